@@ -332,7 +332,7 @@ def _shortage(error: BaseException | None) -> str:
     if error is None:
         return ""
     text = str(error)
-    if isinstance(error, MemoryError) or any(said in text for said in _NO_MEMORY):
+    if isinstance(error, MemoryError) or any(phrase in text for phrase in _NO_MEMORY):
         return (
             "this process is out of memory; data written so far are kept. Close other "
             "programs, or raise its limit (ulimit -v)"

@@ -210,13 +210,13 @@ def _analyse(
 
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
-        told = (
+        motion_document = (
             {"hidden_motion": {each.name: each.to_dict() for each in motions}}
             if hidden is not _Hidden.OMITTED
             else {}
         )
         further = {"responses": {role: campaign_summary(each) for role, each in others.items()}}
-        print_json({**campaign_summary(results), **fitted, **told, **(further if others else {})})
+        print_json({**campaign_summary(results), **fitted, **motion_document, **(further if others else {})})
     for sentence in (
         ()
         if as_json
@@ -225,7 +225,7 @@ def _analyse(
             *(f"warning: {each}" for each in check_warnings(results)),
             *(s for each in motions for s in each.sentences),
             *budget_sentences(results),
-            *(f"{role}: {said}" for role, each in others.items() for said in budget_sentences(each)),
+            *(f"{role}: {text}" for role, each in others.items() for text in budget_sentences(each)),
         )
     ):
         console.print(sentence)

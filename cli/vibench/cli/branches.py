@@ -107,7 +107,7 @@ def branches(
         out,
         lambda folder: write_diagram(diagram, folder / FILE),
         lambda: branches_figure(diagram, measured),
-        is_told=not as_json,
+        is_path_printed=not as_json,
     )
     leave(is_complete=is_complete)
 

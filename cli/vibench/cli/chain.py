@@ -86,7 +86,7 @@ def chain(
         out,
         lambda folder: write_chain(found, folder / FILE),
         lambda: chain_figure(found),
-        is_told=not as_json,
+        is_path_printed=not as_json,
     )
     leave(is_complete=is_complete)
 

@@ -61,8 +61,8 @@ def doctor(as_json: AsJson = False) -> None:
         return
     for title, facts in sections.items():
         console.print(f"{title}:")
-        for name, said in facts.items():
-            console.print(f"  {name}: {said}")
+        for name, fact in facts.items():
+            console.print(f"  {name}: {fact}")
 
 
 def installation() -> dict[str, str]:

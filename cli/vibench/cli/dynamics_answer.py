@@ -57,7 +57,11 @@ def compute_parts(
 
 
 def keep(
-    out: Path | None, write: Callable[[Path], object], draw: "Callable[[], DrawnFigure]", *, is_told: bool
+    out: Path | None,
+    write: Callable[[Path], object],
+    draw: "Callable[[], DrawnFigure]",
+    *,
+    is_path_printed: bool,
 ) -> None:
     """Write the file, its figure and its tables into a folder, if one was given."""
     if out is None:
@@ -65,7 +69,7 @@ def keep(
     out.mkdir(parents=True, exist_ok=True)
     write(out)
     drawn = draw().save(out, (ImageKind.PNG, ImageKind.SVG))
-    if is_told:
+    if is_path_printed:
         console.print("The figure:", bold(drawn[0].resolve()))
 
 

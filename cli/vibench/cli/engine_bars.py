@@ -41,7 +41,7 @@ class EngineBars:
         self._whole: TaskID | None = None
         self._one: TaskID | None = None
         self._name = ""
-        self._told: set[str] = set()
+        self._reported_names: set[str] = set()
         self._messages = 0
 
     def __enter__(self) -> Self:
@@ -77,9 +77,9 @@ class EngineBars:
             self._bars.update(self._one, completed=run.elapsed_s, total=run.total_s, state=text)
 
     def _row(self, row: RowStatus) -> None:
-        if row.state in {"queued", "running"} or row.name in self._told:
+        if row.state in {"queued", "running"} or row.name in self._reported_names:
             return
-        self._told.add(row.name)
+        self._reported_names.add(row.name)
         if row.name == self._name:
             self._drop()
         self._bars.console.print(f"{row.state:11} {row.file or row.name}  ({row.reason})")

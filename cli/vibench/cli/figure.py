@@ -50,13 +50,13 @@ def figure(
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
     # Check the inputs of all figures before drawing the first.
-    asked = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
+    figure_studies = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
 
     def simulated(each: int) -> "Iterator[DrawnFigure]":
-        yield paper_figure(each).draw(options, *(studies(one) for one in asked[each]))
+        yield paper_figure(each).draw(options, *(studies(one) for one in figure_studies[each]))
 
     written: list[dict[str, object]] = []
     for each in numbers:
@@ -69,13 +69,13 @@ def figure(
     studies.complain()
 
 
-def _numbers(asked: str) -> tuple[int, ...]:
+def _numbers(text: str) -> tuple[int, ...]:
     known = (*FILES, *EXPERIMENT)
-    if asked == ALL:
+    if text == ALL:
         return tuple(FILES)
-    if asked.isdigit() and int(asked) in known:
-        return (int(asked),)
-    raise InvalidRequest(f"figure {asked!r} was given; give 1 to {known[-1]}, or all")
+    if text.isdigit() and int(text) in known:
+        return (int(text),)
+    raise InvalidRequest(f"figure {text!r} was given; give 1 to {known[-1]}, or all")
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":

@@ -85,8 +85,8 @@ def map_motions(
     diagram = None if branches is None else read_diagram(branches)
     levels = [recorded_response(path) for path in like or ()]
     if only_estimate:
-        told = estimate_map(request, workers)
-        print_json(told.to_dict()) if as_json else console.print(told.sentence)
+        estimate = estimate_map(request, workers)
+        print_json(estimate.to_dict()) if as_json else console.print(estimate.sentence)
         return
     room_for_folder(out)
     out.mkdir(parents=True, exist_ok=True)

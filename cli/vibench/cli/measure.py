@@ -73,10 +73,10 @@ def print_estimate(
     match form:
         case Form.JSON:
             document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
-            told = {name: [each.to_dict() for each in found] for name, found in known.items()}
+            uncertainties = {name: [each.to_dict() for each in found] for name, found in known.items()}
             ends = {name: {"expected_s": end, "longest_s": most} for name, (end, most) in ends_s.items()}
             within = [asdict(each) for each in shares]
-            print_json(document | {"uncertainty": told, "until": ends, "within": within})
+            print_json(document | {"uncertainty": uncertainties, "until": ends, "within": within})
         case Form.TEXT:
             for share in shares:
                 console.print(share.sentence)

@@ -75,12 +75,12 @@ def validated(model: type[Request], given: Mapping[str, object]) -> Request:
     except ValidationError as error:
         fault = error.errors()[0]
         allowed = _ALLOWED.get(fault["type"], "").format(**fault.get("ctx", {}))
-        said = allowed or fault["msg"].removeprefix("Value error, ")
+        reason = allowed or fault["msg"].removeprefix("Value error, ")
         field = str(fault["loc"][0]) if fault["loc"] else ""
         typed = given.get(field)
         value = typed if fault["input"] is None or isinstance(typed, str) else fault["input"]
         place = f"--{option_name(field)} was given as {value!r}: " if field else ""
-        raise InvalidRequest(place + said) from error
+        raise InvalidRequest(place + reason) from error
 
 
 def option_name(field: str) -> str:
@@ -115,11 +115,11 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
     default = model.model_fields[name].default
     shown = default.value if isinstance(default, Enum) else default
-    said = " ".join(field_docstring(model, name).split())
+    text = " ".join(field_docstring(model, name).split())
     return (
-        said
+        text
         if model.model_fields[name].is_required() or shown in (None, "")
-        else f"{said}  [default: {shown}]"
+        else f"{text}  [default: {shown}]"
     )
 
 

@@ -33,8 +33,8 @@ def print_failures(plan: "GridPlan", failures: Failures) -> int:
     """Print the failed points and the reasons on standard error; return their number."""
     for where, why in failures[:SHOWN_FAILURES]:
         # Omit axes with a single value.
-        told = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
-        place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in told)
+        axes = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
+        place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in axes)
         errors.print(f"error: {place}: {why}")
     if len(failures) > SHOWN_FAILURES:
         more = len(failures) - SHOWN_FAILURES

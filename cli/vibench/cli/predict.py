@@ -109,8 +109,8 @@ def predict(
                 points = [solve_scene(scene) if request.target is None else _refine(scene)]
                 failures = [(where, each.ended) for each in points if each.outcome != Outcome.REACHED_END]
             except (ValueError, RuntimeError) as fault:
-                said = "" if isinstance(fault, ValueError) else f"{type(fault).__name__}: "
-                failures = [(where, f"{said}{fault}")]
+                prefix = "" if isinstance(fault, ValueError) else f"{type(fault).__name__}: "
+                failures = [(where, f"{prefix}{fault}")]
             observer(Progress(1, 1, 0.0, "1 failed" if failures else ""))
         else:
             from vibench.sim.study import ExistingStudy, solve_study
@@ -200,16 +200,16 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
     """
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost
-    said = " ".join(plan.sentences)
+    text = " ".join(plan.sentences)
     if not has_target:  # with a target, the result has the time
-        said += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
+        text += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
-        said += f" {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
+        text += f" {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
     if len(points) == 1:
-        return f"{worst_hz:g} Hz: {method}. {said}"
+        return f"{worst_hz:g} Hz: {method}. {text}"
     span = f"{len(points)} points, {points[0][0]:g} to {points[-1][0]:g} Hz"
-    return f"{span}: {method}. At {worst_hz:g} Hz: {said}"
+    return f"{span}: {method}. At {worst_hz:g} Hz: {text}"
 
 
 def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
@@ -288,12 +288,12 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
     ensembles = [point.ensemble for point in lost if point.ensemble is not None]
     starts, followed_s = sum(each.starts for each in ensembles), sum(each.followed_s for each in ensembles)
     where = f"At {len(lost)} of {len(points)} points"
-    said = f"{where} the motion depends sensitively on the start, or did not settle."
+    text = f"{where} the motion depends sensitively on the start, or did not settle."
     if not ensembles:
         averaged = sum(point.target.starts for point in lost if point.target is not None)
-        return f"{said} There the answer is a mean over starts, {averaged} in all." if averaged else said
+        return f"{text} There the answer is a mean over starts, {averaged} in all." if averaged else text
     return (
-        f"{said} There {starts} starts were simulated for {followed_s:.0f} s in all; "
+        f"{text} There {starts} starts were simulated for {followed_s:.0f} s in all; "
         f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
     )
 

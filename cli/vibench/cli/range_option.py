@@ -70,10 +70,10 @@ def frequencies(text: str) -> tuple[float, ...]:
 
     Raises InvalidRequest for other text, or too many values.
     """
-    asked = range_of(text, Parameter.FREQUENCY, (1, 3))
-    if asked.stop is None or asked.step is None:
-        return (asked.start,)
+    requested = range_of(text, Parameter.FREQUENCY, (1, 3))
+    if requested.stop is None or requested.step is None:
+        return (requested.start,)
     try:
-        return frequency_range(asked.start, asked.stop, asked.step)
+        return frequency_range(requested.start, requested.stop, requested.step)
     except ValueError as error:
         raise InvalidRequest(f"--frequency was given as {text!r}: {error}; give a larger step") from error

@@ -32,7 +32,7 @@ def reproduce(
     damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
     accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = Accuracy.QUICK,
     grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
-    said: Annotated[
+    choices: Annotated[
         list[str] | None,
         option(f"Other open choices of the paper: {_FORMS}.", "NAME=VALUE", name="--with"),
     ] = None,
@@ -51,7 +51,7 @@ def reproduce(
     if as_json:
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
-    case = case_with(options, said or ())
+    case = case_with(options, choices or ())
     room_for_folder(out)
     page = out / PAGE if markdown is None else markdown
     room_for_page(page)
@@ -72,8 +72,8 @@ def reproduce(
     console.print("The page:", bold(page.resolve()))
     console.print("The report:", bold(report.resolve()))
     if as_json:
-        judged = [{"claim": each.claim.says, "verdict": each.verdict.value} for each in found.judgements]
-        print_json({"page": str(page), "report": str(report), "claims": judged})
+        claims = [{"claim": each.claim.says, "verdict": each.verdict.value} for each in found.judgements]
+        print_json({"page": str(page), "report": str(report), "claims": claims})
     studies.complain()
 
 

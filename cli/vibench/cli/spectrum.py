@@ -48,7 +48,7 @@ def spectrum(
             out,
             lambda folder: write_spectrum(found, folder / FILE),
             lambda: exponent_spectrum_figure(found),
-            is_told=not as_json,
+            is_path_printed=not as_json,
         )
     leave(is_complete=is_complete)
 
