@@ -183,33 +183,33 @@ class Judgement:
         return next((each for each in self.findings if each.is_met), None)
 
 
-def finding(asked: Claim, evidence: Evidence, case: Case) -> Finding:
+def finding(claim: Claim, evidence: Evidence, case: Case) -> Finding:
     """Measure a claim under one case, from every start.
 
     An alternative that fails from rest is measured from rest only.
     Raises InvalidRequest when the number of measured values differs from the number of requirements.
     """
-    draws = [_measure(asked, evidence, case)]
-    if asked.is_met_by(draws[0]) or case.name == AS_CHOSEN:
-        draws += [_measure(asked, evidence, replace(case, draw=number)) for number in range(1, asked.draws)]
-    return Finding(case, tuple(draws), sum(asked.is_met_by(values) for values in draws))
+    draws = [_measure(claim, evidence, case)]
+    if claim.is_met_by(draws[0]) or case.name == AS_CHOSEN:
+        draws += [_measure(claim, evidence, replace(case, draw=number)) for number in range(1, claim.draws)]
+    return Finding(case, tuple(draws), sum(claim.is_met_by(values) for values in draws))
 
 
-def _measure(asked: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
-    values = tuple(float(each) for each in asked.measure(Reading(evidence, case)))
-    if len(values) != len(asked.wanted):
+def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
+    values = tuple(float(each) for each in claim.measure(Reading(evidence, case)))
+    if len(values) != len(claim.wanted):
         raise InvalidRequest(
-            f"the claim {asked.key!r} wants {len(asked.wanted)} numbers and {len(values)} were measured; "
+            f"the claim {claim.key!r} wants {len(claim.wanted)} numbers and {len(values)} were measured; "
             "give one for each"
         )
     return values
 
 
-def judgement(asked: Claim, evidence: Evidence, case: Case) -> Judgement:
+def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
     """Measure a claim under a case; if it fails, under its alternatives until it holds for one."""
-    findings = [finding(asked, evidence, case)]
-    for alternative in asked.tried:
+    findings = [finding(claim, evidence, case)]
+    for alternative in claim.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:
             break
-        findings.append(finding(asked, evidence, alternative.of(case)))
-    return Judgement(asked, tuple(findings))
+        findings.append(finding(claim, evidence, alternative.of(case)))
+    return Judgement(claim, tuple(findings))

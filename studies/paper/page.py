@@ -118,32 +118,32 @@ def _line(cells: Sequence[str]) -> str:
     return f"| {' | '.join(each.replace('|', '&#124;') for each in cells)} |"
 
 
-def _row(judged: Judgement) -> str:
-    key, *cells, verdict = _cells(judged)
+def _row(result: Judgement) -> str:
+    key, *cells, verdict = _cells(result)
     bold = verdict.replace(Verdict.FAILS, f"**{Verdict.FAILS}**", 1)
-    return _line((f"**{judged.claim.key}**{key.removeprefix(judged.claim.key)}", *cells, bold))
+    return _line((f"**{result.claim.key}**{key.removeprefix(result.claim.key)}", *cells, bold))
 
 
-def _cells(judged: Judgement) -> tuple[str, ...]:
-    claim = judged.claim
-    measured = _values(claim, judged.findings[0])
-    return f"{claim.key}: {claim.says}", claim.place, measured, wanted_text(claim), verdict_text(judged)
+def _cells(result: Judgement) -> tuple[str, ...]:
+    claim = result.claim
+    measured = _values(claim, result.findings[0])
+    return f"{claim.key}: {claim.says}", claim.place, measured, wanted_text(claim), verdict_text(result)
 
 
-def verdict_text(judged: Judgement) -> str:
+def verdict_text(result: Judgement) -> str:
     """Return the verdict with the option for which it holds."""
-    under, first = judged.met_under, judged.findings[0]
-    match judged.verdict:
+    under, first = result.met_under, result.findings[0]
+    match result.verdict:
         case Verdict.HOLDS_FOR_SHARE:
             share = wilson_share(first.met, len(first.draws))
             return (
-                f"{judged.verdict.value}: {first.met} of {len(first.draws)} "
+                f"{result.verdict.value}: {first.met} of {len(first.draws)} "
                 f"({100 * share.low:.0f} to {100 * share.high:.0f} %)"
             )
         case Verdict.HOLDS_UNDER if under is not None:
             return f"holds under {under.case.name}"
         case Verdict.FAILS:
-            return f"{judged.verdict.value}{_except(judged)}"
+            return f"{result.verdict.value}{_except(result)}"
         case other:
             return other.value
 
@@ -153,37 +153,37 @@ def wanted_text(claim: Claim) -> str:
     return "; ".join(each.sentence for each in claim.wanted)
 
 
-def _difference(judged: Judgement) -> str:
+def _difference(result: Judgement) -> str:
     """Return our numbers, the requirements, and the options under which the claim holds."""
-    found = _values(judged.claim, judged.findings[0])
-    return f"We find {found}; wanted {wanted_text(judged.claim)}. {_upheld(judged)}".strip()
+    found = _values(result.claim, result.findings[0])
+    return f"We find {found}; wanted {wanted_text(result.claim)}. {_upheld(result)}".strip()
 
 
-def _upheld(judged: Judgement) -> str:
+def _upheld(result: Judgement) -> str:
     """Return the options under which a claim holds, with their numbers, and the comment."""
-    claim, alternatives = judged.claim, judged.findings[1:]
-    said = [
+    claim, alternatives = result.claim, result.findings[1:]
+    sentences = [
         f"{'It holds under' if each.is_met else 'Numbers of'} {each.case.name}: {_values(claim, each)}."
         for each in alternatives
         if each.met > 0
     ]
-    if alternatives and judged.met_under is None:
-        said.insert(0, f"None of {len(alternatives)} options tried upholds it{_except(judged)}.")
-    return " ".join([*said, claim.remark]).strip()
+    if alternatives and result.met_under is None:
+        sentences.insert(0, f"None of {len(alternatives)} options tried upholds it{_except(result)}.")
+    return " ".join([*sentences, claim.remark]).strip()
 
 
-def _except(judged: Judgement) -> str:
+def _except(result: Judgement) -> str:
     """Return the options under which a claim holds for some starts only."""
     return "".join(
         f", except {each.case.name} for {each.met} of {len(each.draws)} starts"
-        for each in judged.findings
+        for each in result.findings
         if each.is_met_in_part
     )
 
 
 def _values(claim: Claim, found: Finding) -> str:
-    said = "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
-    return said if len(found.draws) < 2 else f"{said}; over {len(found.draws)} starts"
+    text = "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
+    return text if len(found.draws) < 2 else f"{text}; over {len(found.draws)} starts"
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:
@@ -193,11 +193,11 @@ def _value(wanted: Expectation, found: Finding, number: int) -> str:
     return value if low == high else f"{value} ({low} to {high})"
 
 
-def _tried(judged: Judgement) -> Iterator[str]:
-    for each in judged.findings:
+def _tried(result: Judgement) -> Iterator[str]:
+    for each in result.findings:
         in_part = f"holds for {each.met} of {len(each.draws)} starts"
         mark = in_part if each.is_met_in_part else "holds" if each.is_met else "does not hold"
-        yield f"{each.case.name}: {_values(judged.claim, each)} ({mark})"
+        yield f"{each.case.name}: {_values(result.claim, each)} ({mark})"
 
 
 def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigure) -> Page:

@@ -80,15 +80,15 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
     """Draw the score, and the largest exponents at 1 and 5 um, over damping."""
     damping_s = np.array([each.damping_time_s for each in scores])
     held = np.array([len(each.held) for each in scores])
-    asked = len(scores[0].held) + len(scores[0].failed)
+    count = len(scores[0].held) + len(scores[0].failed)
     weak = np.array([each.weak_exponent_per_s for each in scores])
     moderate = np.array([each.moderate_exponent_per_s for each in scores])
     with report.styled():
         figure = report.new_figure(4.6)
         top, low = figure.subplots(2, 1, sharex=True)
         top.plot(1e6 * damping_s, held, color=report.MEASURED, marker="o")
-        top.set_ylim(0, asked)
-        top.set_ylabel(f"claims that hold, of {asked}")
+        top.set_ylim(0, count)
+        top.set_ylabel(f"claims that hold, of {count}")
         low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # before plotting: margins depend on it
         for values, label, colour, marker in (
             (weak, "1 µm: near zero in the paper", report.LEVELS[0], "o"),
@@ -116,8 +116,11 @@ def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -
     rows = []
     for claim in claims:
         # Claims on continuous models take too long to be computed under the settings in between.
-        asked = settings if claim.is_scored else [settings[0], settings[-1]]
-        held = {each.name: "holds" if holds_from_rest(claim, evidence, each) else "fails" for each in asked}
+        claim_settings = settings if claim.is_scored else [settings[0], settings[-1]]
+        held = {
+            each.name: "holds" if holds_from_rest(claim, evidence, each) else "fails"
+            for each in claim_settings
+        }
         rows.append([held.get(each.name, "") for each in settings])
     totals = [f"{each.count('holds')} of {len(each) - each.count('')}" for each in zip(*rows, strict=True)]
     kept = [(claim.key, *row) for claim, row in zip(claims, rows, strict=True) if "fails" in row]
