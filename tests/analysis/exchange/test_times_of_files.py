@@ -335,7 +335,7 @@ def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, no
 
 @pytest.mark.parametrize(
     ("heading", "order"),
-    [*product(["time [s]", "Zeit", "t (s)", "t"], ["falling", "shuffled"]), ("time", "not a number")],
+    [*product(["time [s]", "Zeit", "t (s)", "t"], ["falling", "shuffled"]), ("time [s]", "not a number")],
 )
 def test_times_that_do_not_rise_are_refused(tmp_path, order, heading):
     times = np.arange(SAMPLES) / RATE_HZ
@@ -348,6 +348,19 @@ def test_times_that_do_not_rise_are_refused(tmp_path, order, heading):
     (tmp_path / "a.csv").write_text(f"{heading};a;b\n" + "".join(rows))
     with pytest.raises(InvalidRequest, match="times that do not rise; sort its rows by time"):
         import_recording(tmp_path / "a.csv", mapped("csv", RATE_HZ), tmp_path / "made.h5")
+
+
+@pytest.mark.parametrize("heading", ["t", "T", "Temps"])
+def test_another_quantity_under_a_short_name_is_no_time(tmp_path, heading):
+    rng = np.random.default_rng(4)
+    torque, warmth = rng.standard_normal(SAMPLES), np.round(np.linspace(20.0, 21.0, SAMPLES), 2)
+    other = torque if heading == "t" else warmth + 0.01 * rng.integers(-1, 2, SAMPLES)
+    signal = motion(np.arange(SAMPLES) / RATE_HZ)
+    rows = (f"{t:.7g};{x:.9g};{2 * x:.9g}\n" for t, x in zip(other, signal, strict=True))
+    (tmp_path / "a.csv").write_text(f"{heading};a;b\n" + "".join(rows))
+    made = import_recording(tmp_path / "a.csv", mapped("csv", RATE_HZ), tmp_path / "made.h5")
+    with open_recording(made) as recording:
+        assert not recording.gaps
 
 
 @pytest.mark.parametrize("first", [0.0, 7.3, 1.7e9])

@@ -156,11 +156,12 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
-    """Return whether a column under a name of times has times in any order; a bare "t" may be a torque."""
-    if found is not None and (channel.unit or found["unit"] or len(found[0]) > 1):
+    """Return whether a column under a name of times has times in any order; "t" and "temps" may be others."""
+    if found is not None and (channel.unit or found["unit"]):
         return True
-    in_order = _begin(np.sort(first))
-    return in_order is not None and not in_order.is_coarse
+    steps = np.diff(np.sort(first))
+    typical = max(float(np.median(steps)), np.finfo(float).tiny)
+    return bool(np.count_nonzero(np.abs(steps / typical - 1) > _OFF) <= _MANY_OFF * steps.size)
 
 
 @dataclass(frozen=True)
