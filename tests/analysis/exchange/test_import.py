@@ -650,6 +650,12 @@ def test_the_mappings_in_the_manual_are_valid(tmp_path, number, units):
     assert [each.kind[1] for each in meaning.channels] == units
 
 
+@pytest.mark.parametrize(("role", "unit"), [("m0_acceleration", "m s-2"), ("m0_displacement", "m")])
+def test_other_sensors_on_m0_need_no_unit_in_the_mapping(tmp_path, role, unit):
+    meaning = mapping(tmp_path, ("1", "drive_voltage", ""), ("2", role, ""))
+    assert meaning.channels[1].kind == (role.removeprefix("m0_"), unit)
+
+
 def test_one_channel_of_a_file_can_be_imported_as_two(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))

@@ -12,15 +12,14 @@ from vibench.acquisition.rig import size_of_unit, volts_per_unit
 from vibench.sim import FrozenModel, SpecimenTable
 
 from ..recordings.channels import BASE, DRIVE
-from ..recordings.response import ACCELERATION, DISPLACEMENT, VELOCITY
 
 KNOWN_ROLES = {
     DRIVE: ("voltage", "V"),
     "amplifier_voltage": ("voltage", "V"),
     BASE: ("acceleration", "m s-2"),
-    VELOCITY: ("velocity", "m s-1"),
-    ACCELERATION: ("acceleration", "m s-2"),
-    DISPLACEMENT: ("displacement", "m"),
+    "m0_velocity": ("velocity", "m s-1"),
+    "m0_acceleration": ("acceleration", "m s-2"),
+    "m0_displacement": ("displacement", "m"),
 }
 """Quantity and unit of these channels in the analysis."""
 
