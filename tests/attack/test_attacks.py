@@ -23,10 +23,10 @@ SEED = 2025
 @pytest.mark.parametrize(
     ("attack", "count"),
     [
-        (toml_files.attack, 80),
-        (imported_files.attack, 100),
-        (engine_messages.attack, 250),
-        (instrument_messages.attack, 750),
+        (toml_files.attack, 50),
+        (imported_files.attack, 60),
+        (engine_messages.attack, 150),
+        (instrument_messages.attack, 400),
         (instrument_replies.attack, 12),
         (altered_recordings.attack, 12),
     ],

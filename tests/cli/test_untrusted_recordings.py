@@ -98,7 +98,7 @@ def said_by_all(vibench_here, folder, name="dwell.h5"):
 @pytest.mark.parametrize(
     "change",
     [
-        pytest.param(each, marks=[pytest.mark.slow] if each in {"units", "rig", "delay"} else [])
+        pytest.param(each, marks=[pytest.mark.slow] if each in {"units", "rig", "delay", "plan"} else [])
         for each in CHANGES
     ],
 )
@@ -121,7 +121,7 @@ def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, fold
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("how", ["copied over", "sealed anew"])
+@pytest.mark.parametrize("how", [pytest.param("copied over", marks=pytest.mark.slow), "sealed anew"])
 def test_a_swapped_recording_is_refused_by_every_command(vibench_here, folder, how):
     noted(folder, ("dwell", "noise"))
     assert {code for code, _ in said_by_all(vibench_here, folder).values()} == {0}

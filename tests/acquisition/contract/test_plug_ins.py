@@ -133,7 +133,7 @@ def test_third_party_instruments_measure_without_changes_to_vibench(installed, t
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["plain_scpi", "charge_amplifier"])
+@pytest.mark.parametrize("name", ["plain_scpi", pytest.param("charge_amplifier", marks=pytest.mark.slow)])
 def test_third_party_instruments_can_run_the_contract_tests(installed, tmp_path, name):
     """Wherever it is asked for: outside of our folder pytest knows none of our settings."""
     done = contract(name, f"--vibench-bench={BENCH}", path=installed, folder=tmp_path)

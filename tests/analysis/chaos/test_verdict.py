@@ -217,7 +217,7 @@ def known_exponent(name):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["duffing", "henon", "stops"])
+@pytest.mark.parametrize("name", ["duffing", pytest.param("henon", marks=pytest.mark.slow), "stops"])
 def test_the_exponent_of_points_is_within_its_bound(name):
     """Of the Duffing oscillator 83.9 +- 2.1 or, in more noise, 66.3 +- 2.3 per second was said for 142.5."""
     points, exponent = known_exponent(name)

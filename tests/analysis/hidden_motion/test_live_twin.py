@@ -120,7 +120,9 @@ def test_untrackable_benches_and_specimens_are_refused(live_world, at_once):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("kind", "level_vpp"), [(261.0, 1.7), ("noise", 8.0)])
+@pytest.mark.parametrize(
+    ("kind", "level_vpp"), [pytest.param(261.0, 1.7, marks=pytest.mark.slow), ("noise", 8.0)]
+)
 def test_vibrometer_drop_outs_trigger_no_change_alarm(live_world, kind, level_vpp):
     lost = []
     for seed in (74, 75, 76):  # one draw of a colliding motion may lose its track once, for 33 ms

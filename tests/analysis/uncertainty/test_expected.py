@@ -126,7 +126,9 @@ def test_an_uncomputable_motion_has_no_expected_uncertainty(monkeypatch):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), (300.0, 5.0)])
+@pytest.mark.parametrize(
+    ("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), pytest.param(300.0, 5.0, marks=pytest.mark.slow)]
+)
 def test_a_dwell_that_collides_is_known_as_well_as_was_stated_before(tmp_path, at_hz, level_vpp):
     """One run under a base that does not yield told it up to 3.4 times too well."""
     plan = dwell(at_hz, level_vpp)

@@ -122,7 +122,7 @@ def test_unaudited_filled_cells_widen_the_shares():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("rare", [0.02, 0.15])
+@pytest.mark.parametrize("rare", [0.02, pytest.param(0.15, marks=pytest.mark.slow)])
 def test_share_intervals_hold_for_rare_kinds(rare):
     held, middles = 0, []
     for seed in range(20):
