@@ -1,10 +1,10 @@
 """Recordings and predictions become frequency responses, spectra, responses, figures and reports.
 
-Pure functions with frozen results; what can have an uncertainty carries one. SI units; a name says the
-unit where it is not plain. An error says what was given, what is allowed, and what to do next.
-Rooms go from signals over recordings, frequency responses and sines to the model beside the
-measurement, figures, results and reports. Of the bench only recordings and plans are known:
-no instrument, no window. Names below are looked up on first use.
+Functions are pure and results are immutable; values have an uncertainty where one can be computed. SI
+units; names end with the unit where needed. Errors state what was given, what is allowed and what to do.
+The packages cover signals, recordings, frequency responses and sines, the model beside the measurement,
+figures, results and reports. They use recordings and plans of a bench, but no instruments and no windows.
+The names below are imported on first use.
 
 A mass on a base that shakes as noise, resonant at 95 Hz with a damping ratio of 0.01:
 

@@ -1,4 +1,4 @@
-"""What is chosen before a figure is drawn; options of commands name it where matplotlib is not installed."""
+"""Choices for figures, kept apart so that commands can list them without matplotlib installed."""
 
 from enum import StrEnum
 

@@ -1,4 +1,4 @@
-"""Columns of numbers beside a figure, and as a CSV file that any program reads; fields by their names."""
+"""Tables of numbers for figures and CSV files, and conversion of results to JSON and xarray."""
 
 import csv
 import inspect
@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 
 _DIGITS = 10
 _PLAIN = (1e-5, 1e7)
-"""Sizes between which numbers are written without a power of ten."""
+"""Range of magnitudes that are written without a power of ten."""
 
 
 def plus_minus(value: float, half_width: float) -> str:
-    """Write a value with two digits of its uncertainty, and to as many places: ``"94.613 ± 0.012"``.
+    """Write a value and its uncertainty, rounded to two digits of the uncertainty: ``"94.613 ± 0.012"``.
 
-    Without an uncertainty that is finite and above zero, four digits of the value stand alone.
+    If the uncertainty is not finite and positive, write four digits of the value only.
     """
     if not 0.0 < half_width < np.inf or not np.isfinite(value):
         return f"{value:.4g}"
     largest = max(abs(value), half_width)
     if not _PLAIN[0] <= largest < _PLAIN[1]:
         power = int(np.floor(np.log10(largest)))
-        # In decimals: a power of ten may lie beyond the numbers of the machine where its part does not.
+        # Decimal, because the power of ten itself may exceed the range of floats.
         scaled = (float(Decimal(float(each)).scaleb(-power)) for each in (value, half_width))
         return f"({plus_minus(*scaled)})e{power}"
-    # The exponent of the two digits as they are written: 0.0996 is 0.10.
+    # Use the exponent after rounding: 0.0996 is written as 0.10.
     place = 1 - int(f"{half_width:.1e}".partition("e")[2])
     shown = max(place, 0)
     return f"{round(value, place) + 0.0:.{shown}f} ± {round(half_width, place):.{shown}f}"
@@ -66,8 +66,8 @@ def table(name: str, **columns: ArrayLike) -> Table:
 def columns(source: object, keys: str) -> dict[str, Any]:
     """Return values of a result by the keys of a document, or the headings of a table.
 
-    ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"``: a field or property by its own name, one of a
-    part (None where the part is None), one item of an array, and the keys of a part's document.
+    Example: ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"`` takes a field or property, an attribute
+    of a part (None if the part is None), an item of an array, and all keys of a part's document.
     """
     found: dict[str, Any] = {}
     for each in keys.split():
@@ -96,9 +96,9 @@ def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: numbers that are not finite are None.
+    """Convert a value for JSON; numbers that are not finite become None.
 
-    A dataclass becomes its ``DOCUMENT``, as `columns` reads it; without one, all its fields.
+    A dataclass becomes the keys in its ``DOCUMENT`` (see `columns`), or all its fields if it has none.
     """
     match value:
         case np.ndarray() | np.generic():
@@ -134,7 +134,7 @@ def _cells(values: ArrayLike) -> tuple[float | str, ...]:
 
 
 def write_csv(content: Table, path: Path) -> Path:
-    """Write a table: headings in the first row, points as decimal marks, empty cells where a column ends."""
+    """Write a table: headings in the first row, decimal points, empty cells below shorter columns."""
     headings = [heading for heading, _ in content.columns]
     rows = zip_longest(*(values for _, values in content.columns), fillvalue="")
     with replace_file(path) as coming, coming.open("w", newline="", encoding="utf-8") as file:
@@ -173,21 +173,21 @@ UNITS = {
     "_ns_per_m": "N s m-1",
     "_s_per_m": "s m-1",
 }
-"""Unit of a value by the end of its name; the longest match counts."""
+"""Unit of a value by the suffix of its name; the longest matching suffix counts."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
-"""Independent variables; the first that a result has is used."""
+"""Names of independent variables; a result uses the first one that it has."""
 
 
 class Labelled:
-    """A result that becomes a labelled Dataset: fields and bounds by their names, with units."""
+    """Base class of results that can be converted to JSON and to a labelled xarray Dataset with units."""
 
     OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """Units of values whose name says none, and of parts what ``{unit}`` is in theirs; ``{0.name}``: a field.
+    """Units of values without a suffix. For a part: the unit that replaces ``{unit}`` in its own texts.
 
-    Any class that is a part of a result may have it, and the next one.
+    ``{0.name}`` inserts a field. Classes of parts may define this and ``DOCUMENT`` too.
     """
     DOCUMENT: ClassVar[str] = ""
-    """Keys of its JSON document, as `columns` reads them; all fields when empty."""
+    """Keys of the JSON document in the syntax of `columns`; all fields when empty."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON document; numbers that are not finite are None."""
@@ -196,13 +196,13 @@ class Labelled:
     def to_xarray(self) -> "xarray.Dataset":
         """Return all numbers of the result as an `xarray.Dataset`.
 
-        Arrays lie over the result's frequencies or times where they have as many values; bounds
-        (``magnitude_lower``) and deviations (``sd_...``) stand beside their values; what is inside of a part
-        has the part's name before its own (``response_frequency_hz``). Parts of single numbers, such as
-        resonances, lie below each other (``resonances_frequency_hz``); others are numbered. Each variable
-        has the attribute ``units`` unless it is a pure number or its unit depends on what was given;
-        rows of several units have them beside their values (``values_value_units``). Texts and settings that
-        are words are attributes.
+        Arrays as long as the result's frequencies or times share that dimension. Bounds
+        (``magnitude_lower``) and deviations (``sd_...``) are separate variables. Names of values in a part
+        begin with the part's name (``response_frequency_hz``). A list of parts of single numbers, such as
+        resonances, becomes one array per field (``resonances_frequency_hz``); other parts are numbered.
+        Each variable has the attribute ``units`` unless it is a pure number or its unit depends on the
+        input; rows of different units have a variable of units (``values_value_units``). Texts are
+        attributes.
 
         Raises InvalidRequest when xarray is not installed.
         """
@@ -218,7 +218,7 @@ class Labelled:
 
 
 def unit_of(name: str) -> str:
-    """Return the unit given by the end of a name, in UDUNITS text; empty without one.
+    """Return the unit by the suffix of a name, as UDUNITS text; empty without such a suffix.
 
     >>> unit_of("damping_ns_per_m"), unit_of("frequency_hz"), unit_of("response_i")
     ('N s m-1', 'Hz', '')
@@ -279,7 +279,7 @@ def _collect(
 
 
 def _is_table(parts: tuple[Any, ...]) -> bool:
-    """Return whether parts are of one kind and hold numbers, words and equally long lists of numbers only."""
+    """Return whether all parts have one type and only numbers, words and equally long lists of numbers."""
     if not all(is_dataclass(each) for each in parts):
         return False
     shapes = {_row_shape(each) for each in parts}
@@ -287,7 +287,7 @@ def _is_table(parts: tuple[Any, ...]) -> bool:
 
 
 def _row_shape(part: Any) -> tuple[Any, ...] | None:
-    """Return type and length of every list of a part; None if it contains anything else."""
+    """Return the type of a part and the lengths of its lists; None if it has fields that do not fit a row."""
     lengths = []
     for _, value in _numbers_of(part):
         match value:
