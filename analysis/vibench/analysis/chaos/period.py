@@ -10,19 +10,19 @@ from ..tables import Labelled
 
 LONGEST_PERIOD = 32
 _TABLE = 2
-"""Dimensions of points: periods and coordinates."""
+"""Number of dimensions of an array of points: periods by coordinates."""
 STEADY = 2e-3
-"""Relative scatter of a steady motion: no drive is steadier."""
+"""Relative scatter that is allowed for a steady motion, because no drive is steadier."""
 _NOISE_MARGIN = 1.5
-"""Largest ratio of measured to expected scatter that noise explains."""
+"""Largest ratio of measured to expected scatter that is attributed to noise."""
 _REPEATED = 0.25
 """Largest share of the points' variance that may remain for a period above one."""
 _BLOCKS = 10
 _DRIFT = 5.0
-"""Standard errors of a slope that one settled record in 250 exceeds (four quantities, eight blocks)."""
+"""Largest drift [standard errors]; one settled record in 250 exceeds it (four quantities, eight blocks)."""
 
 _STEADY_SCATTER = 0.9
-"""Ratio of the scatter of the two halves of a record, above which it does not decay."""
+"""Least ratio of the smaller to the larger scatter of the two halves of a settled record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ def drift(points: Points) -> float:
 
 
 def slow_share(points: Points) -> float:
-    """Return the share of the points' variance between the means of tenths of the record."""
+    """Return the variance of the means of tenths of the record, as a share of the points' variance."""
     means = np.array([block.mean(axis=0) for block in np.array_split(points.value, _BLOCKS)])
     whole = float(np.sum(np.var(points.value, axis=0)))
     return float(np.sum(np.var(means, axis=0))) / whole if whole > 0.0 else 0.0
@@ -115,7 +115,7 @@ def is_settled(points: Points) -> bool:
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the scatter about the mean point changes by a tenth, however small it is."""
+    """Return whether the scatter about the mean point changes by a tenth or more, even if it is small."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

@@ -31,10 +31,10 @@ from .witnesses import (
 
 _HARMONICS = 8
 _EXPLAINED = 0.02
-"""Largest residual of a fit of one rotation's harmonics to a smooth closed curve, relative to the spread."""
+"""Largest residual of a closed curve fitted with harmonics of one rotation, relative to the spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Largest residual of one rotation that is significant above noise."""
+"""Largest relative residual of a closed curve, even if the noise would explain more."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -43,12 +43,12 @@ _MAINS_WITHIN = 1e-3
 
 @dataclass(frozen=True)
 class Rotation:
-    """Best closed curve through the points of a section."""
+    """Closed curve that fits the points of a section best."""
 
     turns_per_period: float
     """Rotation number: turns per drive period, 0 to 0.5."""
     left_over: float
-    """RMS distance of the points from it, relative to their spread."""
+    """RMS distance of the points from the curve, relative to their spread."""
 
 
 def rotation(points: Reals) -> Rotation:
@@ -121,28 +121,28 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""Number of last points whose shape is tested; more would only take time."""
+"""Number of points at the end of a record to test for shape; more would only take time."""
 ABOVE_NOISE = 5.0
 """Least ratio of scatter to noise for tests of the shape."""
 LARGEST_NOISE = 0.1
 """Largest ratio of noise to orbit; more noise could hide another motion."""
 SMALL = 0.05
-"""Largest scatter relative to the orbit of a periodic motion with linear noise."""
+"""Largest scatter of a periodic motion with linear noise, relative to the orbit."""
 SLOW = 0.5
-"""Share of the variance between tenths of the record, beyond which slow change explains the scatter."""
+"""Largest share of the variance between tenths of the record; beyond it the motion changes slowly."""
 _FEWEST_TURNS = 3.0
 """Fewest turns of a closed curve in a record; fewer count as a slow change."""
 _LARGEST_HUM = 0.1
 """Largest mains hum relative to the orbit; more may be motion at its frequency."""
 _LOW_PERIOD = 4
-"""Longest period of interest; a drive at twice the mains frequency makes hum repeat as soon."""
+"""Longest period of interest; hum can repeat as soon if the drive is at twice the mains frequency."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40."""
 _ASYMMETRIC = 2.5
-"""The same for time symmetry; noise exceeds it in about 4 % of cases (better of two coordinates)."""
+"""Required margin for time symmetry; noise exceeds it in about 4 % of cases (better of two coordinates)."""
 _SURELY = 3.0
-"""Distance of the lower bound below a slope in standard deviations, from tenths of a record."""
+"""Distance of the lower bound below the slope, in standard deviations (from tenths of a record)."""
 _DELAYS = 3
 _STEPS = 8
 
@@ -280,7 +280,7 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
 
 
 def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
-    """Return the verdict on a periodic motion with mains hum, which may also be motion at its frequency."""
+    """Return the verdict on a motion with a component at a mains frequency: hum if small, or undecided."""
     if evidence.spread <= _LARGEST_HUM and (period is None or period > _LOW_PERIOD):
         why = (
             f"the points repeat every drive period, except for {100 * evidence.spread:.2g} % of the orbit at "
@@ -348,7 +348,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
-    """Test for noise after a static nonlinearity: a monotone one keeps ranks, any keeps time symmetry."""
+    """Test for noise after a static nonlinearity, by ranks (if monotone) and by time symmetry (if not)."""
     ranked = [surrogate_test(normal_scores(each), seed=seed) for each in points.value.T]
     weakest, strongest = max(ranked, key=lambda each: each.p), max(ranked, key=lambda each: each.margin)
     if not weakest.rejects_linear_noise:

@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""Neighbours tried for each point; those within its own time window do not count."""
+"""Limit on the neighbours tried for each point, since those near in time do not count."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -39,12 +39,12 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """The nearest other point of each point that has one."""
+    """Pairs of a point and its nearest neighbour, for the points that have one."""
 
     point: Integers
     neighbour: Integers
     distance: Reals
-    """Shape (pairs,)."""
+    """Distance of each pair, shape (pairs,)."""
 
 
 def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> Neighbours:
@@ -86,8 +86,8 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
 def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
     """Find several neighbours of each point, at least ``apart`` steps away in time.
 
-    Returns the nearest points of each, and which of them are its neighbours, at most ``count``; shapes (n,
-    tried).
+    Returns indices of the nearest points, and flags for at most ``count`` of them that are neighbours; shapes
+    (n, tried).
     """
     tried = min(count + 2 * apart - 1, len(points))
     index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
@@ -96,9 +96,9 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Larger distances relative to the typical one are limited by the size of the attractor."""
+"""Distance relative to the typical one, above which the size of the attractor limits growth."""
 _ABOVE_NOISE = 3.0
-"""Least ratio of a distance to the noise."""
+"""Least ratio of a distance to the noise in the fit."""
 _SHORTEST_FIT = 3
 """Fewest steps for a line fit."""
 _BLOCKS = 10
@@ -112,7 +112,7 @@ class Divergence:
     logarithm: Reals
     """Mean ln(distance), shape (steps + 1,)."""
     size: float
-    """ln of the typical distance of two points of the motion."""
+    """Logarithm of the typical distance of two points of the motion."""
     first: int
     last: int
     """Steps between which the line was fitted; last - first is 0 if there was no room for one."""
@@ -169,7 +169,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
 
 
 def _typical(points: Reals) -> float:
-    """Mean ln distance of unrelated points, half the record apart."""
+    """Return the mean logarithm of the distance of points that are half the record apart."""
     half = points.shape[0] // 2
     distance = np.linalg.norm(points[half : 2 * half] - points[:half], axis=1)
     return float(np.mean(np.log(np.maximum(distance, np.finfo(np.float64).tiny))))
@@ -180,7 +180,7 @@ def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int,
     above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
     beyond = np.flatnonzero(mean > top)
     first = int(above[0]) if above.size else mean.size - 1
-    # Initially a difference rotates into the stretching direction, which is not part of the line.
+    # The first steps are not fitted: the difference still rotates into the direction of growth.
     first = max(first, apart)
     last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
     return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
@@ -197,10 +197,10 @@ def _slope(logarithms: Reals, first: int, last: int) -> tuple[float, float]:
 
 
 _LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
-"""Frequencies c outside are prone to resonances (section 3.1 of the source)."""
+"""Range of the frequencies c; others are prone to resonances (Gottwald and Melbourne, section 3.1)."""
 _FREQUENCIES = 100
 _CUT = 10
-"""The mean square displacement is computed over this fraction of the series."""
+"""The mean square displacement is computed for lags up to the length of the series over this number."""
 FEWEST = 200
 OVERSAMPLED = 0.8
 """Correlation of neighbours above which a series is a flow sampled too finely for this test."""
@@ -208,14 +208,14 @@ OVERSAMPLED = 0.8
 
 @dataclass(frozen=True)
 class ZeroOne:
-    """What the 0-1 test says."""
+    """Result of the 0-1 test."""
 
     k: float
     """Median of the correlations K_c: near 0 regular, near 1 chaotic *or noisy*."""
     spread: float
-    """Half their interquartile range."""
+    """Half the interquartile range of the K_c."""
     neighbour_correlation: float
-    """Neighbour correlation of each value with the next."""
+    """Correlation of each value with the next."""
 
     @property
     def is_oversampled(self) -> bool:
@@ -254,7 +254,7 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
 
 
 def _correlation(series: Reals, frequency: float) -> float:
-    """K_c: correlation of the mean square displacement of the translated motion with time."""
+    """Return K_c, the correlation of the mean square displacement with time."""
     count = series.size
     cut = count // _CUT
     walk = np.cumsum(series * np.exp(1j * frequency * np.arange(1, count + 1)))
@@ -269,7 +269,7 @@ def _correlation(series: Reals, frequency: float) -> float:
 SURROGATES = 39
 """For linear noise, the statistic is the smallest of 40 with probability 1/40 = 0.025."""
 _DELAYS, _NEIGHBOURS = 4, 10
-"""Number of values in a past, and of similar pasts used to predict the next value."""
+"""Number of values in a delay vector, and of similar vectors used to predict the next value."""
 _ITERATIONS = 200
 _SETTLED = 1e-8
 _LAGS = (1, 2, 3, 4)
@@ -286,7 +286,7 @@ class SurrogateTest:
     spectrum_error: float
     """Largest relative error of a surrogate's spectrum."""
     least_margin: float = 0.0
-    """Smaller margins are due to chance."""
+    """Least `margin` that rejects linear noise; smaller ones may be chance."""
 
     @property
     def margin(self) -> float:
@@ -335,14 +335,14 @@ def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
 
 
 def prediction_error(series: Reals) -> float:
-    """Return the relative prediction error of each value from what followed the most similar pasts.
+    """Return the relative error of predicting each value from the successors of similar delay vectors.
 
     Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
     4.2), mean over neighbours: far below 1 for a deterministic series, near 1 otherwise. With one neighbour
-    or fewer delays, more chaos with impacts stayed undecided.
+    or fewer delays, more chaotic motions with impacts remained undecided.
     """
     pasts, next_values = delay_vectors(series, _DELAYS)[:-1], series[_DELAYS:]
-    # Pasts with values in common are not neighbours.
+    # Delay vectors that overlap in time are not neighbours.
     index, nearest = neighbours_apart(pasts, _DELAYS, _NEIGHBOURS)
     has = nearest.any(axis=1)
     foretold = np.sum(next_values[index[has]] * nearest[has], axis=1) / np.sum(nearest[has], axis=1)
@@ -386,7 +386,7 @@ def surrogate_test(
 
 
 def normal_scores(series: Reals) -> Reals:
-    """Replace values by normal ones of the same rank, which undoes a static monotone nonlinearity.
+    """Replace values by normal scores of the same rank, which undoes a static monotone nonlinearity.
 
     Surrogates of the distorted values would match the spectrum only after iterations.
     """
@@ -395,7 +395,7 @@ def normal_scores(series: Reals) -> Reals:
 
 
 def _with_matching_ends(series: Reals) -> Reals:
-    """Cut a few values off so that the ends match: a jump there would act like noise."""
+    """Cut values off so that both ends match; a jump between them would act like noise in the spectrum."""
     most = max(1, series.size // 10)
     heads = series[:most]
     tails = series[series.size - most :]
