@@ -1,8 +1,7 @@
 """Curve for comparisons: motion of m0 over motion of the base, against frequency.
 
-All measured and predicted responses are ratios of displacements and share one axis. The name tells them
-apart: the transmission
-of a colliding specimen is not its Response I.
+All measured and predicted responses are ratios of displacements and share one axis. Names distinguish
+them, because the transmission of a specimen with impacts is not its Response I.
 """
 
 from collections.abc import Sequence
@@ -61,7 +60,7 @@ class Curve(Labelled):
 
     @property
     def name(self) -> str:
-        """``"sweep_weak, Response II, measured"``."""
+        """Name with quantity and origin: ``"sweep_weak, Response II, measured"``."""
         return f"{self.source}, {self.response.value}, {self.origin.value}"
 
     @property
@@ -80,7 +79,7 @@ class Curve(Labelled):
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Return frequencies and bounds at no more than ``columns`` points: areas are slow to draw."""
+        """Return frequencies and bounds at ``columns`` points at most, because areas are slow to draw."""
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)
@@ -88,7 +87,7 @@ class Curve(Labelled):
 
     @property
     def _reach(self) -> Reals:
-        """Wider bounds would only fill the picture."""
+        """Half width of the bounds of ln(magnitude), at most ln 10 so that they do not fill the figure."""
         return np.minimum(2 * self.relative_sd, np.log(10.0))
 
     def at(self, frequency_hz: Reals) -> "Curve":
@@ -145,11 +144,6 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
     )
 
 
-# Peaks of a curve, interpolated between its points, with the half-power width if it is resolved.
-#
-# Values of curves at the markers.
-
-
 @dataclass(frozen=True)
 class Reading:
     """Values of one curve at the markers."""
@@ -158,7 +152,7 @@ class Reading:
     magnitudes: tuple[float, ...]
     """One value for each marker; NaN outside the curve."""
     decibel: float
-    """Last value over first; NaN if either is missing."""
+    """Last value over first [dB]; NaN if either is missing."""
 
 
 def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
@@ -177,9 +171,9 @@ _LEAST_RISE_DB = 3.0
 _LEAST_RISE_SD = 8.0
 """Least height in standard deviations: the range of a thousand points of noise is 6.5."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""A peak with this many others within this many half widths is not a mode: chaotic motion has many peaks."""
+"""Pairs (peaks, half widths): within this distance, a mode has at most this many peaks, itself included."""
 _CROWD_RISE = 0.3
-"""Others are counted from this share of the required height."""
+"""Least height of counted peaks, as a share of the required height."""
 _USUAL_HALF_WIDTH = 0.01
 """Assumed relative half width of a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
@@ -196,7 +190,7 @@ class CurvePeak:
     relative_sd: float
     """Relative standard deviation of the magnitude; NaN if unknown."""
     half_power_width_hz: float | None
-    """Half-power frequencies; None if a neighbouring peak is closer."""
+    """Width between the half-power frequencies; None if a neighbouring peak or the end is nearer."""
 
     @property
     def damping_ratio(self) -> float | None:
@@ -233,7 +227,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
             break
         peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
         away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
-        # It is itself one of them.
+        # The counts include the peak itself.
         if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
             peaks.append(peak)
     return tuple(sorted(peaks, key=lambda each: each.frequency_hz))

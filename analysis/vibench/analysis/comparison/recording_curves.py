@@ -37,7 +37,7 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
 
 
 def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Iterator[Curve]:
-    """Yield the curve of an estimated transmission with its bounds."""
+    """Yield the curve of an estimated transmission with its standard deviation."""
     found = response.frequency_response
     how = found.settings
     note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
@@ -133,7 +133,7 @@ class AnalysisOptions(FrozenModel):
 
     @model_validator(mode="after")
     def _is_allowed(self) -> Self:
-        """Refuse invalid combinations with the analysis' own error."""
+        """Refuse invalid combinations by building the request, which raises the error."""
         self.request  # noqa: B018 - making it is the check
         return self
 
@@ -144,5 +144,5 @@ class AnalysisOptions(FrozenModel):
 
     @property
     def simulation(self) -> Simulation:
-        """Input of the model, if it is overlaid."""
+        """Simulation to compute, by its input: none, recorded voltage or recorded base motion."""
         return _SIMULATIONS[self.model]
