@@ -28,14 +28,14 @@ class LineEvent:
     frequency_hz: float
     amplitude_m: float
     index: int
-    """Index of the point of the branch before it."""
+    """Index of the last point of the branch before the event."""
     response_ii: float
-    """Response II of m0 there, between the two points."""
+    """Response II of m0 at the event, interpolated between the points on either side."""
 
 
 @dataclass(frozen=True, eq=False)
 class BranchLine(Labelled):
-    """One branch; n points in order."""
+    """One branch with n points, in order along the branch."""
 
     OWN_UNITS: ClassVar = {"states": "m, m, m, m s-1, m s-1, m s-1"}
     DOCUMENT: ClassVar = "periods shape has_twin is_isolated origin begin end elapsed_s events points=motions"
@@ -63,13 +63,13 @@ class BranchLine(Labelled):
     has_twin: bool
     """Whether the mirror images of these motions form another branch."""
     is_isolated: bool
-    """Whether it closes on itself."""
+    """Whether the branch closes on itself."""
     origin: str
-    """Method by which it was found."""
+    """Method by which the branch was found."""
     begin: str
-    """Reason why it ends at its first point."""
+    """Reason why the branch ends at its first point."""
     end: str
-    """Reason why it ends at its last point."""
+    """Reason why the branch ends at its last point."""
     elapsed_s: float
 
     @property
@@ -90,7 +90,7 @@ class BranchLine(Labelled):
 
     @property
     def largest_multiplier(self) -> Reals:
-        """Magnitude, shape (n,)."""
+        """Magnitude of the largest Floquet multiplier, shape (n,)."""
         return np.hypot(self.multiplier_real[:, 0], self.multiplier_imaginary[:, 0])
 
     @property
@@ -104,11 +104,11 @@ class BranchLine(Labelled):
         return growth_time_s(self.frequency_hz, self.largest_multiplier, self.periods)
 
     def along(self, parameter: Parameter) -> Reals:
-        """Frequencies [Hz] or amplitudes [m]."""
+        """Return the values of the varied parameter: frequencies [Hz] or amplitudes [m]."""
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
     def pieces(self) -> Iterator[tuple[bool, slice]]:
-        """Yield stable and unstable stretches; neighbours share a point."""
+        """Yield stable and unstable stretches; neighbouring stretches share a point."""
         is_stable = self.is_stable[1:] & self.is_stable[:-1]
         edges = [0, *(np.flatnonzero(is_stable[1:] != is_stable[:-1]) + 1).tolist(), self.points - 1]
         for first, last in pairwise(edges):
@@ -117,7 +117,7 @@ class BranchLine(Labelled):
 
 
 def line_of(found: FoundBranch) -> BranchLine:
-    """Convert a computed branch."""
+    """Convert a computed branch to a `BranchLine`."""
     branch = found.branch
     return BranchLine(
         frequency_hz=branch.frequencies_hz,
@@ -173,18 +173,18 @@ class BranchDiagram(Labelled):
 
     @property
     def points(self) -> int:
-        """Motions on all branches."""
+        """Number of motions on all branches."""
         return sum(line.points for line in self.lines)
 
     @property
     def largest_error(self) -> float:
-        """Largest error of all points except beside folds, where errors grow; NaN without points."""
+        """Largest of the branches' median errors, since errors grow near folds; NaN without branches."""
         errors = [np.median(line.error_estimate) for line in self.lines]
         return float(max(errors, default=float("nan")))
 
     @property
     def is_complete(self) -> bool:
-        """Whether everything was searched and followed within the requested time."""
+        """Whether the search finished within the requested time."""
         return self.request.time_s is None or self.elapsed_s < self.request.time_s
 
     @property

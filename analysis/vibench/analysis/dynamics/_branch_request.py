@@ -128,7 +128,7 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def path(self) -> DrivePath:
-        """Path of the drive."""
+        """Path in frequency and amplitude along which branches are followed."""
         if self.along is Parameter.AMPLITUDE:
             return AmplitudePath(self.frequency_hz)
         if self.recorded_level:
@@ -191,8 +191,8 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     Parameters
     ----------
     frequency_hz, drive_amplitude_m
-        As measured, in any order; shape (n,). Each bin takes the median, so that one bad interval has no
-        effect.
+        As measured, in any order; shape (n,). The median of each bin is taken, so that one bad value has
+        no effect.
     """
     known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)
     place, level = frequency_hz[known], drive_amplitude_m[known]

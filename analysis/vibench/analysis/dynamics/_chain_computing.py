@@ -66,7 +66,7 @@ class ChainRun(Labelled):
     transmission: Reals
     """|x of m0 at that frequency| over the base's, shape (m, cells)."""
     transmission_error: Reals
-    """Its relative error, shape (cells,); NaN without a requested error or time."""
+    """Relative error of the transmission, shape (cells,); NaN without a requested error or time."""
     largest_m: Reals
     """Largest |p| = |y - z| of every cell while observed, shape (cells,)."""
     impacts: NDArray[np.int64]
@@ -75,17 +75,17 @@ class ChainRun(Labelled):
     energy_j: Reals
     """Mean energy of every cell with its link to the previous cell, shape (cells,)."""
     energy_error_j: Reals
-    """Standard error of that mean."""
+    """Standard error of `energy_j`."""
     exponent_per_s: float = math.nan
     """Largest Lyapunov exponent; NaN if not requested."""
     exponent_error_per_s: float = math.nan
     time_s: Reals
-    """Time axis of the picture, shape (n,)."""
+    """Time axis of `motion_m`, shape (n,)."""
     motion_m: Reals
-    """x of m0 in every cell over the last periods of a steady sine; under other drives its root mean square
-    in equal stretches; shape (n, cells)."""
+    """Displacement x of m0 in every cell, shape (n, cells): over the last periods of a steady sine; under
+    other drives, the RMS over equal stretches of the run."""
     impact_time_s: Reals
-    """Contacts during the picture."""
+    """Times of the contacts within `time_s`."""
     impact_cell: NDArray[np.int64]
     outcome: str
     elapsed_s: float = 0.0
@@ -112,7 +112,7 @@ class ChainAnswer(Labelled):
 
     @property
     def gaps_hz(self) -> list[tuple[float, float]]:
-        """Lower and upper end of each gap."""
+        """Lower and upper end of each band gap."""
         return [(gap.lower_hz, gap.upper_hz) for gap in self.gaps]
 
     @cached_property
@@ -137,7 +137,7 @@ class ChainAnswer(Labelled):
 
     @property
     def linear_transmissions(self) -> dict[int, list[list[float]]]:
-        """The same for every length, cell by cell."""
+        """`linear_transmission` by number of cells, one list per cell."""
         return {cells: self.linear_transmission(cells).T.tolist() for cells in self.request.lengths}
 
     @cached_property
@@ -199,12 +199,12 @@ MOST_NUMBERS = 3e7
 """Most numbers in the samples of a run: 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Number of stretches of a picture that shows a whole run."""
+"""Number of stretches whose RMS is shown for a whole run."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
-"""Under a steady sine energies are averaged over this long, after the responses were observed; with a target
-at most over this part of their time."""
+"""Averaging time [s] of energies under a steady sine, after the responses were observed; with a requested
+error or time, at most this share of the run time before it."""
 SWEEP_PARTS = 120
-"""Number of frequencies of a swept transmission, each over at least `FEWEST_PERIODS`."""
+"""Number of frequencies of a swept transmission; each is averaged over `FEWEST_PERIODS` or more."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
 """Number of segments averaged for the transmission under a recorded motion."""
@@ -212,7 +212,7 @@ X, VX = 0, 3
 
 
 def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
-    """Compute the runs lazily and yield each.
+    """Compute the runs one by one and yield each.
 
     Raises InvalidRequest when the recording cannot be read, or a run is not possible.
     """
@@ -234,7 +234,7 @@ def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
 
 
 def chain_answer(request: ChainRequest) -> ChainAnswer:
-    """Compute all runs."""
+    """Compute all runs of a request."""
     began = time.perf_counter()
     runs = tuple(chain_runs(request))
     return ChainAnswer(request, runs, time.perf_counter() - began)
@@ -255,7 +255,7 @@ def _timed_run(
 
 
 def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
-    """Observe responses in a run from rest, then energies and the picture."""
+    """Compute the responses in a run from rest, then energies and motion in a continuation of it."""
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
     relative_error = np.full(chain.size, math.nan)
     if request.has_target:
@@ -318,7 +318,7 @@ def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
 
 def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     rate, duration_s = drive.sample_rate_hz, min(drive.duration_s, request.duration_s)
-    # Response and base have the same sample times, for one estimator.
+    # Sample the response at the times of the base samples, as the estimator requires.
     run = integrate_chain(
         chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded_rate(rate, chain, duration_s)
     )
@@ -365,7 +365,7 @@ def _lost_run(
 
 
 def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, ratio: Reals) -> ChainRun:
-    """Describe a run whose picture shows all of it."""
+    """Build the result of a run with its motion shown over the whole run."""
     energy, error = mean_energies(chain, run.states, base)
     stretches = np.array_split(np.arange(len(run.time_s)), min(STRETCHES, max(1, len(run.time_s))))
     sizes = [np.sqrt(np.mean(run.states[each, :, X] ** 2, axis=0)) for each in stretches]
@@ -390,7 +390,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
 
 
 def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
-    """Component at the instantaneous frequency, by Hann-weighted means over equal stretches of time."""
+    """Return the component at the drive frequency, by Hann-weighted means over equal stretches of time."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
     turning = np.exp(-2j * np.pi * drive.turns(run.time_s))

@@ -101,12 +101,12 @@ class ChainRequest(SpecimenChoice):
 
     @cached_property
     def unit(self) -> Chain:
-        """The unit of the chain."""
+        """Smallest chain that is repeated: the specimen and any `others`."""
         changed = self.model.strip() or None, self.damping_time_s, self.gap_m
         return Chain((self.shaken, *(each.specimen(*changed) for each in self.others)))
 
     def chain(self, cells: int) -> Chain:
-        """Build a chain of this many cells."""
+        """Build a chain with this number of cells by repeating the unit."""
         return Chain(tuple(islice(cycle(self.unit.cells), cells)))
 
     @property

@@ -12,7 +12,7 @@ from ._spectrum_request import ExponentSpectrum, SpectrumPoint, SpectrumRequest,
 
 
 def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
-    """Follow the branches lazily and yield each."""
+    """Follow the branches one by one and yield each."""
     where = request.shaken, request.path, request.start, request.stop
     if request.resonance_band_hz is not None:
         found = _resonance(request, request.resonance_band_hz)
@@ -32,7 +32,7 @@ def _resonance(request: BranchRequest, band_hz: tuple[float, float]) -> Iterator
 
 
 def diagram_of(request: BranchRequest) -> BranchDiagram:
-    """Compute everything."""
+    """Compute all branches of a request."""
     began = time.perf_counter()
     lines = tuple(branch_lines(request))
     return BranchDiagram(request, lines, time.perf_counter() - began)
@@ -50,7 +50,7 @@ def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
 
 
 def exponent_spectrum(request: SpectrumRequest) -> ExponentSpectrum:
-    """Compute everything."""
+    """Compute all exponents of a request."""
     began = time.perf_counter()
     points = tuple(spectrum_points(request))
     return ExponentSpectrum(request, points, time.perf_counter() - began)

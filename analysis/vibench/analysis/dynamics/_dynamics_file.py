@@ -34,7 +34,7 @@ _UNITS = {
     "impacts": "1",
     "error_estimate": "1",
 }
-"""Columns of a branch, a dataset each."""
+"""Units of the columns of a branch; each column is a dataset."""
 _WORDS = ("periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s")
 """Attributes of a branch."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
@@ -67,7 +67,7 @@ _CHAIN_UNITS = {
     "impact_time_s": "s",
     "impact_cell": "1",
 }
-"""Units of a run of a chain, a dataset each."""
+"""Units of the results of a run of a chain; each result is a dataset."""
 _RUN_WORDS = (
     "cells", "frequency_hz", "observed_s", "exponent_per_s", "exponent_error_per_s", "outcome", "elapsed_s",
 )  # fmt: skip
@@ -78,11 +78,11 @@ _LINEAR_UNITS = {
     "linear_hz": "Hz",
     "attenuation_db": "dB",
 }
-"""Units of the endless chain without contact."""
+"""Units of the results for the infinite chain without contact."""
 
 
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
-    """Write branches to a new file, a group each.
+    """Write branches to a new file, with a group for each branch.
 
     Raises InvalidRequest when the file exists or cannot be written.
     """
@@ -106,7 +106,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
 def read_diagram(path: Path) -> BranchDiagram:
     """Read the branches that `write_diagram` or ``vibench branches`` wrote.
 
-    Raises InvalidRequest when the file is not there, or holds none.
+    Raises InvalidRequest when the file does not exist or contains no branches.
     """
     if not path.is_file():
         raise InvalidRequest(
@@ -128,7 +128,7 @@ def read_diagram(path: Path) -> BranchDiagram:
 def branch_curves(path: Path) -> tuple[Curve, ...]:
     """Read the curves of branches, to overlay them on recordings.
 
-    Raises InvalidRequest when the file contains none, or branches along amplitude.
+    Raises InvalidRequest when the file contains no branches along frequency.
     """
     found = read_diagram(path).curves()
     if not found:
@@ -152,7 +152,7 @@ def _read_line(group: h5py.Group) -> BranchLine:
 
 
 def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
-    """Write all exponents to a new file, a dataset each quantity.
+    """Write all exponents to a new file, with a dataset for each quantity.
 
     Raises InvalidRequest when the file exists or cannot be written.
     """
@@ -166,7 +166,7 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
 
 
 def write_chain(found: ChainAnswer, path: Path) -> Path:
-    """Write the infinite chain and every run to a new file, a group each.
+    """Write the infinite chain, and a group for each run, to a new file.
 
     Raises InvalidRequest when the file exists or cannot be written.
     """

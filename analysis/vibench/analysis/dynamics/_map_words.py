@@ -24,18 +24,18 @@ MOTION_CLASSES = (
 )
 """Classes of motions in a map, and their colours."""
 NO_NUMBERS = ("name", "about", "sources")
-"""Keys of a specimen that do not change the motion."""
+"""Keys of a specimen that have no influence on its motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedLevel:
-    """Measured level and Response of a recording over frequency."""
+    """Measured base amplitude and Response I of a recording over frequency."""
 
     name: str
     pairs: Sequence[tuple[float, float]]
     """Frequency [Hz] and amplitude of the base [m]."""
     measured: Sequence[Curve]
-    """Responses I of m0."""
+    """Curves of Response I of m0."""
 
 
 def motion_classes(results: MapResults, start: int = 0) -> Reals:
@@ -91,7 +91,7 @@ def map_caption(results: MapResults) -> str:
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Return the name of a specimen and its differences from the shipped one or from the paper's."""
+    """Return the name of a specimen and its differences from the shipped one of that name, or the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"

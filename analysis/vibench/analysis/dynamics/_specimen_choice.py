@@ -45,7 +45,7 @@ class SpecimenChoice(FrozenModel):
 
     @model_validator(mode="after")
     def _is_a_specimen(self) -> Self:
-        """Read the description and refuse invalid specimens with its own error."""
+        """Read the description; report an invalid specimen at the field that causes the error."""
         found = self.described
         if found is None:
             try:
@@ -58,18 +58,18 @@ class SpecimenChoice(FrozenModel):
         try:
             self.shaken  # noqa: B018 - making it is the check
         except ValueError as error:
-            # If it fails with its own law too, the law is not the cause.
+            # If the specimen's own law also fails, that error is raised: the chosen law is not the cause.
             self.specimen_under(found.contact)
             raise _at("model", error) from error
         return self
 
     @property
     def shaken(self) -> Specimen:
-        """The specimen."""
+        """The specimen with the chosen contact law, damping and gap."""
         return self.specimen_under(self.law)
 
     def specimen_under(self, model: str) -> Specimen:
-        """Build the same with another contact law."""
+        """Build the specimen with another contact law."""
         assert self.described is not None, "validation fills it"
         return self.described.specimen(model, self.damping_time_s, self.gap_m)
 

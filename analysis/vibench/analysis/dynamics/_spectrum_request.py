@@ -15,9 +15,9 @@ from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
 LONGEST_S = 1e5
-"""Longest averaging time: its intervals take some hundreds of megabytes."""
+"""Longest averaging time [s]; longer ones would need more than some hundreds of megabytes."""
 ROUNDING = 1e-9
-"""Tolerance for rounding when a step divides the range."""
+"""Relative rounding tolerance when the range is a multiple of the step."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
 """Elastic contact laws, for which the sum of exponents is known from the dampers."""
 
@@ -60,7 +60,7 @@ class SpectrumRequest(SpecimenChoice):
 
     @property
     def points(self) -> int:
-        """Number of scenes."""
+        """Number of values of the varied parameter."""
         return math.floor((self.stop - self.start) / self.step * (1.0 + ROUNDING) + ROUNDING) + 1
 
     @property
@@ -69,7 +69,7 @@ class SpectrumRequest(SpecimenChoice):
         return tuple(self.start + k * self.step for k in range(self.points))
 
     def drive(self, value: float) -> tuple[float, float]:
-        """Frequency and amplitude at a value."""
+        """Return frequency [Hz] and amplitude [m] for a value of the varied parameter."""
         if self.along is Parameter.FREQUENCY:
             return value, self.amplitude_m
         return self.frequency_hz, value
@@ -116,21 +116,21 @@ class SpectrumPoint:
     motion: str
     source: str
     blocks: int
-    """Independent stretches behind the least certain exponent; with few, intervals are wide."""
+    """Number of independent stretches for the least certain exponent; few give wide intervals."""
     impact_rate_hz: float
     outcome: str
     elapsed_s: float
 
     @property
     def sum_difference(self) -> float:
-        """Sum of the exponents over the rate of the dampers, minus one."""
+        """Relative difference of the sum of the exponents from `dampers_per_s`."""
         return self.sum_per_s / self.dampers_per_s - 1.0 if self.dampers_per_s else math.nan
 
 
 def point_of(
     found: LyapunovSpectrum, dampers_per_s: float, confidence: float, elapsed_s: float
 ) -> SpectrumPoint:
-    """Convert a computed spectrum."""
+    """Convert a computed spectrum to a `SpectrumPoint`."""
     bounds = found.intervals_per_s(confidence)
     low, high = found.dimension_interval(confidence)
     is_known = bool(np.isfinite(found.exponents_per_s[0]))
@@ -171,7 +171,7 @@ class ExponentSpectrum(Labelled):
 
     @property
     def largest_sum_difference(self) -> float:
-        """Largest relative difference of the sums from the rate of the dampers; NaN for inelastic contact."""
+        """Largest relative difference of the sums from the dampers' rate; NaN for inelastic contact."""
         if not self.request.is_elastic:
             return math.nan
         known = [abs(each.sum_difference) for each in self.points if math.isfinite(each.sum_difference)]
