@@ -1,4 +1,4 @@
-"""Align the channels of a file by its times, or refuse."""
+"""Align the channels of a file by their times; raise an error if that is impossible."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -44,13 +44,13 @@ _TIME = re.compile(
 )
 _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03bc]*)\s*", re.IGNORECASE)
 SAME_RATE = 1e-4
-"""Relative tolerance between two statements of a sample rate; clocks differ less."""
+"""Relative tolerance between two stated sample rates; two clocks differ by less."""
 EVEN = 1e-3
-"""Tolerance of a sample's time on an even axis of exactly known rate, in sample intervals."""
+"""Largest spread of times about an even axis for which its rate counts as exact, in sample intervals."""
 _PLACED = 0.1
-"""Tolerance on any even axis, in addition to rounding."""
+"""Tolerance of a time on an even axis in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Share of intervals and their relative deviation from the median that show too few digits."""
+"""Relative deviation of an interval from the median, and share of such intervals that shows coarse times."""
 _LEAST_ROUNDED = 10
 """Least differing intervals to recognize rounding; fewer could be lost samples at even distances."""
 _ROUNDED_SPREAD = 1.05
@@ -60,23 +60,23 @@ _COARSE_SPREAD = 1.25
 _RISING = 0.9
 """Least share of non-negative intervals in a channel of times."""
 _BIN = 512
-"""Number of samples per pair of kept extremes."""
+"""Number of samples of which only the two extremes are kept."""
 _LEAST_RISING = 64
-"""Evenly rising numbers required to accept times under another name."""
+"""Least number of evenly rising numbers to accept a channel of another name as times."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
-"""Most samples by which times may go back; more is another record."""
+"""Most samples by which times may go back; more means that another record begins."""
 FARTHEST = 2**40
 """Largest counted gap between two times, in sample intervals."""
 _LONGEST_PAUSE = 10
-"""Most lost samples per kept one; more is a wrong time."""
+"""Largest ratio of the time span, in sample intervals, to the samples; more means wrong times."""
 
 
 def stated_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]:
-    """Return the sample rate stated by named numbers, the nearest first, and any contradiction.
+    """Return the first sample rate that the facts state (nearest fact first), and any contradiction.
 
-    A number is a rate or an interval, with a unit behind its name: ``"dt_ms"``, ``"Sample rate [kHz]"``.
+    A fact is a rate or an interval; its name may end with the unit: ``"dt_ms"``, ``"Sample rate [kHz]"``.
     """
     said = list(_rates_hz(facts))
     other = next((each for each in said if not agrees(each, (said[0], said[0]))), None)
@@ -110,9 +110,9 @@ def _text(value: Any) -> str:
 
 
 def told_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
-    """Return the stated time of a channel's first sample, the nearest statement first.
+    """Return the stated time of a channel's first sample, from facts with the nearest first.
 
-    A date and an offset are added, as in NI's waveforms.
+    If a date and an offset are stated, as in NI's waveforms, their sum is returned.
     """
     moments_s, offsets_s = [], []
     for name, value in facts:
@@ -173,11 +173,11 @@ class TimeAxis:
     uncertainty: float
     """Uncertainty of the interval; 0 if exact."""
     rounding: float
-    """Rounding of the start."""
+    """Uncertainty of the start by rounding."""
     runs: tuple[tuple[int, int], ...]
-    """First sample and its place in sample intervals, for each regular stretch."""
+    """For each regular stretch: its first sample, and the time of that sample in sample intervals."""
     trouble: str = ""
-    """Reason why samples have no times."""
+    """Reason why the times cannot be used; empty if they can."""
     unit: str | None = ""
     """Unit; empty if the file states none, None for sample numbers."""
     is_named: bool = False
@@ -185,7 +185,7 @@ class TimeAxis:
 
     @property
     def moments(self) -> tuple[object, ...]:
-        """Return what differs between times of channels that are not simultaneous."""
+        """Start and runs of the times, which are equal for simultaneous channels."""
         return round(self.start / self.interval, 2), self.runs
 
     def of(self, channel: SourceChannel) -> SourceChannel:
@@ -199,7 +199,7 @@ class TimeAxis:
         bounds = rate_bounds(self.interval, self.uncertainty, unit)
         told = channel.sample_rate_hz
         if told is not None and not unit:
-            # A rate determines the unit of the times.
+            # Choose the unit of the times that agrees with the stated rate.
             units = {each: rate_bounds(self.interval, self.uncertainty, each) for each in _UNITS}
             unit, bounds = next(((a, b) for a, b in units.items() if b and agrees(told, b)), (unit, bounds))
         second = SECONDS[unit.casefold()]
@@ -210,7 +210,7 @@ class TimeAxis:
             channel,
             sample_rate_hz=told if told is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            # Times that start at zero count from the stated start.
+            # Times that start at zero are relative to the stated start.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second,
@@ -260,7 +260,7 @@ def _last_digit(block: Reals, off: Reals) -> float:
 
 
 class _Scan:
-    """Scan of times: extremes of their distance from the even axis, and jumps."""
+    """Scan of times that keeps jumps and the extremes of the deviation from an even axis."""
 
     def __init__(self, interval: float, rounding: float) -> None:
         self._interval, self._rounding = interval, rounding
@@ -273,7 +273,7 @@ class _Scan:
         self._trouble = ""
 
     def add(self, block: Reals) -> None:
-        """Add the next times."""
+        """Add the next block of times."""
         if not np.isfinite(block).all():
             self._trouble = "has times that are not numbers"
             return
@@ -299,7 +299,7 @@ class _Scan:
         self._samples += block.size
 
     def axis(self) -> TimeAxis:
-        """Return the time axis."""
+        """Return the time axis fitted to all times added."""
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
         slope, offset = 0.0, float(np.mean(distance))
@@ -339,17 +339,17 @@ def _impossible(runs: list[tuple[int, int]], samples: int, span: float) -> str:
 
 @dataclass(frozen=True)
 class Piece:
-    """Evenly spaced samples of a file."""
+    """Stretch of evenly spaced samples of a file."""
 
     first: int
-    """First sample in the file."""
+    """Index of the first sample in the file."""
     place: int
-    """Place of the first one, in sample intervals since the channel's start."""
+    """Time of the first sample, in sample intervals since the channel's start."""
     samples: int
 
     @property
     def end(self) -> int:
-        """Place after the last one."""
+        """Place one past the last sample."""
         return self.place + self.samples
 
 
@@ -381,7 +381,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
 def restarts(
     starts_s: Mapping[int, float], rate_hz: float | None, samples: int
 ) -> tuple[tuple[tuple[int, int], ...], str]:
-    """Return the runs of a channel with several stated starts, and any contradiction."""
+    """Return the runs (see `TimeAxis`) of a channel with several stated starts, and any contradiction."""
     runs = [(0, 0)]
     first_s = next(iter(starts_s.values()), 0.0)
     for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):
@@ -406,13 +406,13 @@ class Alignment:
 
     rate_hz: float
     places: int
-    """Sample intervals from the first sample of any channel to the last common one."""
+    """Length of the axis in sample intervals: from the earliest sample to the last common one."""
     pieces: tuple[tuple[Piece, ...], ...]
     """Pieces of each channel."""
     late_s: tuple[float, ...]
-    """Delay of each channel relative to its place, less than half an interval."""
+    """Remaining delay of each channel after rounding to whole intervals; at most half an interval."""
     remarks: tuple[str, ...]
-    """Remarks on time information in the file and its replacement by the mapping."""
+    """Remarks on times in the file, and on times that the mapping replaces."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:
@@ -537,7 +537,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
 
 
 def _same(rates_hz: Sequence[float], samples: int) -> bool:
-    """Return whether channels of these rates stay aligned over this many samples."""
+    """Return whether channels of these sorted rates remain aligned over this many samples."""
     return all(
         (high / low - 1) * samples <= _APART for low, high in pairwise((*rates_hz[:1], *rates_hz[-1:]))
     )

@@ -1,7 +1,7 @@
 """Times of day and dates in text, as seconds.
 
-Dates may be written in any order: consecutive rows are close in time, so the order in which they are closest
-is the right one. Times without a date go on past midnight.
+The order of day, month and year is found from consecutive rows: the right order makes them closest in time.
+Times without a date continue to increase past midnight.
 """
 
 import re
@@ -25,7 +25,7 @@ _HOUR_S, _DAY_S = 3600, 86400
 
 
 class ClockTimes:
-    """Dates and times of a file in their order, as seconds since its first midnight."""
+    """Converter of the dates and times of a file, read in order, to seconds since its first midnight."""
 
     def __init__(self) -> None:
         self._last_s: float | None = None
@@ -33,7 +33,7 @@ class ClockTimes:
         self._date = ""
 
     def in_seconds(self, text: str) -> str:
-        """Return a text with times as seconds, and dates without a time as days."""
+        """Replace times in a text by seconds, and dates without a time by days."""
         return _CLOCK.sub(self._number, text)
 
     def _number(self, found: re.Match[str]) -> str:
@@ -56,7 +56,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Move on to a date, by the order of its parts that is closest to the last one; whether it is one."""
+        """Advance to a date, in the order of parts nearest to the last date; return whether it is valid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)
@@ -67,7 +67,7 @@ class ClockTimes:
 
 
 def _orders(text: str) -> Iterator[date | None]:
-    """Yield what a date means with year, day or month first."""
+    """Yield the date as read with the year, the day or the month first; None if invalid."""
     parts = [
         int(each) if each.isdecimal() else _MONTHS.get(each[:3].casefold(), 0)
         for each in re.split("[-/.]", text)

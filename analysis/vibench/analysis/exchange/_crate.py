@@ -35,7 +35,7 @@ Entity = dict[str, Any]
 
 @dataclass(frozen=True)
 class CrateFacts:
-    """Facts that are not in the folder."""
+    """Facts for the crate that are not in the folder."""
 
     licence: str
     """Address of the licence: ``https://creativecommons.org/licenses/by/4.0/``."""
@@ -97,7 +97,7 @@ def pack_folder(
     with new_file(crate) as unfinished, ZipFile(unfinished, "x", ZIP_DEFLATED) as archive:
         archive.writestr(METADATA, json.dumps(document, indent=2, ensure_ascii=False))
         for path in paths:
-            # A finished recording is compressed already.
+            # Finished recordings are already compressed.
             kind = ZIP_STORED if path.suffix == ".h5" else ZIP_DEFLATED
             archive.write(path, path.relative_to(folder).as_posix(), compress_type=kind)
             observer(path.stat().st_size)
@@ -168,7 +168,7 @@ def _about(
 
 
 def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
-    """Return a single entity without a list, as RO-Crate 1.1 recommends (compacted JSON-LD)."""
+    """Return a single entity itself instead of a list, as RO-Crate 1.1 recommends (compacted JSON-LD)."""
     return entities[0] if len(entities) == 1 else entities
 
 

@@ -1,6 +1,6 @@
-"""Write CSV with one row per sample below headings with units.
+"""Write CSV files with one row per sample, and read tables of text.
 
-Read columns of text, separated by commas, semicolons, tabs or blanks, into memory.
+Columns to read may be separated by commas, semicolons, bars, tabs or blanks; all are read into memory.
 """
 
 import codecs
@@ -22,9 +22,9 @@ from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel, TableSource
 
 TIME_FORMAT = "%.9f"
-"""Nanoseconds since the recording's first sample."""
+"""Format of the seconds since the recording's first sample, to nanoseconds."""
 VALUE_FORMAT = "%.10g"
-"""One digit more than 2^-30 of the range needs; lost samples are ``nan``."""
+"""Format of values, one digit more than 2^-30 of the range needs; lost samples are ``nan``."""
 
 
 def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
@@ -43,17 +43,17 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 
 
 LONGEST_HEAD = 200
-"""Longest heading in lines."""
+"""Most lines of a heading."""
 DELIMITERS = (";", "\t", "|", ",", None)
-"""Separators in the order of trying; None means blanks. With another separator, a comma is decimal."""
+"""Separators, in the order of trying; None means blanks. Other separators make commas decimal marks."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
     r"|[mk]?m(?:/s| s-?)(?:2|\^2|\*\*2|\u00b2)|[Ss]econds?|[Vv]olts?|[dmyhsDMYHS.:/ f-]{8,})?"
 )
-"""One cell of a row of units, or of the forms of dates and times."""
+"""One cell of a row that gives units, or formats of dates and times."""
 TITLE = re.compile(r"\W*(?:(?:y[ _])?units?(?:[ _]labels?)?|einheit(?:en)?|names?|channels?)\W*", re.I)
-"""First cell of a row of the heading that says what the others are."""
+"""First cell of a heading row that names the content of the row, such as "Units"."""
 NAME_AND_UNIT = re.compile(r"[^\s\[\]()]+(?:\s*[\[(][^\[\]()]*[\])])?")
 STATEMENT = re.compile(
     r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
@@ -63,16 +63,16 @@ SENTENCE = re.compile(
     r"(?:sampled|recorded|acquired) (?:at|with) ([\d.]+) ?(k?hz)|([\d.]+) ?(k?s)(?:a|amples?)?(?:/| per )s",
     re.I,
 )
-"""A rate within other words: ``"recorded at 5120 Hz"``, ``"51.2 kS/s"``."""
+"""A sample rate in a sentence: ``"recorded at 5120 Hz"``, ``"51.2 kS/s"``."""
 FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
-"""The letter before an exponent in double precision."""
+"""Letter D before the exponent of a double-precision number in Fortran's notation."""
 GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
-"""A number whose decimals may be a group of thousands."""
+"""A number whose separator may be decimal or may group thousands, such as ``1,234``."""
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Format of the numbers of a text."""
+    """Format of the rows of numbers in a text file."""
 
     delimiter: str | None
     columns: int
@@ -94,7 +94,7 @@ class _Layout:
         return found
 
     def plain(self, line: str, clock: ClockTimes) -> str:
-        """Return a line with blanks and decimal points; empty for comments, and if all cells are."""
+        """Return a line in the form that numpy reads; empty for comments and lines of empty cells."""
         if line.startswith(("#", "%")):
             return ""
         is_plain = '"' not in line and not self.empty and not self.has_text
@@ -146,7 +146,7 @@ def _channel(name: str, samples: int, label: str, unit: str, own: Facts, shared:
 
 
 def _may_be_grouped(column: Reals) -> bool:
-    """Whether numbers of at most three decimals lie among whole numbers, and none below 1."""
+    """Return whether a column mixes whole numbers and numbers above 1 with at most three decimals."""
     size = np.abs(column[np.isfinite(column)])
     rest = size[size != np.rint(size)]
     has_three = np.allclose(1e3 * rest, np.rint(1e3 * rest), 1e-12, 0.0)
@@ -154,7 +154,7 @@ def _may_be_grouped(column: Reals) -> bool:
 
 
 def _require_decimals(place: int, cells: Sequence[str]) -> None:
-    """Raise ValueError if separators of a column seem to be those of thousands."""
+    """Raise ValueError if the separators in a column seem to group thousands."""
     marked = [each for each in cells if "." in each or "," in each]
     whole = next((each for each in cells if each.lstrip("+-0").isdigit()), "")
     if whole and all(GROUPED.fullmatch(each) for each in marked):
@@ -197,7 +197,7 @@ def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
 def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
     """Return the heading, its length, and the format of the numbers.
 
-    A line of numbers followed by a different number of them belongs to the heading.
+    A line of numbers belongs to the heading if the next line has another number of columns.
     """
     found: tuple[list[str], int, _Layout] | None = None
     with path.open(encoding=encoding, errors="replace") as file:
@@ -215,7 +215,7 @@ def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
 
 
 def _layout(line: str) -> _Layout | None:
-    """Return the format of a line of numbers; None if it is none."""
+    """Return the format of a line of numbers; None for other lines."""
     for delimiter in DELIMITERS:
         cells = _cells(line, delimiter, ClockTimes())
         filled = len(cells)
@@ -249,7 +249,7 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
-    """Return labels and units from one row, or from two of which one has only units; else empty."""
+    """Return labels and units from one heading row, or from one row each; empty texts if there are none."""
     rows = [row for line in head if any(row := _row(line, layout))]
     named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]
     labels, units = named[-1], next((row for row in reversed(rows) if _are_units(row)), [""] * layout.columns)
@@ -261,7 +261,7 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Whether cells are units, behind a title or not."""
+    """Return whether all cells are units, except a title in the first cell."""
     cells = row[1:] if TITLE.fullmatch(row[0]) else row
     return any(cells) and all(UNIT_CELL.fullmatch(each) for each in cells)
 
@@ -278,7 +278,7 @@ def _row(line: str, layout: _Layout) -> list[str]:
 
 
 def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]]:
-    """Yield the facts of each column, and those of the file: LabVIEW's ``Delta_X`` has a number for each."""
+    """Yield the facts of each column (as LabVIEW's ``Delta_X``) and those that all columns share."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:

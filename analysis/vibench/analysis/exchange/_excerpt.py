@@ -10,7 +10,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Reals
 
 BLOCK_SAMPLES = 51_200
-"""One chunk of the file: 0.4 MB a channel in memory."""
+"""Samples in a block, as in one chunk of the file: 0.4 MB per channel."""
 
 TransferObserver = Callable[[int], None]
 """Callback with the number of values written since its last call."""
@@ -51,11 +51,11 @@ class Excerpt:
         return self.recording.path.name.removesuffix(".part").removesuffix(".h5")
 
     def blocks(self) -> Iterator[RecordedBlock]:
-        """Yield all channels together in blocks."""
+        """Yield blocks of all channels."""
         return self.recording.blocks(self.roles, BLOCK_SAMPLES, self.start, self.stop)
 
     def channel_blocks(self, role: str) -> Iterator[Reals]:
-        """Yield one channel in blocks [its physical unit]."""
+        """Yield blocks of one channel, in its physical unit."""
         for block in self.recording.blocks((role,), BLOCK_SAMPLES, self.start, self.stop):
             yield block.values[0]
 

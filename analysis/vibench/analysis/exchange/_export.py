@@ -30,7 +30,7 @@ _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 def require_unused(path: Path) -> None:
-    """Raise InvalidRequest when a file has that name, or its folder does not exist."""
+    """Raise InvalidRequest when the path exists, or its folder does not."""
     if path.exists():
         raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
     if not path.parent.is_dir():
@@ -43,8 +43,8 @@ def require_unused(path: Path) -> None:
 def new_file(path: Path) -> Iterator[Path]:
     """Yield a temporary name; rename it to ``path`` on success, otherwise delete it.
 
-    Raises InvalidRequest when ``path`` or its unfinished form exists, the folder does not, or the disk
-    refuses.
+    Raises InvalidRequest when ``path`` or its temporary name exists, the folder does not exist, or
+    writing fails.
     """
     unfinished = path.with_name(path.name + UNFINISHED)
     for each in (path, unfinished):
@@ -83,7 +83,7 @@ def result_paths(recording: Recording, path: Path) -> tuple[Path, ...]:
 
 
 def write_result_tables(recording: Recording, path: Path) -> tuple[Path, ...]:
-    """Write each result as ``NAME.RESULT.AXIS.csv`` beside ``path``, one for every set of axes."""
+    """Write each result beside ``path``, as one file ``NAME.RESULT.AXIS.csv`` for every set of axes."""
     paths = result_paths(recording, path)
     for each, content in zip(paths, _tables(recording), strict=True):
         with new_file(each) as unfinished:
@@ -112,7 +112,7 @@ def matlab_results(recording: Recording) -> dict[str, Any]:
 
 
 def _identifier(name: str) -> str:
-    """Make a MATLAB name of a result's: ``noise-2`` becomes ``noise_2``."""
+    """Convert the name of a result to a MATLAB name: ``noise-2`` becomes ``noise_2``."""
     return "".join(each if each.isalnum() else "_" for each in name)
 
 
@@ -258,7 +258,7 @@ class Exporter:
     write: WriteSamples | None = None
     """Writes samples; facts and results are written beside them."""
     require: Callable[[Excerpt], None] = _accept
-    """Raises InvalidRequest for what the format cannot hold."""
+    """Raises InvalidRequest for an excerpt that the format cannot hold."""
     write_functions: WriteFunctions | None = None
     """Writes frequency responses and spectra; None if the format cannot."""
     write_all: WriteAll | None = None

@@ -11,7 +11,7 @@ SUFFIX = ".facts.json"
 
 
 def facts_path(path: Path) -> Path:
-    """``NAME.csv.facts.json`` beside ``NAME.csv``."""
+    """Return the path of the facts: ``NAME.csv.facts.json`` beside ``NAME.csv``."""
     return path.with_name(path.name + SUFFIX)
 
 
@@ -51,6 +51,6 @@ def facts_document(excerpt: Excerpt) -> dict[str, Any]:
 
 
 def write_facts(excerpt: Excerpt, path: Path) -> None:
-    """Write the document."""
+    """Write the facts as JSON."""
     text = json.dumps(facts_document(excerpt), indent=2, allow_nan=False, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")

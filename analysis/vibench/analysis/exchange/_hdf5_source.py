@@ -22,7 +22,7 @@ FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
 """HDF5's message for a truncated file."""
 EXACT_KINDS = {"i": 4, "u": 2}
-"""Integers of at most this many bytes fit the recording's own."""
+"""Most bytes of signed and unsigned integers that a recording can store exactly."""
 
 
 Facts = tuple[tuple[str, Any], ...]
@@ -30,7 +30,7 @@ Facts = tuple[tuple[str, Any], ...]
 
 @dataclass(frozen=True)
 class _Place:
-    """Place of a channel's numbers."""
+    """Location of a channel's numbers in the file."""
 
     path: str
     row: int | None
@@ -40,10 +40,10 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class Hdf5Source:
-    """Datasets of one dimension, and rows or columns of those with two: ``"/data#1"``, counted from one.
+    """One-dimensional datasets, and the rows or columns of two-dimensional ones: ``"/data#1"``, from one.
 
     CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. A file whose data lie in other files
-    (external links and storage, virtual datasets) is refused, unless that was allowed.
+    (external links and storage, virtual datasets) is refused unless external data are allowed.
     """
 
     file: h5py.File
@@ -51,11 +51,11 @@ class Hdf5Source:
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        """In the order of their names."""
+        """Channels in the order of their names."""
         return tuple(self.places)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read a stretch."""
+        """Read the samples of a channel from ``start`` to ``stop``."""
         place = self.places[channel]
         dataset = self.file[place.path]
         match place:
@@ -74,7 +74,7 @@ class Hdf5Source:
 
 @contextmanager
 def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
-    """Open a file; UnusableData when it is not HDF5."""
+    """Open a file; raises UnusableData when it is not HDF5."""
     try:
         file = open_hdf5(path, locking=False)
     except UnsafeHdf5 as error:
@@ -142,7 +142,7 @@ def _origin(file: h5py.File) -> Origin | None:
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Return single numbers of a group and its parents by name, the nearest first."""
+    """Return named attributes and single values of a group and then of its parents."""
     if group.name not in known:
         hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
         items = [(name, group[name]) for name in hard]

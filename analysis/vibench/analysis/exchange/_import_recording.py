@@ -1,6 +1,6 @@
 """Import a file as a recording, with its mapping, origin and checksum.
 
-The parts of the plan are placed by the mapping, or one after the other.
+The mapping gives the times of the plan's parts; otherwise the parts follow one after the other.
 """
 
 import hashlib
@@ -114,7 +114,7 @@ def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterat
 
 
 FARTHEST = 2.0**62
-"""A sample beyond the end of every file."""
+"""Sample number beyond the end of any file."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e100
 """Range of a channel's largest number, so that squares and steps stay finite."""
 NEAR_FULL_SCALE = 0.95
@@ -150,7 +150,7 @@ def import_recording(
 
     Channels are aligned by the times in the file. Missing samples and values that are not finite count as
     lost samples of all channels. The stored "volts" are the
-    numbers of the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
+    numbers in the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
     two above their largest.
 
     Parameters
@@ -267,7 +267,7 @@ def _power_of_two_above(peak: float, name: str) -> float:
 def _bench(
     path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], remarks: Sequence[str]
 ) -> dict[str, Any]:
-    """Return the known bench configuration and the origin of the samples."""
+    """Return what is known of the bench, and facts on the imported file."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     bench: dict[str, Any] = {

@@ -21,17 +21,17 @@ KNOWN_ROLES = {
     "m0_acceleration": ("acceleration", "m s-2"),
     "m0_displacement": ("displacement", "m"),
 }
-"""Quantity and unit of these channels in the analysis."""
+"""Quantity and unit that the analysis requires of these channels."""
 
 
 _NO_UNIT = {"", "-", "1", "none", "None"}
-"""Units in a file that state none."""
+"""Texts of a unit in a file that mean no unit."""
 _LARGEST_CORRECTION = 0.2
-"""Largest relative difference of a scale from the unit in the file that may be a calibration."""
+"""Largest relative correction by a scale, beyond which the scale contradicts the unit in the file."""
 
 
 def _is_another_quantity(file_unit: str) -> bool:
-    """Return whether a unit belongs to a motion or a force, which no scale turns into another quantity."""
+    """Return whether a unit is one of motion or force, which a scale cannot convert to another quantity."""
     return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
 
 
@@ -104,7 +104,7 @@ class ChannelMapping(FrozenModel):
         return self
 
     def factor(self, file_unit: str) -> float:
-        """Return the unit per number of a file in ``file_unit``; empty if the file states none.
+        """Return the factor from numbers in ``file_unit`` (empty if the file states none) to the unit.
 
         Raises ValueError when the scale contradicts the unit, or is needed and missing.
         """

@@ -1,4 +1,4 @@
-"""Write MATLAB 5: a struct for each channel, and one of facts.
+"""Write MATLAB 5 files with a struct for each channel and a struct of facts.
 
 Read MATLAB files: 7.3 is HDF5; the default of ``save`` is MATLAB 5, read into memory.
 """
@@ -35,7 +35,7 @@ from ._source_channel import SourceChannel, TableSource, scale_among, unit_among
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15
 PLAIN = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
-"""Types of numbers and of text."""
+"""Type codes of numbers and text."""
 SMALL_BYTES = 4
 """An element of up to this many bytes may lie in its tag."""
 DEEPEST = 30
@@ -48,13 +48,13 @@ def require_whole(path: Path) -> None:
     if len(content) < HEAD_BYTES:
         raise ValueError("it ends within its head")
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[HEAD_BYTES - 2 : HEAD_BYTES]))
-    # Version 4 has no such head; its reader checks its few types.
+    # Version 4 files have no such head; scipy checks their few types itself.
     if order is not None:
         _look(content[HEAD_BYTES:], order, 0)
 
 
 def _look(content: memoryview, order: str, depth: int) -> None:
-    """Check consecutive elements."""
+    """Check consecutive elements and those nested in them."""
     if depth > DEEPEST:
         raise ValueError(f"more than {DEEPEST} nested structs or cells")
     while len(content) >= TAG_BYTES:
@@ -166,7 +166,7 @@ def _facts(excerpt: Excerpt) -> dict[str, Any]:
 
 
 def _segments(excerpt: Excerpt) -> dict[str, Any]:
-    """Columns of the segments that the excerpt touches, as indices of its own arrays, counted from one."""
+    """Return columns of the segments in the excerpt, with indices into its arrays that count from one."""
     touched = [
         each
         for each in excerpt.recording.segments
@@ -190,7 +190,7 @@ FEWEST_SAMPLES = 2
 def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     """Open a file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``.
 
-    Raises ValueError when it is damaged.
+    Raises ValueError when the file is damaged.
     """
     if h5py.is_hdf5(path):
         with open_hdf5_source(path) as source:
@@ -202,7 +202,7 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
         if len(set(names)) < len(names):
             raise ValueError("it has several variables of one name")
         content = loadmat(path, simplify_cells=True)
-    except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError
+    except (MatReadError, zlib.error) as error:  # neither is a subclass of ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
     # Our own exports state the rate beside the channels.

@@ -1,7 +1,7 @@
 """Write NeXus: an NXentry with an NXdata for each channel, which silx plots with labels.
 
-Of the NeXus standard (NXdata, version 2024.02): the group names its ``signal`` and ``axes``; values are
-physical, since readers do not apply scales; the half step of the converter is each value's error.
+As in the NeXus standard (NXdata, version 2024.02), a group names its ``signal`` and ``axes``. Values are
+physical, since readers do not apply scales. Their errors are half a step of the converter.
 """
 
 from pathlib import Path

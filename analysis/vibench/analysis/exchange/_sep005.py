@@ -11,18 +11,18 @@ QUANTITIES = {"velocity": "v", "acceleration": "a", "displacement": "d", "force"
 
 
 def sep005(excerpt: Excerpt) -> list[dict[str, Any]]:
-    """Return the channels of an excerpt as SDyPy's packages take them; in memory, lost samples NaN.
+    """Return the channels of an excerpt as SDyPy's packages expect them; lost samples are NaN.
 
     Parameters
     ----------
     excerpt
-        As `excerpt` gives it of an open recording.
+        Result of `excerpt` for an open recording.
 
     Returns
     -------
     list of dict
-        For each channel ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` where
-        SEP 005 has a letter for it, ``start_timestamp`` of the first sample, and ``group``, the recording.
+        For each channel ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` if SEP
+        005 defines a letter for it, ``start_timestamp`` of the first sample, and ``group``, the recording.
     """
     recording = excerpt.recording
     rate = recording.sample_rate_hz

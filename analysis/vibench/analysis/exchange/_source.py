@@ -32,10 +32,10 @@ class Source(Protocol):
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        """Everything in it that can be a channel of a recording."""
+        """All data in the file that can become channels of a recording."""
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Return numbers as the file means them, lost ones as NaN, shape (stop - start,)."""
+        """Return numbers scaled as the file states, with NaN for lost samples, shape (stop - start,)."""
 
 
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
@@ -69,7 +69,7 @@ DAMAGE = (
 
 
 CHANNELS_SHOWN, NAME_SHOWN = 20, 60
-"""Most channels named in a sentence, and letters of each name."""
+"""Most channels that a message names, and most letters of each name."""
 MOST_CHANNELS = 4096
 """More channels mean a transposed table or a damaged file."""
 
@@ -122,7 +122,7 @@ def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
             isinstance(source.source, Hdf5Source)
             and len({axes[time].moments for time in near if axes[time].unit is not None}) > 1
         ):
-            # Names in order of the alphabet do not tell which times belong to a channel.
+            # HDF5 sorts names by alphabet, so their order does not show which times belong to a channel.
             named = ", ".join(shortened(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
             axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
         told = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
@@ -142,7 +142,7 @@ def channel_blocks(source: Source, channel: SourceChannel) -> Iterator[Reals]:
 
 @dataclass(frozen=True)
 class _CheckedSource:
-    """A source that raises every failure as one sentence."""
+    """A source that converts every failure to an error of one sentence."""
 
     path: Path
     source: Source
@@ -154,7 +154,7 @@ class _CheckedSource:
         return tuple(self.found)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        # A signalling NaN is a lost sample like any other NaN.
+        # Ignore the warning on a signalling NaN: it is a lost sample like any other NaN.
         with _readable(self.path), np.errstate(invalid="ignore"):
             values = self.source.read(self.found[channel], start, stop)
         if values.shape != (stop - start,):
@@ -183,7 +183,7 @@ def _readable(path: Path) -> Iterator[None]:
 def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     """Return the channel of that name, or the only one of that label.
 
-    Raises InvalidRequest when there is none, or more than one; the sentence lists what there is.
+    Raises InvalidRequest when there is none, or more than one; the message lists the channels.
     """
     found = [each for each in source.channels if each.name == wanted]
     found = found or [each for each in source.channels if each.label == wanted]

@@ -13,7 +13,7 @@ from vibench.acquisition.recording import Origin
 from ..signals.arrays import Reals
 
 LEAST_INTERVAL_S = 1e-100
-"""Shortest interval between samples, whose inverse is finite."""
+"""Shortest accepted interval between samples, so that its inverse is finite."""
 SECONDS = {
     **dict.fromkeys(("", "none", "s", "sec", "secs", "sek", "second", "seconds", "sekunden"), 1.0),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
@@ -23,18 +23,18 @@ SECONDS = {
     **dict.fromkeys(("h", "hour", "hours", "stunden"), 3600.0),
     **dict.fromkeys(("d", "day", "days", "tage"), 86400.0),
 }
-"""Length in seconds of a unit of time, by its text without regard to case."""
+"""Length in seconds of each unit of time; texts are compared without regard to case."""
 
 
 def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, float] | None:
-    """Turn an interval between samples, in a unit of time, into bounds of the rate [Hz]; None if none."""
+    """Convert an interval between samples, in a unit of time, to bounds of the rate [Hz]; None if invalid."""
     second = SECONDS.get(unit.casefold(), 0.0)
     shortest, longest = second * (interval - uncertainty), second * (interval + uncertainty)
     return (1 / longest, 1 / shortest) if LEAST_INTERVAL_S < shortest <= longest < inf else None
 
 
 def text_of(raw: bytes) -> str:
-    """Decode text in one of two encodings, which files do not state."""
+    """Decode text as UTF-8, or else as Latin-1, since files do not state the encoding."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
@@ -58,7 +58,7 @@ def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0) -> str:
 
 
 def scale_among(facts: Iterable[tuple[str, Any]]) -> str:
-    """Return a stated scale that readers do not know to be applied or not, such as ``"gain = 0.001"``."""
+    """Return a stated scale, such as ``"gain = 0.001"``, that may or may not be applied to the numbers."""
     for name, value in facts:
         if _SCALE.fullmatch(name) and np.size(value) == 1 and np.ravel(value).dtype.kind in "iuf":
             number = float(np.ravel(value)[0])
@@ -80,7 +80,7 @@ class SourceChannel:
     """Sample rate; None if the file does not state it exactly."""
     unit: str = ""
     step: float | None = None
-    """Step between values from integers, to store them exactly."""
+    """Step between values that were stored as integers, to store them exactly."""
     origin: Origin | None = None
     """Whether it was measured or simulated; None if unknown."""
     full_scale: float | None = None
@@ -91,11 +91,11 @@ class SourceChannel:
     """Time of its first sample, on the common clock of the file."""
     start_error_s: float = 0.0
     runs: tuple[tuple[int, int], ...] = ()
-    """First sample and its place in sample intervals, for each stretch; empty if all are even."""
+    """For each regular stretch: first sample and its time in sample intervals; empty without jumps."""
     time_unit: str | None = None
-    """Unit of its times, empty if not stated; None without times."""
+    """Unit of the channel's times, empty if not stated; None without times."""
     stated_scale: str = ""
-    """Scale in the file that its numbers may lack; empty if there is none."""
+    """Scale in the file that may not be applied to its numbers; empty if there is none."""
     time_trouble: str = ""
     """Contradiction in the file's time information; empty if there is none."""
 
@@ -114,9 +114,9 @@ class TableSource:
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        """In the order of the file."""
+        """Channels in the order of the file."""
         return tuple(self.numbers)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Return a stretch."""
+        """Read the samples of a channel from ``start`` to ``stop``."""
         return self.numbers[channel][start:stop]

@@ -17,9 +17,9 @@ from ._source_channel import SourceChannel, scale_among, unit_among
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
 LONGEST_NS = 1000 * 86400 * 10**9
-"""Time stamps are counted within a thousand days, which leave a double 15 ns."""
+"""Time stamps are taken modulo a thousand days, so that a double resolves them to 15 ns."""
 START_ERROR_S = 1e-6
-"""Start times are kept in microseconds."""
+"""Start times are stored in microseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,11 @@ class TdmsSource:
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        """In the order of the file."""
+        """Channels in the order of the file."""
         return tuple(self.found)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read a stretch."""
+        """Read the samples of a channel from ``start`` to ``stop``."""
         values = self.found[channel][start:stop]
         if values.dtype.kind == "M":
             return np.asarray(values.astype("M8[ns]").astype(np.int64) % LONGEST_NS * 1e-9)
@@ -55,12 +55,12 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         raise InvalidRequest(
             f"{path.name} needs npTDMS to be read, which is not installed: pip install 'vibench[exchange]'"
         ) from error
-    # Opened here, because npTDMS does not close damaged files.
+    # Open the file here, because npTDMS does not close damaged files.
     with path.open("rb") as raw:
         if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, without an error
             raise UnusableData(f"{path.name} is no TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
-        # Its warnings on standard error are suppressed; errors are raised.
+        # Suppress the warnings of npTDMS on standard error; errors are still raised.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
         statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}

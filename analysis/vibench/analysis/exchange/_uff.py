@@ -4,8 +4,8 @@ Layout: SDRC universal dataset 58, "Function at Nodal DOF", and its binary varia
 Dynamics Research Laboratory, University of Cincinnati). The increment of time has five decimals, an error
 of 0.5 ms after 200 s at 51.2 kHz, so ID line 5 contains the exact rate.
 
-Reading takes the time responses of datasets 58, text or binary, as from Polytec's software. The mapping
-must give the sample rate. The number of binary samples comes from the header, because what follows them
+The reader takes the time responses in datasets 58, text or binary, as from Polytec's software. The mapping
+must give the sample rate. The number of binary samples comes from the header, because the end of a dataset
 differs between makers.
 """
 
@@ -51,7 +51,7 @@ ORIGIN = re.compile(rf"\borigin=({'|'.join(Origin)})\b")
 
 
 def id_line(text: str) -> str:
-    """Return one of the five ID lines, which may not be empty."""
+    """Return one of the five ID lines, with NONE for an empty text."""
     return f"{text.strip() or 'NONE':<{ID_WIDTH}.{ID_WIDTH}}"
 
 
@@ -96,7 +96,7 @@ def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 
 
 def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[str]:
-    """Lines before the samples: the delimiter, the type, and records 1 to 11."""
+    """Yield the lines before the samples: the delimiter, the type, and records 1 to 11."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz
     kind, *exponents = QUANTITIES.get(channel.quantity, UNKNOWN)
@@ -132,7 +132,7 @@ def date_line(started_utc: str) -> str:
 HEADER_LINES = 11
 UNITS = "164"
 LENGTHS = {1.0: "m", 100.0: "cm", 1000.0: "mm", 39.37: "in"}
-"""Unit of length, by the units in a metre (dataset 164)."""
+"""Unit of length by the number of units in a metre (dataset 164)."""
 MOTIONS = {8: "m", 11: "m/s", 12: "m/s2"}
 """Units of displacement, velocity and acceleration, by data type."""
 LEAST_TEXT = 2
@@ -150,7 +150,7 @@ TIME_FUNCTIONS = {0, TIME_RESPONSE}
 
 @dataclass(frozen=True)
 class _Body:
-    """Place and format of the numbers of a dataset."""
+    """Location and format of the numbers of a dataset."""
 
     offset: int
     end: int
@@ -171,7 +171,7 @@ class UffSource:
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        """In the order of the file."""
+        """Channels in the order of the file."""
         return tuple(self.bodies)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
@@ -268,7 +268,7 @@ def _channel(number: int, header: list[str], length: str) -> SourceChannel:
     label = header[0].strip()
     unit, start, increment = header[7][46:66].strip(), _real(header[6][30:43]), _real(header[6][43:56])
     second = SECONDS.get(unit.casefold())
-    # Without a label, motion is in the units of dataset 164.
+    # Without a unit label, motion is in the units of dataset 164.
     motion = MOTIONS.get(_whole(header[8][:10]), "") if length != "m" else ""
     return SourceChannel(
         name=str(number),
@@ -317,11 +317,11 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
 # Functions of frequency as Universal File Format: frequency responses, coherences and densities, as text.
 #
 # Layout: SDRC universal dataset 58, records 1 to 12, function types 4 (frequency response function), 6
-# (coherence) and 9 (power spectral density), double precision. Text holds frequencies to six digits: lines
-# that begin and step in six digits are written evenly spaced. A frequency response and its coherence at
-# consecutive multiples of another spacing are moved to the nearest spacing of six digits; all other lines
-# are written with the frequency of each. Modal programs expect even lines that begin at a multiple of their
-# spacing.
+# (coherence) and 9 (power spectral density), double precision. Text holds frequencies to six digits, so
+# lines are written evenly spaced if six digits hold the first line and the spacing. A frequency response or
+# coherence at multiples of another spacing is interpolated to the nearest spacing of six digits, since modal
+# programs expect even lines that begin at a multiple of their spacing. All other lines are written each with
+# its frequency.
 
 _COMPLEX_DOUBLE = 6
 _FREQUENCY_AXIS = 18
@@ -344,14 +344,14 @@ class FunctionType(IntEnum):
 
 @dataclass(frozen=True)
 class FunctionAxis:
-    """Axis of a function: a channel's motion, or nothing."""
+    """Axis of a function: the motion of a channel, or none."""
 
     role: str = ""
     """Role of the channel."""
     label: str = "NONE"
     """Label of the axis; 20 characters are written."""
     quantity: str = ""
-    """``"velocity"``; decides data type and exponents."""
+    """Quantity such as ``"velocity"``; determines data type and exponents."""
     unit: str = "NONE"
 
 
@@ -361,9 +361,9 @@ class UniversalFunction:
 
     kind: FunctionType
     frequency_hz: Reals
-    """Ascending, shape (lines,)."""
+    """Frequencies of the lines, ascending, shape (lines,)."""
     values: Reals | Complexes
-    """Shape (lines,)."""
+    """Values at these frequencies, shape (lines,)."""
     response: FunctionAxis
     reference: FunctionAxis
     note: str
@@ -409,7 +409,7 @@ def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iter
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
-    """Return the function, its first line, and its spacing in six digits (0: uneven)."""
+    """Return the function, its first frequency, and its spacing in six digits; 0 if uneven."""
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0
@@ -436,9 +436,9 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 
 
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
-    """Return a first line and a spacing of six digits that divides it; 0 and 0 if none was found.
+    """Return a first frequency and a spacing that divides it, in six digits; zeros if none was found.
 
-    pyEMA and sdypy-EMA count the lines below the first; a rounding error would add one.
+    pyEMA and sdypy-EMA compute the number of lines below the first; a rounding error would add one.
     """
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
         step = _six_digits(spacing + number * _last_digit(spacing))

@@ -66,9 +66,9 @@ ORDERS = {b"RIFF": "<", b"RIFX": ">"}
 """Byte orders of sizes; RF64 files over 4 GiB store them elsewhere."""
 FIRST_CHUNK = 12
 UNKNOWN_SIZE = 2**32 - 1
-"""Size field of streamed samples."""
+"""Size field of a file that was streamed, so that its size was not known."""
 OFFSETS = {"u": 128.0}
-"""Eight bits are stored without sign."""
+"""Offset of unsigned integers, which WAV uses for eight bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class WavSource:
     channels: tuple[SourceChannel, ...]
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read a stretch."""
+        """Read the samples of a channel from ``start`` to ``stop``."""
         column = np.asarray(self.data[start:stop, self.channels.index(channel)], dtype=np.float64)
         return (column - OFFSETS.get(self.data.dtype.kind, 0.0)) / _full_count(self.data.dtype)
 
@@ -132,12 +132,12 @@ def _require_whole(path: Path) -> None:
 
 def _read(path: Path) -> tuple[int, NDArray[Any]]:
     with warnings.catch_warnings():
-        # Skip other chunks: cue points, broadcast data.
+        # Ignore the warnings on other chunks, such as cue points or broadcast data.
         warnings.simplefilter("ignore", wavfile.WavFileWarning)
         try:
             return wavfile.read(path, mmap=True)
         except ValueError:
-            # 24 bits cannot be mapped; they are read as the upper bytes of 32.
+            # Samples of 24 bits cannot be memory-mapped; scipy reads them as the upper bytes of 32.
             return wavfile.read(path)
 
 
