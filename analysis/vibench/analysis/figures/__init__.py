@@ -1,7 +1,7 @@
-"""Figures of measurements with the model's results; one file for each figure, drawn without a display.
+"""Figures of measurements and simulations, drawn without a display; one module for each figure.
 
-Each is a matplotlib figure with its caption and the plotted numbers, saved as PNG, SVG or PDF and CSV;
-the same data give the same bytes. Colour-blind readers can tell the colours apart.
+Each has a caption and tables of the plotted numbers. It is saved as PNG, SVG or PDF, and CSV; the same data
+give the same bytes. Colour-blind readers can distinguish the colours.
 """
 
 from vibench.acquisition import need_extra

@@ -24,9 +24,9 @@ from .stepped_sine import tracked_caption
 
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15
-"""Margin around the points, as a part of their range, so that no point lies on the frame."""
+"""Margin around the points, as a share of their range, so that no point lies on the frame."""
 _MOST_MARKS = 5
-"""Most intervals of the backbone's frequency axis, because numbers such as 266.385 are wide."""
+"""Most tick intervals on the backbone's frequency axis, because labels such as 266.385 are wide."""
 _LEVEL = "base acceleration [m/s²]"
 _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
@@ -38,7 +38,7 @@ _MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 
 def backbone_figure(
     analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None
 ) -> style.DrawnFigure:
-    """Draw the resonance over level, and m0's amplitude over the resonance, for levels where it was found."""
+    """Draw resonance and amplitude over level, and the backbone; mark levels without a resonance."""
     levels = tracked_resonances(analysis.facts.feedback)
     base = np.array([each.base_m_per_s2 for each in levels])
     simulated_m = _simulated_m(levels, analysis, laid)
@@ -72,7 +72,7 @@ def backbone_figure(
 
 
 def _broken(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
-    """Interrupt the line where the controller did not reach a level."""
+    """Insert NaN at the lost levels, so that lines are interrupted there."""
     nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
     gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
     return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
@@ -83,7 +83,7 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 
 
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
-    """Return amplitudes in a readable unit, with its factor and name."""
+    """Return amplitudes in a readable unit, and factor and name of the unit."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
     scale, unit = style.prefixed(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
@@ -130,7 +130,7 @@ def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
 
 
 def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> None:
-    """Label the amplitude axis, and let it reach from zero to above the largest value."""
+    """Label the amplitude axis, and set its range from zero to above the largest value."""
     of = "at resonance"
     if levels[0].harmonic > 1:
         of = f"at {levels[0].harmonic} times the drive"

@@ -33,7 +33,7 @@ _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPO
 def branches_figure(
     diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
 ) -> style.DrawnFigure:
-    """Draw Responses I and II of m0 on every branch over the parameter, with recordings beneath.
+    """Draw Responses I and II of m0 on every branch over the varied parameter, and recordings behind them.
 
     If the request names a bench's control loop, a third panel shows which unstable motions it can hold.
 
@@ -42,9 +42,9 @@ def branches_figure(
     diagram
         The branches.
     measured
-        Responses of stepped sines and sweeps; drawn where frequency changes.
+        Responses of stepped sines and sweeps; drawn for branches along frequency.
     tracked
-        Tracked resonances; drawn with a phase resonance, whose first panel shows its frequency.
+        Tracked resonances; drawn with a branch of phase resonance, in a first panel of frequencies.
     """
     with style.styled():
         holdable = diagram.holdable
@@ -95,7 +95,7 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
 
 
 def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
-    """Draw the frequency of a phase resonance instead of Response I, with tracked resonances."""
+    """Draw the frequency of a phase resonance instead of Response I, and tracked resonances."""
     panels[0].clear()
     for line in diagram.lines:
         draw_line(panels[0], line, _place(diagram, line), line.frequency_hz)
@@ -172,7 +172,7 @@ def _across(axes: Axes, diagram: BranchDiagram) -> None:
 
 
 def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
-    """Return every point of every branch, and every special point."""
+    """Return tables of all points of the branches, and of the special points."""
     lines = diagram.lines
     if not lines:
         return ()

@@ -13,7 +13,7 @@ from ..tables import Table, table
 from . import style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
-"""Heights without and with runs."""
+"""Heights [in] of the figure without and with runs."""
 _SMALLEST = 1e-8
 """Smaller transmissions are drawn at the bottom of the axis."""
 _DECADES = 4.0

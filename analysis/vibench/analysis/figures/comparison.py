@@ -1,4 +1,4 @@
-"""Overlaid curves, as the window's Compare page shows them, in light colours for printing."""
+"""Overlaid curves as on the window's Compare page, in light colours for printing."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -24,9 +24,9 @@ _STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
     CurveOrigin.STABLE: ("-", ":"),
     CurveOrigin.UNSTABLE: ("--", "-."),
 }
-"""Styles of the transmission or Response I, and of Response II."""
+"""Line styles by origin: for the transmission or Response I, and for Response II."""
 _LONE = 1
-"""A curve of one point is drawn as a marker."""
+"""Most points of a curve that is drawn as a marker."""
 _SINGLE_BAND = 0.2
 
 
@@ -116,7 +116,7 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
-    """Describe each curve with its numbers."""
+    """Return the caption: note of each curve, and the difference of the pair."""
     said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     said.append("Shaded: two standard deviations.")
     if pair is not None:
@@ -131,7 +131,7 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
 def comparison_tables(
     name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
 ) -> tuple[Table, ...]:
-    """Return every curve, the difference, and the peaks, with units in the headings."""
+    """Return tables of every curve, its peaks and the difference, with units in the headings."""
     found = [
         table(
             f"{name}_{number}_{_file_word(curve)}",

@@ -15,7 +15,7 @@ from . import style
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
-"""Range on both sides of a stop. The paper fits its models 1 um beyond it. Power laws are shown whole."""
+"""Range of p on both sides of a stop; power laws begin at -gap. The paper fits up to 1 um beyond the stop."""
 _GREY = "#9a9a9a"
 _SPEED_M_PER_S = 0.1
 """Speed for laws that depend on it: the impact speed of the paper's specimen at 5 um and 260 Hz."""
@@ -23,7 +23,7 @@ _POINTS = 801
 
 
 def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigure:
-    """Draw the force that pushes m1 back, for each specimen by its label; p = y - z.
+    """Draw the force that pushes m1 back over p = y - z, in one panel per specimen, titled by its label.
 
     The nearer stop is shown. A law that depends on the speed is drawn for loading and unloading at
     0.1 m/s. Rigid stops, which have no finite force, are drawn as a wall.
@@ -55,7 +55,7 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
     below_m, above_m = specimen.gaps_m
     nearer_m = min(below_m, above_m)
     first_m = -nearer_m if isinstance(specimen.contact, PowerLaw) else nearer_m - _BEFORE_M
-    # From free motion into the stop, on the side where that stop is.
+    # Go from free motion into the nearer stop; `side` is the sign of p there.
     side = -1.0 if below_m < above_m else 1.0
     stop_m, p = side * nearer_m, side * np.linspace(first_m, nearer_m + _BEYOND_M, _POINTS)
     axes.axvline(1e6 * stop_m, color=_GREY, linewidth=0.8)

@@ -1,4 +1,4 @@
-"""Noise and nonlinear distortion of a transmission from noise that repeats, and its detection lines."""
+"""Noise and nonlinear distortion of a transmission from periodic noise, and the undriven lines."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ _EVEN, _ODD = style.LINEAR, style.SIMULATED
 
 
 def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> style.DrawnFigure:
-    """Draw the parts of noise and distortion in the scatter, and the levels at lines without drive."""
+    """Draw the shares of noise and distortion in the scatter, and the levels at undriven lines."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
     with style.styled():
@@ -86,7 +86,7 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
 
 
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
-    """State the parts of the scatter that are noise and distortion."""
+    """Return the caption with the shares of noise and distortion in the scatter."""
     found = distortion(periodic)
     said = [
         (
@@ -98,7 +98,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     if found.distortion_share is None:
         said.append("; one realisation cannot show distortion.")
     else:
-        # Neighbouring lines do not follow a narrow mode that moves: some of the drift is left.
+        # Near a narrow mode whose frequency drifts, some of the drift remains and counts as distortion.
         most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
         said.append(f", distortion {most}{_percent(found.distortion_share)}.")
     if periodic.drift is not None:

@@ -33,7 +33,7 @@ Pair = tuple[DwellAnalysis, DwellOverlay | None]
 
 
 def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
-    """Draw one row for each level, weak to strong: whole dwell, its last periods, spectrum of its window."""
+    """Draw one row for each level, weak to strong: whole dwell, last periods, spectrum of the window."""
     rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
     at = model_resonances(specimen_of(rising[0][0].facts.bench))
     with style.styled():
@@ -105,7 +105,7 @@ def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at
 
 
 def dwells_caption(rising: Sequence[Pair]) -> str:
-    """State the responses and the levels in the terminal bands for each level."""
+    """Return the caption with responses and terminal-band amplitudes for each level."""
     said = []
     for analysis, laid in rising:
         found = analysis.response

@@ -1,4 +1,4 @@
-"""The draws of a twin in a figure: median, 95 % band, and sentences."""
+"""Median and 95 % band of the draws of a twin, for figures, tables and captions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ from ..tables import Table, columns, table
 from . import style
 
 ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
-"""Attributes of the responses to sines."""
+"""Attribute of a result for each response to sines."""
 RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Response II\n|x at f| / A0"}
 
 
 def draw_sines(axes: Axes, along: Reals, sines: ResponsePrediction, what: str, label: str) -> None:
-    """Draw the response without contact, and dots for the steady sines, over the abscissae ``along``."""
+    """Draw the response without contact as a line, and steady sines as dots, over the abscissae ``along``."""
     rising = np.argsort(along)
     axes.plot(along[rising], sines.linear[rising], **style.LINEAR_CURVE)
     axes.plot(along, getattr(sines, ATTRIBUTES[what]), ".", color=style.PREDICTED, label=label)
 
 
 def simulated_label(run: SimulatedRun) -> str:
-    """Return the legend's name of the simulated curve."""
+    """Return the legend label of the simulated curve."""
     if not run.driven.by_voltage:
         return "simulated under the recorded base"
     return "simulated under the recorded voltage"
@@ -49,14 +49,14 @@ def draw_band(
     found = laid.quantity(name)
     if found is None or laid.run.draws == 1:
         return None
-    # Their number differs between recordings: the caption states it.
+    # The label omits the number of draws, which differs between recordings; the caption states it.
     look: dict[str, Any] = {"color": style.SIMULATED, "alpha": 0.25, "zorder": 1.5, "label": "95 % of draws"}
     axes.fill_between(along, shown(found.lower), shown(found.upper), **look)
     return shown(found.median)
 
 
 def run_text(laid: AbstractOverlay[Any]) -> str:
-    """Describe the simulation, and state where the measurement lies in it."""
+    """Return sentences on the simulation, and on where the measurement lies among its draws."""
     run = laid.run
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
@@ -79,7 +79,7 @@ def run_text(laid: AbstractOverlay[Any]) -> str:
 
 
 def agreement_text(laid: AbstractOverlay[Any]) -> str:
-    """Return the end of a sentence on where the measurement lies in the draws; empty under a base motion."""
+    """Return the end of a sentence: where the measurement lies among the draws; empty under a base motion."""
     if not laid.run.driven.by_voltage:
         return ""
     said = [*laid.agreement]
@@ -89,13 +89,13 @@ def agreement_text(laid: AbstractOverlay[Any]) -> str:
 
 
 def sines_table(name: str, sines: ResponsePrediction) -> Table:
-    """Return a table of the responses to steady sines that a figure shows beside a measurement."""
+    """Return a table of the responses to steady sines."""
     keys = "frequency_hz amplitude_m response_i response_ii linear impacts"
     return table(f"{name}_sines", **columns(sines, keys))
 
 
 def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
-    """Return a table's columns with the median and band of a quantity's draws."""
+    """Return table columns with median and band of the draws of a quantity."""
     found = laid.quantity(name)
     if found is None or laid.run.draws == 1:
         return {}
@@ -109,7 +109,7 @@ def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str
 
 
 def simulated_responses(laid: SweepOverlay | SteppedSineOverlay) -> dict[str, Reals]:
-    """Return a table's columns with the simulated responses to sines and their draws."""
+    """Return table columns with the simulated responses to sines, and median and band of their draws."""
     return {
         **columns(laid.response, "response_i_simulated=response_i response_ii_simulated=response_ii"),
         **band_columns(laid, RESPONSE_I, "response_i"),
@@ -118,7 +118,7 @@ def simulated_responses(laid: SweepOverlay | SteppedSineOverlay) -> dict[str, Re
 
 
 _LABEL_HEIGHT = 1.01
-"""Just above the axis, in parts of its height."""
+"""Height of labels, just above the axis, relative to the axis height."""
 _FREE_LABEL = "resonances without contact"
 _BOUND_LABEL = "terminal resonances (m1 stuck to m2)"
 
@@ -140,7 +140,7 @@ def model_resonances(specimen: Specimen) -> ModelResonances:
 
 
 def mark_resonances(axes: Axes, at: ModelResonances) -> None:
-    """Draw dashed lines without contact and dotted ones with m1 stuck to m2."""
+    """Draw dashed lines at resonances without contact, dotted ones at those with m1 stuck to m2."""
     for number, frequency in enumerate(at.free_hz):
         label = _FREE_LABEL if number == 0 else None
         axes.axvline(frequency, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)

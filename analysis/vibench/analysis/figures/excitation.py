@@ -1,4 +1,4 @@
-"""The planned drive voltage, before anything moves."""
+"""Planned drive voltage, over time and as a spectrum."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from . import style
 
 _HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
-"""Samples per period of the highest frequency: enough to draw a signal, and a whole sweep stays small."""
+"""Samples per period of the highest frequency: enough for a figure, few enough for a long sweep."""
 _SMALLEST_PART = 0.2
-"""The spectrum is shown around the frequencies where it is within 14 dB of its largest line."""
+"""Least size of a shown line relative to the largest one (14 dB); sets the frequency range."""
 _COLUMNS = 2000
 
 

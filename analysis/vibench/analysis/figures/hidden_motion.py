@@ -1,4 +1,4 @@
-"""The hidden motion of one recording: p between the stops, and its impacts."""
+"""Hidden motion of one recording: p between the stops, and the impacts."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +12,7 @@ _MICRO = 1e6
 _COLUMNS = 1200
 _ZOOM_S = 0.025
 _BOUND = 1.96
-"""Standard deviations in a 95 % bound."""
+"""Half width of a 95 % bound in standard deviations."""
 _BINS = 40
 _DEEPEST_SHOWN_M = 2e-6
 _POINTS = 200
@@ -68,7 +68,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
 
 
 def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
-    # The part that is enlarged: around the middle impact, or else the middle of the motion.
+    # Enlarge the part around the middle impact, or without impacts the middle of the motion.
     count = round(_ZOOM_S * motion.sample_rate_hz)
     impacts = motion.tracked.collisions.samples
     middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2

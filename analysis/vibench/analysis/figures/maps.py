@@ -42,15 +42,15 @@ def map_figure(
     diagram: BranchDiagram | None = None,
     levels: Sequence[RecordedLevel] = (),
 ) -> style.DrawnFigure:
-    """Draw a map over two quantities, or the diagram along one.
+    """Draw a map over two quantities, or a bifurcation diagram along one.
 
     Parameters
     ----------
     results
-        The map, complete or growing.
+        Results of a map, complete or still being computed.
     shown
-        One of `SHOWN`, beside the kinds of motion. None shows Response I; for a basin map, the time for
-        which each start was followed.
+        Quantity of `SHOWN` to draw beside the kinds of motion. None: Response I, or for a basin map, the
+        time for which each start was followed.
     diagram
         Branches to overlay on a diagram along one quantity.
     levels
@@ -164,7 +164,7 @@ def _scale(name: str, values: Reals) -> Normalize:
 
 
 def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
-    """Draw a recording's level as a line, with measured values in the colours of the map."""
+    """Draw a recording's level as a line, with its measured responses in the colours of the map."""
     frequency_hz, amplitude_m = np.array(level.pairs).T
     label = style.plain_label(level.name)
     axes.plot(frequency_hz, MICRO * amplitude_m, color=style.MEASURED, linewidth=4.0, label=label)

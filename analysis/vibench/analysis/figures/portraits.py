@@ -13,7 +13,7 @@ from . import style
 _PANEL_IN = 2.9
 _COLUMNS = 3
 _ORBIT_PERIODS = 60.0
-"""Most lines drawn; more would fill the panel."""
+"""Number of last drive periods of the orbit to draw; more would fill the panel."""
 _MOST_POINTS = 2000
 
 

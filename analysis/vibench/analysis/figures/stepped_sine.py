@@ -1,4 +1,4 @@
-"""Responses I and II at each frequency or level of a stepped sine, with both directions apart."""
+"""Responses I and II at each frequency or level of a stepped sine, separately for both directions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ P = TypeVar("P")
 
 @dataclass(frozen=True)
 class SteppedLook(Generic[P]):
-    """Axis, title and caption of a stepped sine, for each stepped quantity."""
+    """Axis, title and caption of the figure for one stepped quantity."""
 
     along: Callable[[SteppedResponse], Reals]
     axis: str
@@ -100,7 +100,7 @@ def _responses(
 def _draw_simulated(
     axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
-    """Draw the median of the draws at every step of one direction, with the 95 % band as an error bar."""
+    """Draw the median of the draws at each step in one direction, with the 95 % band as error bars."""
     values, reach = getattr(laid.response, ATTRIBUTES[what])[chosen], None
     found = laid.quantity(what)
     if found is not None and laid.run.draws > 1:
@@ -113,7 +113,7 @@ def _draw_simulated(
 
 
 def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
-    """Return the caption with the distance of the simulation."""
+    """Return the caption, with the agreement of the simulation if there is one."""
     text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
@@ -122,7 +122,7 @@ def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, loo
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
-    """State the largest response and its frequency."""
+    """Return the caption with the largest response and its frequency."""
     top = int(np.argmax(found.response_ii))
     return (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
@@ -133,7 +133,7 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
 
 
 def stepped_level_caption(found: SteppedResponse) -> str:
-    """State between which levels the motion jumps, and the hysteresis."""
+    """Return the caption with the levels at which the motion jumps, and the hysteresis."""
     text = (
         f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
@@ -151,7 +151,7 @@ def stepped_level_caption(found: SteppedResponse) -> str:
 
 
 def tracked_caption(found: SteppedResponse) -> str:
-    """State the number of levels."""
+    """Return the caption with the number of levels."""
     return f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
 
 

@@ -1,4 +1,4 @@
-"""Style of all figures: colours that colour-blind readers can tell apart, and sizes."""
+"""Style of all figures: sizes, and colours that colour-blind readers can distinguish."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +41,7 @@ SIMULATED_CURVE: Mapping[str, Any] = {
     "linestyle": (0, (4, 2)),
     "zorder": 3.5,
 }
-"""A simulation over the measurement."""
+"""Line style of a simulated curve drawn over a measured one."""
 LINEAR_CURVE: Mapping[str, Any] = {
     "color": LINEAR,
     "linestyle": "--",
@@ -53,12 +53,12 @@ WIDTH_IN = 7.2
 """Width that fits the text of A4 and a report's column."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""Margin beyond both ends of the axis, because measured lines lie a few ppm off round numbers."""
+"""Relative margin at both ends of the axis, because measured lines lie a few ppm off round numbers."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Range of the ratio of a frequency axis' ends in which ticks at 3 and 7 help and fit."""
+"""Ratio of the ends of a frequency axis: linear below 5; ticks at 3 and 7 only below 60."""
 _FEW_DECADES = (1.5, 0.5)
-"""Decades of a magnitude axis below which some, or all, ticks between powers of ten have numbers."""
+"""Decades of a magnitude axis below which some, and all, ticks between powers of ten are labelled."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
@@ -100,12 +100,12 @@ def styled() -> Iterator[None]:
 
 
 def plain_label(name: str) -> str:
-    """Escape a file's name so that Matplotlib shows it unchanged, even if it contains mathematics."""
+    """Escape a name so that Matplotlib shows it unchanged, even if it contains dollar signs."""
     return printable(name).replace("$", r"\$")
 
 
 def new_figure(height_in: float) -> Figure:
-    """Make a figure of the common width, ``height_in`` inches high, with a layout without overlaps."""
+    """Make a figure of the common width and a given height [in], laid out without overlaps."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -122,7 +122,7 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None
 
 
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
-    """Scale frequencies of ``axes`` logarithmically, marked at 20, 50, 100; a narrow band stays linear."""
+    """Set a logarithmic frequency axis with ticks such as 20, 50, 100; a narrow band stays linear."""
     axes.set_xlim(low_hz * (1 - _EDGE), high_hz * (1 + _EDGE))
     if high_hz < _LINEAR_BELOW * low_hz:
         return
@@ -136,14 +136,14 @@ def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
 
 
 def magnitude_axis(axes: Axes) -> None:
-    """Scale magnitudes of ``axes`` logarithmically, marked at 0.1, 1, 10; a narrow range has more."""
+    """Set a logarithmic magnitude axis with ticks at powers of ten; a narrow range has more."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.yaxis.set_minor_formatter(_Between(minor_thresholds=_FEW_DECADES))
 
 
 class _Between(LogFormatter):
-    """Numbers the ticks that matplotlib would number, but writes 0.4 instead of 4e−01."""
+    """Formatter that labels the same ticks as matplotlib, but writes 0.4 instead of 4e−01."""
 
     def __call__(self, value: float, place: int | None = None) -> str:
         return _plain(value) if super().__call__(value, place) else ""
@@ -208,7 +208,7 @@ class DrawnFigure:
         return target.getvalue()
 
     def save(self, folder: Path, kinds: Sequence[ImageKind] = SCREEN) -> tuple[Path, ...]:
-        """Write the requested images, and the numbers as CSV; replace an older figure of that name."""
+        """Write the requested images, and the tables as CSV; replace an older figure of that name."""
         folder.mkdir(parents=True, exist_ok=True)
         drawn = []
         for kind in kinds:

@@ -1,4 +1,4 @@
-"""A sweep: envelope in time, responses over frequency, collisions (the paper's Fig. 13 d)."""
+"""Sweep: envelope over time, responses over frequency, collisions (the paper's Fig. 13 d)."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -105,7 +105,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
 
 
 def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
-    """State where the masses collided, with bounds, and the result of the simulation."""
+    """Return the caption with the collisions, their bounds, and the agreement of the simulation."""
     found = analysis.response
     amplitudes = 1e6 * found.drive_amplitude_m
     said = [
@@ -136,7 +136,7 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
 
 
 def regions_text(found: Collisions) -> str:
-    """State where a sweep had collisions."""
+    """Return the frequency ranges in which a sweep had collisions, as text."""
     unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
     unclear = f"; {unclear} the sweep was too fast to distinguish ringing from collisions" if unclear else ""
     if not found.regions:
@@ -146,7 +146,7 @@ def regions_text(found: Collisions) -> str:
         start, stop = region.start, region.stop
         middle_hz = 0.5 * (start.upper_hz + start.lower_hz)
         begin = plus_minus(middle_hz, start.upper_hz - middle_hz) + " Hz"
-        # How long collisions continue is random, so their end in one run has no bounds.
+        # The end of collisions is random, so that of one run has no bounds.
         end = f"{stop.frequency_hz:.1f} Hz in this run"
         first = "the sweep's beginning" if region.reaches_start else begin
         last = "the sweep's end" if region.reaches_stop else end

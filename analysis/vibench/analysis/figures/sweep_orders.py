@@ -1,4 +1,4 @@
-"""Motion at other frequencies than the drive's in a sweep: spectrogram, and orders 1/3 to 5."""
+"""Motion in a sweep at frequencies other than the drive's: spectrogram, and orders 1/3 to 5."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,7 +17,7 @@ _ORDER_STYLES = ("-", "-", "--", "-.", ":")
 
 
 def sweep_orders_figure(analysis: SweepAnalysis) -> style.DrawnFigure:
-    """Draw the spectrogram of the velocity and the displacement at orders of the drive."""
+    """Draw the spectrogram of the velocity, and the displacement at orders of the drive."""
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
         picture, orders = figure.subplots(2, 1, height_ratios=(1.3, 1.0))

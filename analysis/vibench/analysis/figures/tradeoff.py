@@ -1,4 +1,4 @@
-"""Error over time: every method that can answer a scene."""
+"""Error over processor time, for every method that can compute a scene."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from ..tables import table
 from . import style
 
 _LEAST = 1e-14
-"""An error below this is rounding."""
+"""Least error drawn; smaller ones are rounding."""
 
 
 def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigure:

@@ -1,4 +1,4 @@
-"""The transmission of one noise level: the paper's Fig. 13 a to c, with coherence and bounds."""
+"""Transmission at one noise level, as the paper's Fig. 13 a to c, with coherence and bounds."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,12 +26,12 @@ from .ensemble_band import (
 
 _HEIGHT_IN = 6.4
 _LARGEST_BOUND_RATIO = 10.0
-"""Largest distance of drawn bounds from the curve; unknown values would otherwise fill the figure."""
+"""Largest ratio of drawn bounds to the curve; bounds of uncertain lines would fill the figure."""
 _DIFFERENCE_LIMIT_DB = 12.0
 _LINEAR_POINTS = 4000
 _HALF_TURN_DEG = 180.0
 _BELOW = 0.5
-"""The axis begins at half the smallest value."""
+"""Lower end of the axis relative to the smallest value."""
 
 
 def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = None) -> style.DrawnFigure:
@@ -150,7 +150,7 @@ def _differences(axes: Axes, laid: NoiseOverlay, at: ModelResonances) -> None:
 
 
 def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> str:
-    """Return the caption with the figure's numbers."""
+    """Return the caption with level, resonances, coherence and agreement of the simulation."""
     response = analysis.response
     view = analysis.request.view
     symbol, unit = view.symbol.replace(" ", ""), f" {view.unit}" if view.unit else ""
@@ -183,7 +183,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
 
 
 def estimate_sentence(response: NoiseResponse) -> str:
-    """State how a transmission was estimated, its resolution, and what was left out."""
+    """Return sentences on the estimator, the resolution, and the data left out."""
     found = response.frequency_response
     how = found.settings
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"

@@ -1,4 +1,4 @@
-"""All noise levels in one figure: resonances vanish and others appear as the level grows."""
+"""Transmissions at all noise levels in one figure, to show how resonances change with the level."""
 
 from collections.abc import Sequence
 
@@ -60,7 +60,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
 
 
 def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
-    """State the peaks of each level."""
+    """Return the caption with the resonances at each level."""
     said = []
     for each in rising:
         peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]
