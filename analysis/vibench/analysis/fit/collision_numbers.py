@@ -24,7 +24,7 @@ from .specimen_fit import SpecimenFit
 from .statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
-"""Limits of Response I over Response II, which is 1 for a sine; in between is undecided."""
+"""Limits of Response I over Response II (1 for a sine): no collisions below, collisions above."""
 _LENGTH_S = 3.0
 """Length of a tracked stretch [s], with four restarts."""
 _MOST_RECORDINGS = 3
@@ -38,7 +38,7 @@ _JUDGED = (
     Hidden.EXPONENT,
     Hidden.LOSS,
 )
-"""Parameters that noise does not determine."""
+"""Parameters whose described values are checked against the collisions."""
 _SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
 
 
@@ -71,7 +71,7 @@ class CollisionNumbers:
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
-        """Return the specimen with the determined gaps; a more accurate mean keeps their ratio."""
+        """Return the specimen with the determined gaps; if the mean gap is determined, the ratio is kept."""
         mean = next((each for each in self.determined if each.what is Hidden.MEAN_GAP), None)
         if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
@@ -95,7 +95,7 @@ class CollisionNumbers:
 
     @property
     def contradicted(self) -> tuple[str, ...]:
-        """Return described values that lie outside the bounds by more than their width, worst first."""
+        """Texts on values that differ from the description by more than their bounds' width, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
             for each in self.determined
@@ -106,7 +106,7 @@ class CollisionNumbers:
 
 
 def peakedness(dwell: DwellAnalysis) -> float:
-    """Return Response I, without its bias if known, over Response II; 1 for a sine."""
+    """Return Response I over Response II, which is 1 for a sine; a known bias is subtracted."""
     found = dwell.response
     lift = 0.0 if isnan(found.noise_bias_i) else found.noise_bias_i
     return (found.response_i - lift) / found.response_ii
@@ -115,7 +115,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
 def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track the colliding recordings; return the parameters of the one with the best gaps.
 
-    Returns ------- The parameters, or None and the reason.
+    Returns the parameters and an empty text, or None and the reason.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -145,7 +145,7 @@ def numbers_from_statistics(
 ) -> tuple[CollisionNumbers | None, str]:
     """Compare statistics of the best recording with those of simulated specimens.
 
-    Returns ------- The parameters, or None and the reason.
+    Returns the parameters and an empty text, or None and the reason.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
@@ -196,7 +196,7 @@ class _Colliding:
     drive_hz: float | None = None
 
     def within(self, recording: Recording) -> tuple[float, float]:
-        """Return its start and end [s]."""
+        """Return start and end of the stretch [s]."""
         rate = recording.sample_rate_hz
         start_s, stop_s = max(
             (

@@ -1,4 +1,4 @@
-"""The gap from the onset of collisions, where it equals the linear relative motion."""
+"""Fit of the gap to the onset of collisions, where the linear relative motion equals the gap."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ _STEP = 1e-4
 _EDGE_POINTS = 41
 _APPROACH_S = 1.0
 _LEAST_INTERVALS = 3
-"""Fewest intervals for a line through A0 with a residual."""
+"""Fewest intervals for fitting a line to A0."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Onset:
     gap_m: float
     low_m: float
     high_m: float
-    """Bounds: those of the edge, widened by the uncertainties of drive and linear specimen."""
+    """Bounds of the gap from those of the edge, widened by uncertainties of drive and linear specimen."""
 
 
 def fit_gap(
@@ -63,7 +63,7 @@ def fit_gap(
     fit
         Fit of the linear specimen, for its covariance.
     confidence
-        Of drive and linear specimen within the bounds.
+        Confidence for the uncertainties of drive and linear specimen.
     """
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit, confidence)]
     if not found:
@@ -88,7 +88,7 @@ def onsets(
     fit: SpecimenFit | None = None,
     confidence: float = DEFAULT_CONFIDENCE,
 ) -> Iterator[Onset]:
-    """Yield every onset of a sweep with the gap that it implies."""
+    """Yield every onset of collisions in a sweep, with the gap that follows from it."""
     reach = float(norm.ppf(0.5 + 0.5 * confidence))
     rate = sweep.response.sweep_rate_hz_per_s
     for region in sweep.collisions.regions:
@@ -122,7 +122,7 @@ class _Approach:
 
 
 def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
-    """Return A0 from the intervals before an onset, without the last one."""
+    """Fit A0 to the intervals before an onset, except the last one."""
     last = int(np.argmin(np.abs(measured.time_s - edge.time_s))) - 1
     first = max(0, last - round(_APPROACH_S / measured.interval_s))
     if last - first < _LEAST_INTERVALS:
@@ -185,7 +185,7 @@ class Bracket:
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Return the gap from the narrowest bracket, the geometric mean of its bounds.
+    """Return the gap as the geometric mean of the narrowest bracket.
 
     Raises NotEnoughData when no frequency has dwells on both sides of the onset.
     """
@@ -207,7 +207,7 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 
 
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Bracket]:
-    """Yield a bracket for every frequency with dwells on both sides.
+    """Yield a bracket for every frequency with dwells with and without collisions.
 
 
 

@@ -19,10 +19,10 @@ from .parameters import LINEAR, Parameter, parameter_value, with_values
 LEAST_RELATIVE_SD = 1e-4
 """Least relative scatter of a line, because calibrations and clocks are no better."""
 _LEAST_CLEAR = 10.0
-"""Least magnitude of a line over the usual scatter of its neighbours, for a normal logarithm.
+"""Least ratio of a magnitude to the median scatter of its neighbours, so that ln(magnitude) is normal.
 
-Its own scatter, from few averages, would select lines with small scatter by chance, and a correct model
-would be refused.
+The scatter of the line itself comes from few averages. It would select lines whose scatter is small by
+chance, so that a correct model would be refused.
 """
 _NEIGHBOURS = 31
 """Number of lines for the median scatter."""
@@ -44,7 +44,7 @@ _MOST_STEPS = 60
 """Step limit: a further mode without evidence has no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
-"""m0 over base at frequencies, of a specimen and of further numbers."""
+"""Function of specimen, frequencies [Hz] and further parameters that returns m0 over base."""
 
 
 def loaded_response(
@@ -52,8 +52,8 @@ def loaded_response(
 ) -> Complexes:
     """Return m0 over base of a specimen with additional loads, shape (lines,).
 
-    m2 hangs on m0 and m1 on m2. A link of dynamic stiffness P with everything behind it, A, gives P A / (P
-    + A). ``extra_n_per_m`` are additional dynamic stiffnesses at m0 and at m2.
+    m2 is linked to m0, and m1 to m2. A link of dynamic stiffness P in series with the dynamic stiffness A
+    behind it gives P A / (P + A). ``extra_n_per_m`` are additional dynamic stiffnesses at m0 and at m2.
     """
     s = 2j * np.pi * frequency_hz
     (m0, m1, m2), springs, dampers = specimen.masses, specimen.stiffnesses, specimen.dampings
@@ -64,7 +64,7 @@ def loaded_response(
 
 
 def own_response(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
-    """Return the three masses alone."""
+    """Return m0 over base for the three masses without additional loads."""
     return loaded_response(specimen, frequency_hz, (0.0, 0.0))
 
 
@@ -90,7 +90,7 @@ class Descended:
     covariance: Reals
     """Covariance of the logarithms, for a correct model."""
     freedoms: Reals
-    """Degrees of freedom of each uncertainty; few if few lines determine it."""
+    """Degrees of freedom of each uncertainty; few if few lines determine the parameter."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -98,7 +98,7 @@ class Descended:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines to fit, with the logarithms of parameters, the phases and a scale."""
+    """Lines and settings of a fit of parameters (as logarithms), phases of the channels, and a scale."""
 
     frequency_hz: Reals
     measured: Complexes
@@ -107,7 +107,7 @@ class Lines:
     averages: float
     """Independent averages for each line's scatter."""
     correlation: tuple[float, float]
-    """Number of correlated lines per independent one, for parameters and for chi square."""
+    """Number of lines per independent line, for parameters and for chi square."""
     nominal: Specimen
     free: tuple[Parameter, ...]
     scale_sd: float
@@ -115,7 +115,7 @@ class Lines:
 
     @property
     def start(self) -> Reals:
-        """Start of the search."""
+        """Starting point of the search."""
         named = [max(parameter_value(self.nominal, each), LEAST_DAMPING_TIME_S) for each in self.free]
         return np.concatenate([np.log(named), np.zeros(CHANNEL_PHASES + (self.scale_sd > 0.0))])
 
@@ -175,9 +175,9 @@ def lines_of(
     scale_sd: float,
     fitted: Specimen | None = None,
 ) -> Lines:
-    """Select the lines clear of the scatter; raises NotEnoughData for too few.
+    """Select the lines that are well above the scatter; raises NotEnoughData if too few are left.
 
-    The criterion uses the measurement, or a fitted specimen, so that noise does not affect the choice.
+    The magnitudes of a fitted specimen, if given, replace the measured ones, so that noise has no effect.
     """
     measured = np.abs(frequency_response.value)
     frequency_hz = frequency_response.frequency_hz
@@ -207,11 +207,11 @@ def lines_of(
 
 
 def fit_lines(lines: Lines) -> Descended:
-    """Fit from the description, and if that fails from stiffer and softer ones."""
+    """Fit from the described specimen; if that fails, also from stiffer and softer ones."""
     usual = Freedom()
     best = _from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:
-        # A phase may lie on another branch: restart from stiffer or softer specimens.
+        # The start may be wrong by a turn of the phase: restart from stiffer and softer specimens.
         others = [_from(lines, usual, lines.start + _stiffer(lines, scale)) for scale in SCALES]
         best = min([best, *others], key=lambda each: each.cost)
     if np.isinf(best.cost):
@@ -243,7 +243,7 @@ class _Ended:
 
 
 def _from(lines: Lines, allowed: Freedom, start: Reals) -> _Ended:
-    """Fit by least squares, which converges from afar, then by likelihood."""
+    """Fit by least squares, which converges from a distant start, and then by likelihood."""
     open_ended = np.full(start.size - len(allowed.low), np.inf)
     bounds = (np.concatenate([-open_ended, allowed.low]), np.concatenate([open_ended, allowed.high]))
 
@@ -282,8 +282,8 @@ def _fit_from_description(lines: Lines, allowed: Freedom, found: _Ended) -> Desc
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
-    # Student's likelihood for estimated scatter: the variance of its slope is (spread + 2) / spread times
-    # its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
+    # The scatter is estimated, so the likelihood is Student's. The variance of its slope is (spread + 2) /
+    # spread times its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
     squared = lines.squared(lines.residuals(found.x, allowed.model))
     slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
     slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]

@@ -16,7 +16,7 @@ class Parameter(StrEnum):
     """Parameter of a specimen."""
 
     DAMPING_TIME = "damping_time_s"
-    """c_i / k_i, one for all links."""
+    """Damping time c_i / k_i, common to all links."""
     F0 = "f0_hz"
     F1 = "f1_hz"
     F2 = "f2_hz"
@@ -24,7 +24,7 @@ class Parameter(StrEnum):
     M0 = "m0_kg"
     M1 = "m1_kg"
     M2 = "m2_kg"
-    """Only one at a time, because motion determines only ratios of masses."""
+    """Masses, of which only one at a time can be fitted, because motion determines only their ratios."""
     C0 = "c0_ns_per_m"
     C1 = "c1_ns_per_m"
     C2 = "c2_ns_per_m"
@@ -33,11 +33,11 @@ class Parameter(StrEnum):
 
 
 LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
-"""Default parameters for a transmission without collisions."""
+"""Parameters that are fitted by default to a transmission without collisions."""
 MASSES = (Parameter.M0, Parameter.M1, Parameter.M2)
 DAMPERS = (Parameter.C0, Parameter.C1, Parameter.C2)
 ALSO_FREE = MASSES + DAMPERS
-"""Additional parameters for a transmission."""
+"""Parameters that may be fitted in addition."""
 SHOWN = {
     Parameter.DAMPING_TIME: ("c / k", 1e6, "µs"),
     Parameter.F0: ("f0", 1.0, "Hz"),
@@ -78,7 +78,7 @@ class FittedValue:
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Read one parameter of a specimen; the damping time of a specimen with several is that of link 0."""
+    """Read one parameter of a specimen; if damping times differ between links, link 0 counts."""
     masses, stiffnesses = specimen.masses, specimen.stiffnesses
     match parameter:
         case Parameter.DAMPING_TIME:
@@ -97,9 +97,9 @@ def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
 
 
 def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
-    """Return a specimen with other parameters; frequencies stay when a mass changes.
+    """Return a specimen with changed parameters; a change of mass leaves the frequencies unchanged.
 
-    Other dampings stay proportional to stiffness, and two gaps keep their ratio.
+    Other dampers remain proportional to stiffness, and the ratio of two gaps is kept.
     """
     old = parameter_value(specimen, Parameter.DAMPING_TIME)
     beta = values.get(Parameter.DAMPING_TIME, old)

@@ -27,7 +27,7 @@ from .parameters import (
 from .suspects import Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
-"""Relative error of a converter clock, which no recording shows."""
+"""Relative standard deviation of a converter clock, which recordings do not reveal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +43,14 @@ class SpecimenFit(Labelled):
     lines: int
     """Number of lines used."""
     reduced_chi_square: float
-    """Reduced chi square, including the uncertainty of the scatter; 1 for a model that explains the lines."""
+    """Reduced chi square, about 1 if the model explains the lines; accounts for the estimated scatter."""
     limit: float
-    """Value that one correct model in a thousand exceeds."""
+    """Reduced chi square that one correct model in a thousand exceeds."""
     suspects: tuple[Suspect, ...]
     """Wrong assumptions that would explain a misfit, the most likely first."""
     confidence: float
     phase_rad: tuple[float, float]
-    """Phase of the channels at 100 Hz by a high pass (as 1 / f) and by a delay (as f)."""
+    """Phase of the channels at 100 Hz: from a high pass, proportional to 1 / f, and from a delay, to f."""
 
     @property
     def fits(self) -> bool:
@@ -84,8 +84,8 @@ def fit_specimen(
     """Fit linear parameters to magnitude and phase, weighted by the scatter of the lines.
 
     The scatter comes from few averages, so Student's likelihood is used. A fit is refused if a correct
-    model exceeds its chi square once in a thousand times. It then has no values, but a ranking of
-    assumptions that could be wrong.
+    model exceeds its chi square once in a thousand times. A refused fit has no values, but a
+    ranking of assumptions that may be wrong.
 
     Raises InvalidRequest when nothing is free, or for parameters that no linear transmission determines
     (gap, more than one mass), and NotEnoughData for too few significant lines.
@@ -135,7 +135,7 @@ def fit_specimen(
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Return the covariance by clock error, which scales all frequencies, and times inversely."""
+    """Return the covariance from the clock error, which scales frequencies, and times inversely."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

@@ -1,4 +1,4 @@
-"""Parameters of a specimen from statistics of its chaos, if the motion cannot be tracked."""
+"""Parameters of a specimen from statistics of its chaotic motion, for motions that cannot be tracked."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -21,8 +21,8 @@ from .specimen_fit import SpecimenFit
 
 # Parameters of a model from statistics of its runs: approximate Bayesian computation with regression.
 #
-# Parameters are drawn from a box, a run is made of each, and every parameter is regressed on the statistics
-# of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The prediction for the
+# Parameters are drawn from a box and each draw is simulated. Every parameter is regressed on the statistics
+# of these runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The prediction for the
 # observed statistics, with leave-one-out errors, is the posterior. Its intervals have the stated coverage
 # for parameters within the box, even for a poor regression (conformal prediction; Vovk, Gammerman and
 # Shafer 2005). The box is then narrowed and drawn from again (Deistler, Goncalves and Macke 2022).
@@ -33,7 +33,7 @@ _MARGIN = 1.25
 """Half width of the next box as a multiple of the largest error of the regression."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
-"""Number of components of the statistics' scatter for checking the observed ones."""
+"""Number of principal components of the statistics in which the observed ones are checked."""
 _FAR = 1.05
 """Distance of observed statistics, relative to the furthest run, above which the model is refused.
 
@@ -42,7 +42,7 @@ differences between rig and recording.
 """
 
 Runs = Callable[[Reals], Reals]
-"""Statistics, shape (draws, statistics), of runs with the given parameters, shape (draws, parameters)."""
+"""Function from parameters, shape (draws, parameters), to statistics of runs, (draws, statistics)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Posterior:
     """Posterior of parameters for observed statistics."""
 
     draws: Reals
-    """Shape (draws, parameters)."""
+    """Parameters drawn from the posterior, shape (draws, parameters)."""
     distance: float
     """Distance of the observed statistics from those of runs, relative to the furthest run."""
 
@@ -63,12 +63,12 @@ class Posterior:
 def posterior(
     runs: Runs, observed: Reals, box: Reals, seed: int, rounds: Sequence[int] = ROUNDS
 ) -> Posterior:
-    """Draw, run, regress and narrow the box, in rounds.
+    """Draw parameters, simulate, regress and narrow the box, once per round.
 
     Parameters
     ----------
     runs
-        Function that makes runs.
+        Function that simulates parameters and returns statistics.
     observed
         Observed statistics, shape (statistics,).
     box
@@ -84,7 +84,7 @@ def posterior(
         inside = np.all((parameters >= box[:, 0]) & (parameters <= box[:, 1]), axis=1)
         parameters, statistics = parameters[inside], statistics[inside]
         new = rng.uniform(box[:, 0], box[:, 1], (wanted - len(parameters), len(box)))
-        # An unchanged box contains all runs.
+        # If the box did not change, it contains all earlier runs and none may be missing.
         if len(new):
             parameters = np.concatenate([parameters, new])
             statistics = np.concatenate([statistics, runs(new)])
@@ -150,8 +150,9 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
 
 
 def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
-    """Return squared distances of a run from others along components and beyond, (terms,) and
-    (statistics,).
+    """Return two squared distances of a run from others, along the components and outside of them.
+
+    ``own_terms`` has the shape (terms,), ``own_values`` (statistics,).
     """
     known, *_ = np.linalg.lstsq(terms, values, rcond=None)
     _, spread, axes = np.linalg.svd(values - terms @ known, full_matrices=False)
@@ -164,7 +165,7 @@ def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Re
 _SEGMENT_S = 0.1
 _LOWEST_HZ, _HIGHEST_HZ = 40.0, 12_000.0
 _HIGHEST_PART = 0.4
-"""Highest part of the sample rate, within the converter's pass band."""
+"""Highest frequency as a share of the sample rate, within the converter's pass band."""
 _BANDS = 18
 _ABOVE_NOISE = 4.0
 _COHERENT_HZ = 1_000.0
@@ -177,8 +178,8 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
     """Return statistics of a stretch of irregular motion, shape (statistics,).
 
     They are logarithmic band powers of base acceleration and m0's velocity, their coherence per band, the
-    distribution of m0's displacement (spread, skewness, tails), and under a sine the harmonics, whose even
-    ones distinguish the sides.
+    distribution of m0's displacement (spread, skewness, tails), and under a sine the harmonics. Even
+    harmonics distinguish the two stops.
 
     Parameters
     ----------
@@ -196,7 +197,7 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
 
 
 def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
-    """Return which statistics are above channel noise, whose spectrum is unknown; same shape.
+    """Return flags of the statistics that are above the noise of the channels.
 
     Parameters
     ----------
@@ -216,7 +217,7 @@ def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> F
 
 
 def _bands(rate_hz: float) -> tuple[int, Integers]:
-    """Return the samples of a segment, and the edges of the bands among its lines."""
+    """Return the samples of a segment, and the edges of the bands as numbers of lines."""
     length = round(_SEGMENT_S * rate_hz)
     edges = np.geomspace(_LOWEST_HZ, min(_HIGHEST_HZ, _HIGHEST_PART * rate_hz), _BANDS + 1)
     return length, np.asarray(np.ceil(edges * length / rate_hz), dtype=np.int64)
@@ -235,7 +236,7 @@ def _in_bands(motion: Reals, rate_hz: float) -> tuple[Reals, ...]:
 
 
 def _displacement(velocity: Reals, rate_hz: float) -> Reals:
-    """Integrate in steps of samples, high-passed below all drives."""
+    """Return displacement times the sample rate, with a high pass below all drive frequencies."""
     b, a = scipy.signal.butter(2, _DRIFT_HZ, "highpass", fs=rate_hz)
     return np.asarray(scipy.signal.lfilter(b, a, np.cumsum(velocity - velocity.mean())))
 
@@ -264,12 +265,12 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range as factors of the description; gaps by geometric mean and root of upper over lower."""
+"""Search range as factors; gaps are given by their geometric mean and the root of upper over lower."""
 _CONFIDENCE = 0.95
 _TOLD = 0.5
-"""Width of bounds relative to the search range above which the statistics add no information."""
+"""Width of bounds, relative to the search range, above which a parameter is undetermined."""
 _LIKELY = 2.0
-"""Largest factor between the recorded base motion and that of the first draws."""
+"""Largest factor between the recorded base motion and that of the first draw."""
 _LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0
 _SEED = 29
 
@@ -300,11 +301,11 @@ def statistical_numbers(
     drive_hz
         Drive frequency of a sine; None for sweeps and noise.
     fitted
-        A shaker, if the bench describes none.
+        Fitted shaker, if the bench describes none.
     linear
         Fit of the linear parameters; each run draws them within its uncertainty.
     rounds
-        Numbers of runs, each in a narrower box.
+        Number of runs for each box; boxes become narrower.
     """
     rate_hz = recording.sample_rate_hz
     start, stop = (round(each * rate_hz) for each in stretch_s)
@@ -333,7 +334,7 @@ def statistical_numbers(
 
 
 class _Runs:
-    """Runs with given parameters and random starts."""
+    """Simulation of runs with given parameters and random starts."""
 
     def __init__(
         self,
@@ -385,7 +386,7 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
 
 
 def _require_likely(made: _Runs, measured: Reals) -> None:
-    """Raise, after a few draws, if the voltage does not reproduce the recorded base motion."""
+    """Raise UnusableData if the base motion of a first draw does not resemble the recorded one."""
     first = made.draws.draw(made.specimen, made.rng)
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:
@@ -407,7 +408,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
         why = "the statistics of the motion do not determine it better than the description" if flat else ""
-        # The centre of the bounds, because results are written with a half width.
+        # Use the centre of the bounds as value, because results are written with a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
     nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"
     for untold in (Hidden.EXPONENT, Hidden.LOSS):

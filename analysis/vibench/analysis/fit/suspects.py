@@ -1,4 +1,4 @@
-"""Find the wrong assumption of a model that does not fit, by freeing each in turn."""
+"""Search for the wrong assumption of a model that does not fit, by freeing each one in turn."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _HIGHEST_HZ = 2e4
 _MODE_LOW, _MODE_HIGH = (1e-6, 1e-4), (1.0, 0.3)
 """Limits of the mass ratio and the damping ratio of a further mode."""
 _MODE_START = (float(np.log(0.02)), float(np.log(0.01)))
-"""Starts of the search for one: the logarithms of both."""
+"""Start of the search for a further mode: logarithms of mass ratio and damping ratio."""
 
 
 class Assumption(StrEnum):
@@ -33,7 +33,7 @@ class Assumption(StrEnum):
     C2 = "c2"
     FRICTION = "friction"
     SENSITIVITY = "sensitivity"
-    """Sensitivity of the vibrometer over that of the accelerometer, the only observable one."""
+    """Ratio of the sensitivities of vibrometer and accelerometer; only the ratio is observable."""
     EXTRA_MODE = "extra mode"
     TABLE_MASS = "table mass"
     GAPS = "gaps"
@@ -41,7 +41,7 @@ class Assumption(StrEnum):
 
 @dataclass(frozen=True)
 class Suspect:
-    """A freed assumption, and the quality of the fit without it."""
+    """A freed assumption, and the quality of the resulting fit."""
 
     DOCUMENT: ClassVar = (
         "assumption would_mend_it=sentence reduced_chi_square mends behind_the_likeliest=behind"
@@ -52,13 +52,13 @@ class Suspect:
     """The change that explains the misfit, with its size."""
     reduced_chi_square: float
     mends: bool
-    """Whether the model fits with it."""
+    """Whether the model fits when this assumption is freed."""
     behind: float
-    """Twice the log likelihood ratio to the best one, penalised by ln(reals) per parameter; 0 is best."""
+    """Twice the log likelihood ratio to the best suspect, with ln(values) per parameter added; 0 is best."""
 
     @property
     def may_be_it(self) -> bool:
-        """Return whether the data do not distinguish it from the best one."""
+        """Return whether the data do not distinguish this suspect from the best one."""
         return self.behind < TOLD_APART
 
 
@@ -84,7 +84,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
             tried.append((assumption, sentence, found.chi_square, parameters, freedom))
     if not tried:
         return ()
-    # A residual of the best one is added to the scatter, so that small differences are not significant.
+    # Scale the scatter by the misfit of the best one, so that small differences are not significant.
     left = max(1.0, min(chi / freedom for _, _, chi, _, freedom in tried)) * lines.correlation[0]
     reals = 2 * lines.frequency_hz.size
     scores = [chi / left + count * np.log(reals) for _, _, chi, count, _ in tried]
@@ -102,7 +102,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
 
 
 _Told = Callable[[Specimen, Reals], str]
-"""Description of the change; empty if it is impossible."""
+"""Function that describes the fitted change; empty if the change is impossible."""
 
 
 def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:
@@ -181,7 +181,7 @@ def _off(_: Specimen, further: Reals) -> str:
 
 
 def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
-    """Return the dynamic stiffness of a small mass on a spring, attached to a mass."""
+    """Return the dynamic stiffness that a small mass on a damped spring adds to a mass."""
     own_hz, share, damping = np.exp(further)
     ratio = frequency_hz / own_hz
     spring = 1.0 + 2j * damping * ratio

@@ -28,14 +28,14 @@ from .specimen_fit import SpecimenFit, fit_specimen
 from .suspects import Assumption, Suspect
 
 _SURELY = 3.3
-"""Standard deviations that one correct description in a thousand exceeds."""
+"""Deviation in standard deviations that one correct description in a thousand exceeds."""
 _LEAST_RELATIVE_SD = 2e-3
-"""Relative error of a correct table mass by coil, filters and held samples."""
+"""Relative error of the fitted table mass that remains from coil, filters and held samples."""
 
 
 @dataclass(frozen=True)
 class TableFit:
-    """Fitted and described moving mass without the specimen."""
+    """Fitted and described moving mass of the shaker without the specimen."""
 
     mass_kg: float
     sd_kg: float
@@ -72,7 +72,7 @@ class TableFit:
 def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
     """Fit the shaker to weak noise and compare its mass with the bench; None without a described shaker.
 
-    The table mass shows in the reaction of the specimen's resonances on the base. Raises UnusableData when
+    The reaction of the specimen's resonances on the base determines the mass. Raises UnusableData when
     no shaker explains the transmission from voltage to base.
     """
     with open_recording(analysis.facts.path) as recording:
@@ -96,14 +96,14 @@ class UpdatedSpecimen(Labelled):
     values: tuple[FittedValue, ...]
     """Fitted values; empty if the model does not fit."""
     collisions: CollisionNumbers | None
-    """Parameters from collisions by tracking or statistics; None if neither is possible."""
+    """Parameters from tracking collisions or from their statistics; None if neither is possible."""
     linear: SpecimenFit | None
     """Linear fit of the weakest noise; None without noise."""
     linear_from: str
     """Recording for damping and frequencies; empty if none."""
     table: TableFit | None
     not_told: tuple[str, ...]
-    """One sentence with the reason for everything that stays as described."""
+    """Sentences with the reason for each value that remains as described."""
     nominal: SpecimenTable
     """Specimen described by the bench."""
 
@@ -124,7 +124,7 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Assumptions that recordings contradict, the most likely first for each."""
+        """Assumptions that recordings contradict; for each source, the most likely ones first."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
@@ -237,7 +237,7 @@ def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ..
 def _in_words(found: FittedValue) -> str:
     name, scale, unit = SHOWN[found.parameter]
     half = 0.5 * (found.high - found.low)
-    # Two digits of the interval, so that its ends differ in print.
+    # Round to two digits of the half width, so that the printed bounds differ.
     places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
     value, low, high, nominal = (
         f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
