@@ -1,4 +1,4 @@
-"""Modes fitted to lines by variable projection, with decorrelated errors."""
+"""Fit of modes to the lines of a transmission by variable projection, with decorrelated errors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from ..signals.window import Window, cosine_weights, hop_samples, taper
 from .results import FrequencyResponse
 
 SMALLEST_RELATIVE_SD = 1e-6
-"""Keeps the weights finite for noise-free simulations."""
+"""Least relative standard deviation, so that weights stay finite for noise-free simulations."""
 LARGEST_DAMPING = 0.5
 RESOLVED_LINES = 4.0
 """Least half-power bandwidth in noise bandwidths to be resolved."""
 WELL_FITTED = 1.2
-"""Reduced chi-square at which the background is good enough; a higher degree would only add uncertainty."""
+"""Reduced chi-square below which a higher degree of the background would only add uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,14 @@ class Resonance:
     peak_magnitude: float
     sd_peak_magnitude: float
     reduced_chi_square: float
-    """Reduced chi-square about the mode; standard deviations are widened if it is above 1."""
+    """Reduced chi-square of the lines about the mode; standard deviations are widened if it is above 1."""
     chi_square_limit: float
     """Value that one correct fit in a thousand exceeds."""
     lines_used: int
     is_resolved: bool
     """Whether the resolution is fine enough for this bandwidth."""
     overlap: float
-    """Factor by which a neighbour that overlaps widens the spread of the damping; 1 without one."""
+    """Factor by which an overlapping mode increases the uncertainty of damping; 1 without one."""
 
     @property
     def is_explained(self) -> bool:
@@ -57,7 +57,7 @@ class Resonance:
 
     @property
     def remark(self) -> str:
-        """Sentence about a fit that does not describe its lines, or of modes that overlap; else empty."""
+        """Sentence on a fit that does not describe its lines, or on overlapping modes; otherwise empty."""
         if self.is_explained and self.overlap > 1.0:
             return f"two modes overlap at {self.frequency_hz:.5g} Hz; the bounds allow for one between them"
         if self.is_explained:
@@ -69,12 +69,12 @@ class Resonance:
 
     @property
     def quality_factor(self) -> float:
-        """1 / (2 damping ratio)."""
+        """Quality factor, 1 / (2 damping ratio)."""
         return 0.5 / self.damping_ratio
 
     @property
     def half_power_bandwidth_hz(self) -> float:
-        """2 damping ratio times frequency."""
+        """Half-power bandwidth, 2 damping ratio times frequency."""
         return 2 * self.damping_ratio * self.frequency_hz
 
 
@@ -90,9 +90,9 @@ _PROXY_SAMPLES = 1024
 _FAR_LINES = 12
 """Distance in lines beyond which errors under cosine windows are uncorrelated."""
 _NEAR = 0.05
-"""Exponent below which a series is more accurate than the closed form."""
+"""Magnitude of the exponent below which a series is more accurate than the closed form."""
 _LEAST_NOISE = 0.02
-"""Least noise share of a line's variance: correlations of ringing alone may be singular."""
+"""Least share of sensor noise in a line's variance, since ringing alone may give a singular matrix."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Leakage:
         g [1/Hz] adds g i / (2 pi) (-1 - z I).
         """
         scaled = (pole - 2j * np.pi * frequency_hz) * self.segment_s
-        # Between two lines, and between two terms of a window, lie whole periods of the segment.
+        # Lines and window terms are whole periods per segment apart, so exp(scaled) is the same for all.
         rest = complex(np.expm1(pole * self.segment_s))
         integral = np.zeros_like(scaled)
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):
@@ -132,7 +132,7 @@ class Leakage:
         line
             Numbers of the lines, rising.
         value, spread
-            Transmission there, and the standard deviation of either part, which bounds the result.
+            Transmission there, and the standard deviation of its real or imaginary part, an upper bound.
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
         most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)
@@ -160,7 +160,7 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
     how = found.settings
     window, segment_s = Window(how.window), how.segment_samples / how.sample_rate_hz
     noise, ringing = _line_correlations(window, how.overlap, found.segments_used)
-    # Half of a complex variance in either part, averaged; w' counts per second, the slope per hertz.
+    # Each part has half of the complex variance, averaged; w' is per second, the slope per hertz.
     scale = 1 / (8 * np.pi**2 * found.n_eff * segment_s**2)
     return Leakage(segment_s, window, noise, scale * ringing)
 
@@ -218,17 +218,17 @@ def _exponentials(exponent: Complexes, rest: complex) -> tuple[Complexes, Comple
 
 
 Background = Callable[[Reals], Complexes]
-"""Shapes with real factors to add to modes, shape (lines, factors)."""
+"""Function of frequency [Hz] that returns background shapes with real factors, shape (lines, factors)."""
 _FINE_POINTS = 401
 _STEP = 1e-6
 _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
 """Maximum steps of a fit."""
 _STEADY_AVERAGES = 49.0
-"""Equivalent averages of a scatter that is smoothed over neighbouring lines."""
+"""Averages to which a scatter smoothed over neighbouring lines is equivalent."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
-"""Half-power bandwidths between two modes up to which their bounds allow for one more between them."""
+"""Distance in half-power bandwidths below which the bounds of two modes allow for a third between them."""
 _EDGE = 1e-3
 """Relative distance to a bound at which a fit counts as having found no minimum."""
 
@@ -239,9 +239,9 @@ class Lines:
     Parameters
     ----------
     band
-        Their transmission; weights follow from its standard deviation.
+        Transmission of the lines; its standard deviation gives the weights.
     chosen
-        Which of its known lines are fitted.
+        Flags of the lines to fit, shape (lines,).
     """
 
     def __init__(self, band: FrequencyResponse, chosen: Flags) -> None:
@@ -252,11 +252,11 @@ class Lines:
         self._leakage = leakage_of(band)
         slope = band.drive_slope_per_hz
         self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
-        # The scatter of few averages is smoothed over lines.
+        # A scatter that is smoothed over lines counts as one from more averages.
         self._averages = band.n_eff if band.steady_relative_sd is None else max(band.n_eff, _STEADY_AVERAGES)
         self._root: Complexes | None = None
         self.ringing_share = np.zeros(self.value.size)
-        """Share of each line's variance by cut-off ringing; all of it with a boxcar."""
+        """Share of cut-off ringing in each line's variance; 1 with a boxcar."""
         if self._leakage is not None and self.value.size:
             number = np.rint(self.frequency_hz * self._leakage.segment_s).astype(np.int64)
             rung = self._leakage.rung(number, self.value, self._spread)
@@ -266,12 +266,12 @@ class Lines:
 
     @property
     def narrowest_hz(self) -> float:
-        """Least half-power bandwidth [Hz] to determine damping with a boxcar: its leakage is not local."""
+        """Least half-power bandwidth [Hz] to determine damping with a boxcar, whose leakage spreads far."""
         leakage = self._leakage
         return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
 
     def independent(self, columns: Complexes) -> Reals:
-        """Convert complex values of the lines to real ones of variance one, shape (2 lines, ...)."""
+        """Convert complex values of lines to uncorrelated real ones of variance one, shape (2 lines, ...)."""
         if self._root is None:
             shape = (-1,) + (1,) * (columns.ndim - 1)
             scaled = columns / self._spread.reshape(shape)
@@ -390,14 +390,14 @@ def modal_fit(
     follows = np.hstack((_rates(lambda moved: basis(moved) @ found, poles), basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     freedom = left.size - follows.shape[1]
-    # A mode with a factor of exactly zero leaves its pole free.
+    # If the factor of a mode is exactly zero, its pole is undetermined.
     if freedom < 1 or not np.diag(curvature).all() or _condition(curvature) > _WORST_CONDITION:
         return None
     squares = lines.squares(left)
     chi_square = float(np.sum(squares)) / freedom
     alone = np.diag(np.linalg.inv(curvature))
     hidden = lines.modes(_poles_between(poles))
-    # Lines that two overlapping modes describe may also be of three, whose dampings differ by far more.
+    # Three modes with very different damping may also fit two overlapping peaks, so allow for a third.
     columns = np.hstack((follows, lines.independent(hidden)))
     curvature = np.asarray(columns.T @ columns)
     if _condition(curvature) > _WORST_CONDITION:
@@ -416,8 +416,8 @@ def modal_fit(
         share = freedom / left.size
         beside = 2 * float(np.count_nonzero(about)) * share
         nearby = float(np.sum(squares[about])) / beside
-        # Errors by ringing also correlate with the conjugates of others, which at most doubles the variance
-        # of a fitted value.
+        # Errors by ringing also correlate with conjugates of other errors, which at most doubles the
+        # variance of a fitted value.
         widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
@@ -450,7 +450,7 @@ def modal_fit(
 
 
 def _poles_between(poles: Reals) -> Reals:
-    """Return the poles half way between two modes that overlap; three that overlap are taken to be all."""
+    """Return poles half way between pairs of overlapping modes; none within groups of three or more."""
     modes = poles.reshape(-1, 2)
     modes = modes[np.argsort(modes[:, 0])]
     mean_bandwidth = np.exp(modes[:-1, 1]) + np.exp(modes[1:, 1])
@@ -460,7 +460,7 @@ def _poles_between(poles: Reals) -> Reals:
 
 
 def _condition(curvature: Reals) -> float:
-    """Return the condition of a matrix scaled to ones on the diagonal, which does not depend on units."""
+    """Return the condition number of a matrix scaled to a unit diagonal, so that units have no effect."""
     size = np.sqrt(np.diag(curvature))
     return float(np.linalg.cond(curvature / np.outer(size, size)))
 

@@ -28,21 +28,21 @@ from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
 Estimated = tuple[FrequencyResponse, Callable[[], "NoiseResponse"]]
-"""The transmission, and a function that finds the rest, such as resonances, which takes longer."""
+"""The transmission, and a slower function that returns all results, such as resonances."""
 _BLOCK = 1 << 19
 """Samples per block."""
 _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Standard deviations of a mean difference between estimators that counts as bias."""
+"""Least mean difference of two estimators that counts as bias, in standard deviations."""
 _ALIKE_LINES = 4
-"""Variance factor for correlated lines under a window and a median instead of a mean."""
+"""Factor of the variance of a median over lines that a window correlates, relative to an ideal mean."""
 
 
 @dataclass(frozen=True)
 class NoiseResponse(Labelled):
-    """Transmission from base displacement to m0's displacement, with the findings."""
+    """Transmission from base displacement to m0's displacement, with resonances and data quality."""
 
     OWN_UNITS: ClassVar = {"frequency_response": "1", "h1": "1", "h2": "1", "periodic": "s"}
     DOCUMENT: ClassVar = (
@@ -60,11 +60,11 @@ class NoiseResponse(Labelled):
     bias: str
     """Remark on an estimator with bias by noise; otherwise empty."""
     periodic: PeriodicFrequencyResponse | None
-    """Sources of the scatter; None for noise that does not repeat."""
+    """Result with the sources of scatter; None for noise that does not repeat."""
     used_s: float
     """Averaged time [s]."""
     left_out: int
-    """Number of incomplete realisations or segments, or with lost or overloaded samples."""
+    """Number of realisations or segments that are incomplete or have lost or overloaded samples."""
     lost_samples: int
     """Lost samples during the noise."""
     overloaded_samples: int
@@ -93,8 +93,8 @@ def repeated_response(
     channels, noise, request
         Record, excitation and request.
     repetitions
-        Repetition of every realisation, if known from the same drive; measured by default. Draws pass it,
-        and then the scatter of resonances among realisations is not computed.
+        Repetition of every realisation, if known from the same drive; measured by default. If given, as
+        for simulated draws, the scatter of resonances among realisations is not computed.
     """
     if request.cuts_segments:
         raise InvalidRequest(
@@ -167,7 +167,7 @@ def repeated_response(
 
 @dataclass
 class _Unusable:
-    """Number of unusable samples."""
+    """Counters of unusable samples."""
 
     lost: int = 0
     overloaded: int = 0
@@ -205,7 +205,7 @@ def _least_squares(
     delay_s: float,
     noise_ratio: float | None,
 ) -> FrequencyResponse:
-    """h1, h2 or hv over realisations; ``motion`` has the shape (realisations, 2, lines)."""
+    """Estimate h1, h2 or hv from realisations; ``motion`` has the shape (realisations, 2, lines)."""
     s_xx = np.sum(np.abs(motion[:, 0]) ** 2, axis=0)
     s_yy = np.sum(np.abs(motion[:, 1]) ** 2, axis=0)
     s_xy = np.sum(np.conj(motion[:, 0]) * motion[:, 1], axis=0)
@@ -256,7 +256,7 @@ def streamed_response(
         valid = bad.valid(data, channels.overloaded(first, last))
         if not valid.all():
             data = np.where(valid, data, 0.0)
-        # Here the order of drive, base and response differs.
+        # The sums expect base, response and reference (the drive), in this order.
         sums.add(data[[1, 2, 0]], valid)
         level.add(data[1], valid)
     band = (noise.band_start_hz, noise.band_stop_hz)
@@ -330,7 +330,7 @@ class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
     DOCUMENT: ClassVar = "resonances=response.resonances transmission distortion *response"
 
     request: FrequencyResponseRequest
-    """The request."""
+    """Request that produced this analysis."""
 
     @property
     def transmission(self) -> dict[str, Any]:

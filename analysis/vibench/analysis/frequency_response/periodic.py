@@ -24,12 +24,12 @@ from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Share of a period that may be missing at the end, more than clocks differ; periodicity fills it in."""
+"""Share of a period that may be missing at the end of a record; it is continued periodically."""
 _WEAKEST_LINE = 1e-3
-"""A line counts as driven within 60 dB of the strongest, above quantisation."""
+"""Least amplitude of a driven line relative to the strongest: 60 dB below it, above quantisation."""
 _ITERATIONS = 8
 _CONVERGED = 1e-9
-"""Relative change of the period at which iteration stops; the rest is less than a tenth of that."""
+"""Relative change of the period at which iteration stops; the remaining error is below a tenth of it."""
 _LARGEST_OFFSET = 200e-6
 """Largest relative clock offset, for two oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
@@ -43,7 +43,7 @@ class Repetition:
     period_samples: float
     """Converter samples per period; may be fractional."""
     sd_samples: float
-    """Its standard deviation by noise of the drive channel."""
+    """Standard deviation of the period by noise of the drive channel."""
     periods: int
     """Whole periods in the record."""
 
@@ -138,7 +138,7 @@ def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
 
 
 _OVER_CHANCE = 8.0
-"""Least ratio of common scatter of the lines to its chance value for a drift."""
+"""Least ratio of the scatter that a drift explains to the amount expected by chance."""
 _MOST = 0.5
 """Least share of the scatter beyond noise that a drift explains."""
 
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest deviation of a line used to find a drift; near narrow modes it is larger."""
 _OFTEN = 3.0
-"""The same, over the median line, where most lines deviate by more."""
+"""Largest deviation relative to that of the median line, where this allows more than `_SMALL`."""
 
 
 class Scatter(StrEnum):
@@ -169,8 +169,8 @@ class Drift:
     frequency_share: float
     """Relative standard deviation of all frequencies among realisations."""
     common_share: float
-    """Other changes that all lines follow together, as damping or a delay; median relative standard deviation
-    of the lines."""
+    """Other changes common to all lines, such as of damping or a delay: median over the lines of the relative
+    standard deviation."""
 
     @property
     def text(self) -> str:
@@ -193,7 +193,7 @@ class BestLinearApproximation:
     relative_sd: Reals
     """Standard deviation of ln(magnitude), equal to that of the phase [rad]."""
     steady_relative_sd: Reals
-    """The same, smoothed over neighbouring lines."""
+    """`relative_sd` smoothed over neighbouring lines."""
     noise_variance: Reals
     """Complex variance of one realisation by noise."""
     distortion_variance: Reals | None
@@ -293,7 +293,7 @@ def _without_drift(
         Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
     """
     count = len(off)
-    # The ratio of displacements shifts with the modes; velocity over acceleration also has 1 / frequency.
+    # A change of all frequencies stretches the ratio of displacements; the value has a further 1 / frequency.
     moved = value * frequency_hz
     stretch = frequency_hz * _slope(moved, frequency_hz) / moved
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
@@ -321,13 +321,13 @@ def _without_drift(
 
 
 _TOGETHER = 0.8
-"""Least share of the scatter in courses that all lines follow."""
+"""Least share of the scatter that common courses of all lines must explain."""
 _BEYOND_CHANCE = 1.25
-"""The same over its largest expected value for independent lines."""
+"""Least ratio of that share to its largest expected value for independent lines."""
 
 
 def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
-    """Remove what all lines follow in one or two courses over the realisations; return its share too.
+    """Remove the one or two courses over realisations that all lines share; return the rest and their share.
 
     Singular values of independent lines have a known largest size (Marchenko and Pastur, Math. USSR-Sbornik 1
     (1967) 457).
@@ -356,14 +356,14 @@ def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
 
 
 def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
-    """Return the slope at each line, from a local quotient of two straight lines, as of one mode."""
+    """Return the slope at each line, from a local quotient of two straight lines, which fits one mode."""
     if value.size == 1:
         return np.zeros_like(value)
     slope = np.gradient(value, frequency_hz)
     steps = np.diff(value) / np.diff(frequency_hz)
     across = (value[2:] - value[:-2]) / (frequency_hz[2:] - frequency_hz[:-2])
     product = steps[1:] * steps[:-1]
-    # Too large at a smooth extremum and with a mode between three lines.
+    # Elsewhere, at smooth extrema and modes narrower than three lines, this slope would be too large.
     is_mode = np.abs(product) < np.abs(across) ** 2
     slope[1:-1][is_mode] = product[is_mode] / across[is_mode]
     return np.asarray(slope)
@@ -381,7 +381,7 @@ class DetectionLines:
     response_amplitude: Reals
     """Rms over realisations of the response's amplitude [unit of the response]."""
     noise_amplitude: Reals
-    """Its part by noise (standard deviation of the mean over periods)."""
+    """Part of the amplitude by noise (standard deviation of the mean over periods)."""
 
 
 @dataclass(frozen=True)
@@ -399,7 +399,7 @@ class PeriodicFrequencyResponse(Labelled):
     noise_variance: Reals
     """Complex variance of one realisation by noise [(unit of the value)^2]."""
     distortion_variance: Reals | None
-    """Complex variance beyond it and the drift; None for a single realisation."""
+    """Complex variance beyond noise and drift; None for a single realisation."""
     drift: Drift | None
     scatter: Scatter
     realisations: int
@@ -421,7 +421,7 @@ class _Realisation:
 
 
 class PeriodicSums:
-    """Mean spectra of realisations that arrive one by one.
+    """Mean spectra of realisations, which are added one by one.
 
     Parameters
     ----------

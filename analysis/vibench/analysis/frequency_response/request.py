@@ -54,7 +54,7 @@ class FrequencyResponseView:
 
     @property
     def symbol(self) -> str:
-        """``"|x / U|"``, for captions and axes."""
+        """Symbol for captions and axes, such as ``"|x / U|"``."""
         return f"|{_SYMBOLS[self.response]} / {_BASE_SYMBOLS[self.base]}|"
 
     def label(self, mass: str = "m0") -> str:
@@ -116,7 +116,7 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
 _SEGMENT_S = 4.0
 """Default segment of streamed noise [s]: lines 0.25 Hz apart resolve a bandwidth of 1 Hz."""
 _LEAST_SEGMENTS = 8
-"""Default minimum of averages: a short record gets shorter segments instead."""
+"""Least number of segments by default; a short record gets shorter segments."""
 _PROXY_SAMPLES = 4096
 """Window length for computing overlap correlations, which do not depend on it."""
 

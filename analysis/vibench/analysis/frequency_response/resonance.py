@@ -24,7 +24,7 @@ from .results import FrequencyResponse
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within this many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
-"""Eight lines are sixteen real values, for two pole and at most ten linear parameters."""
+"""Least number of lines of a fit: sixteen real values for two pole and at most ten linear parameters."""
 _LEAST_RISE = 3.0
 """Least height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3
@@ -32,18 +32,18 @@ _MOST_MODES = 3
 _APART = (0.5, 1.5)
 """Initial spacing of poles side by side, in half widths."""
 _LEAST_GAIN = 25.0
-"""Least reduction of chi square by one more mode; for its four parameters chance gives 19 once in a
-thousand."""
+"""Least reduction of chi square by one more mode with four parameters; by chance it exceeds 19 once in a
+thousand cases."""
 _REACH_DAMPING = 4.0
-"""Largest change of the logarithm."""
+"""Largest change of ln(damping ratio) in a fit."""
 _USUAL_HZ = 300.0
-"""Scales the background."""
+"""Reference frequency that scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
-"""Accept an unresolved peak only if line or damping is known to 10 %: else it is a ripple on a broad one."""
+"""Accept an unresolved peak only if line or damping is known to 10 %; otherwise it may be a ripple."""
 _BACKGROUND_DEGREES = (1, 2, 3)
-"""Degrees tried in turn: near broad peaks, neighbours do not lie on a straight line."""
+"""Degrees of the background, tried in turn; near broad peaks a straight line is not enough."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
-"""Relative uncertainty of damping above which a peak is a ripple of noisy lines and no resonance."""
+"""Relative uncertainty of damping above which a peak counts as noise, not as a resonance."""
 
 
 def resonances(
@@ -89,7 +89,7 @@ def scattered_resonances(
     found
         Resonances from all realisations.
     without
-        The same without each of them.
+        Resonances without each of the realisations in turn.
     """
     widened = []
     for each in found:
@@ -131,7 +131,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
     size = _smooth(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
-    # A smaller rise of ln(magnitude) is noise at any line.
+    # Require a rise of ln(magnitude) that noise does not explain.
     lines, about = scipy.signal.find_peaks(size, prominence=0.0)
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
@@ -160,7 +160,7 @@ def _half_power_lines(size: Reals, line: int) -> int:
 
 
 def _fit_peak(band: FrequencyResponse, line: int, half_width: int, most: int) -> tuple[Resonance, ...]:
-    """Fit the lines about a peak with one mode, or with as many as explain them, up to a number."""
+    """Fit the lines about a peak with the fewest modes that explain them, at most ``most``."""
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
     chosen = np.zeros(band.frequency_hz.size, dtype=np.bool_)
     chosen[max(0, line - reach) : line + reach + 1] = True
@@ -199,7 +199,7 @@ def _powers(centre_hz: float, degree: int) -> Background:
 
 
 def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
-    """Return starts of several poles for one: side by side, at several spacings, each narrower."""
+    """Yield starting values that split one pole into several narrower ones, at several spacings."""
     ((log_frequency, log_damping),) = poles
     if modes == 1:
         yield poles.ravel()
@@ -260,7 +260,7 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        # One pole for two modes may end beside both, so split it also at its start.
+        # One pole fitted to two modes may end far from both, so also split the pole at its start.
         split = (_split_poles(each[worst : worst + 1], 2) for each in (poles, starts[0]))
         starts = [np.vstack((rest, two.reshape(2, 2))) for two in chain.from_iterable(split)]
     return best
@@ -281,7 +281,7 @@ def _determined_modes(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
 
 
 def _poles(found: Sequence[Resonance]) -> Reals:
-    """Logarithms of natural frequency and damping ratio, shape (modes, 2)."""
+    """Return the logarithms of natural frequency and damping ratio, shape (modes, 2)."""
     return np.log([[each.frequency_hz, each.damping_ratio] for each in found])
 
 
@@ -307,5 +307,5 @@ def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
 
 
 def _doubt(found: Resonance) -> tuple[bool, float]:
-    """Rank fits that explain their lines first, and these by the relative uncertainty of their damping."""
+    """Return a sort key: fits that explain their lines first, then by relative uncertainty of damping."""
     return not found.is_explained, found.sd_damping_ratio / found.damping_ratio

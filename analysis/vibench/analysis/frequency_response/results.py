@@ -74,7 +74,7 @@ class FrequencyResponse(Labelled):
     half_width: Reals
     """Relative half width of the bounds."""
     coherence_significance: float
-    """Coherence that independent noises stay below with probability ``settings.confidence``."""
+    """Coherence below which independent noises stay with probability ``settings.confidence``."""
     resolution_hz: float
     """Noise bandwidth of a line, which smears finer features; zero for exactly periodic drive."""
     segments_used: int
@@ -89,7 +89,7 @@ class FrequencyResponse(Labelled):
 
     @property
     def magnitude(self) -> Reals:
-        """|response / drive|."""
+        """Magnitude, |response / drive|."""
         return np.abs(self.value)
 
     @property
@@ -127,8 +127,8 @@ class FrequencyResponse(Labelled):
     def is_significant(self) -> Flags:
         """Lines with significant coherence and valid bounds.
 
-        If the drive explains less than a tenth of the response, linear bounds cover in only 3 to 75 % of
-        cases, even with significant coherence.
+        If the drive explains less than a tenth of the response, linear bounds contain the true value in only
+        3 to 75 % of cases, even with significant coherence.
         """
         decisive = self.coherence if self.reference_coherence is None else self.reference_coherence
         return np.asarray(decisive > max(self.coherence_significance, LEAST_COHERENCE))

@@ -13,11 +13,11 @@ from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 
 _ENOUGH_FREEDOM = 24.0
-"""Degrees of freedom at which a line's variance is known to a third."""
+"""Degrees of freedom at which the variance of a line is accurate to a third."""
 _FREEDOM = 96.0
-"""Number of neighbouring lines for estimating the noises, since a small one shows in some lines only."""
+"""Degrees of freedom, summed over neighbouring lines, for estimating the noise levels."""
 _FEWEST_FREEDOM = 4.0
-"""Fewest degrees of freedom of all lines together for which neighbours help."""
+"""Total degrees of freedom of the lines above which smoothing over neighbours helps."""
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
@@ -27,10 +27,10 @@ _FAINT = 1e-12
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
     """Return the standard deviation of ln(magnitude) for weighting lines in a fit.
 
-    From two realisations it can be 100 times too small, so that a few lines would dominate a fit. Smooth
-    over neighbouring lines are instead the noises of both sensors and of the base: y - H x has the variance
-    a + b |H|^2 + c |dH|^2, with dH from line to line for leakage. Their sizes are found by maximum
-    likelihood of chi-square distributed variances.
+    From two realisations, the estimate of one line can be 100 times too small, so that a few lines would
+    dominate a fit. Instead, the noise levels are taken as smooth over neighbouring lines: y - H x has the
+    variance a + b |H|^2 + c |dH|^2 from both sensors and, with the step dH between lines, leakage. The
+    levels a, b and c have maximum likelihood for chi-square distributed variances.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
     freedom
         Degrees of freedom of each line's own variance.
     """
-    # Averages with nearly full overlap count as hardly more than one.
+    # With nearly full overlap, the number of independent averages may approach one.
     freedom = max(freedom, 1.0)
     lines = min(ceil(_FREEDOM / freedom), value.size)
     if freedom >= _ENOUGH_FREEDOM or lines * freedom <= _FEWEST_FREEDOM:
@@ -61,7 +61,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
     sizes = _sizes(np.where(known, variance, 0.0)[around], shapes[:, around])
     places, middles = np.arange(value.size), firsts + (lines - 1) / 2
     smooth = sum(np.interp(places, middles, size) * shape for size, shape in zip(sizes, shapes, strict=True))
-    # A square over a variance of n degrees of freedom is n / (n - 2) on average, Student's.
+    # Student's t: a squared deviation over a variance with n degrees of freedom averages n / (n - 2).
     wider = lines * freedom / (lines * freedom - 2)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(known, np.sqrt(wider * smooth / (gain * power)), np.nan)
@@ -95,31 +95,31 @@ def estimator_by_name(estimator: Estimator | str) -> Estimator:
 
 
 def coherence(s_xx: Reals, s_yy: Reals, s_xy: Complexes) -> Reals:
-    """|S_xy|^2 / (S_xx S_yy); 0 for a dead channel."""
+    """Return the coherence |S_xy|^2 / (S_xx S_yy); 0 for a dead channel."""
     power = s_xx * s_yy
     ratio = np.divide(np.abs(s_xy) ** 2, power, out=np.zeros_like(power), where=power > 0)
     return np.asarray(np.clip(ratio, 0.0, 1.0))
 
 
 def h1(s_xx: Reals, s_xy: Complexes) -> Complexes:
-    """S_xy / S_xx."""
+    """Return the estimate h1, S_xy / S_xx."""
     return _ratio(s_xy, s_xx.astype(np.complex128))
 
 
 def h2(s_yy: Reals, s_xy: Complexes) -> Complexes:
-    """S_yy / conj(S_xy)."""
+    """Return the estimate h2, S_yy / conj(S_xy)."""
     return _ratio(s_yy.astype(np.complex128), np.conj(s_xy))
 
 
 def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complexes:
-    """Total least squares with r = S_nn / S_mm, response noise over drive noise, in the channels' units.
+    """Return the total least squares estimate for r = S_nn / S_mm, response noise over drive noise.
 
     [S_yy - r S_xx + sqrt((S_yy - r S_xx)^2 + 4 r |S_xy|^2)] / (2 conj(S_xy)); r to infinity is h1, r = 0
-    is h2. Without r the answer would depend on the units of the channels.
+    is h2. r is in the units of the channels; without it, the result would depend on these units.
     """
     difference = s_yy - noise_ratio * s_xx
     root = np.sqrt(difference**2 + 4 * noise_ratio * np.abs(s_xy) ** 2)
-    # For a negative difference the sum cancels; the conjugate form does not.
+    # For a negative difference the sum loses digits by cancellation; the conjugate form does not.
     stable = np.divide(
         4 * noise_ratio * np.abs(s_xy) ** 2,
         root - difference,
@@ -187,7 +187,7 @@ _ROWS = ("drive", "response", "reference")
 
 
 class FrequencyResponseSums:
-    """Transmission of a long record that arrives in blocks, in constant memory.
+    """Sums for the transmission of a long record that arrives in blocks, in constant memory.
 
     Blocks have the rows drive, response and, for the
     drive-referenced estimator, reference.
