@@ -90,7 +90,7 @@ class CollisionNumbers:
 
     @property
     def gap_fields(self) -> tuple[str, ...]:
-        """Sentences on the gaps."""
+        """Names of the determined gaps."""
         return tuple(each.what.value for each in self.determined if each.what in (*_SIDES, Hidden.MEAN_GAP))
 
     @property

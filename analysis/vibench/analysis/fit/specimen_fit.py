@@ -92,7 +92,7 @@ def fit_specimen(
 
     Parameters
     ----------
-    transmission
+    frequency_response
         Displacement over displacement, delays removed.
     nominal
         Start of the search, and values of everything that is not free.
