@@ -100,8 +100,8 @@ def read_entry(where: str, path: Path, size_bytes: int) -> CatalogueEntry:
 
 
 def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
-    said = recording.plan.get("excitation")
-    excitation = said if isinstance(said, dict) else {}
+    value = recording.plan.get("excitation")
+    excitation = value if isinstance(value, dict) else {}
     low_hz, high_hz = _band(excitation)
     seal = recording.check_seal(SealDepth.QUICK)
     is_damaged = seal.state is SealState.DAMAGED

@@ -161,8 +161,8 @@ class CampaignRunner:
         )
         this = next(each for each in done if each.name == point.name)
         with open_recording(point_result.path) as recording:
-            asked = tuple(self._after(Finished(this, done), recording))
-        further = tuple(Point(name, each) for each in asked for name in _names(each))
+            follow_ups = tuple(self._after(Finished(this, done), recording))
+        further = tuple(Point(name, each) for each in follow_ups for name in _names(each))
         self._journal.follow_up(point.name, further)
         if not further:
             return

@@ -100,9 +100,9 @@ def bench(rig: Rig) -> Iterator[Bench]:
 @contextmanager
 def refused() -> Iterator[None]:
     """Require an AcquisitionError other than BrokenPromise."""
-    with pytest.raises(AcquisitionError) as told:
+    with pytest.raises(AcquisitionError) as error:
         yield
-    assert not isinstance(told.value, BrokenPromise), str(told.value)
+    assert not isinstance(error.value, BrokenPromise), str(error.value)
 
 
 def heard_v(bench: Bench, duration_s: float) -> Samples:

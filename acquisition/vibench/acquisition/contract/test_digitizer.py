@@ -16,8 +16,8 @@ def test_it_says_who_it_is_what_it_reads_and_how_fast(bench: Bench) -> None:
     assert digitizer.identity.reply
     assert digitizer.identity == digitizer.identity
     assert digitizer.roles == tuple(channel.role.value for channel in bench.rig.daq.channels)
-    asked_hz = bench.rig.daq.sample_rate_hz
-    assert asked_hz * (1 - 1e-6) <= digitizer.sample_rate_hz <= 2 * asked_hz
+    requested_hz = bench.rig.daq.sample_rate_hz
+    assert requested_hz * (1 - 1e-6) <= digitizer.sample_rate_hz <= 2 * requested_hz
 
 
 def test_blocks_follow_each_other_from_sample_zero(bench: Bench) -> None:

@@ -109,7 +109,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
         # The tracked order may be a hundredth of the whole motion, which would seem settled too early.
-        loop.judged_order = plan.harmonic
+        loop.settling_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
     for number in range(len(plan.accelerations_m_per_s2)):
@@ -333,8 +333,8 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
     lock = tracked.lock
     if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
         lock = LockResult.LOST
-    is_told = lock is LockResult.LOCKED
-    resonance, mode = (tracked.resonance, tracked.mode) if is_told else (None, None)
+    is_locked = lock is LockResult.LOCKED
+    resonance, mode = (tracked.resonance, tracked.mode) if is_locked else (None, None)
     base_m = found.base.amplitude / (2 * pi * found.drive_hz) ** 2
     loop.note(
         ResonanceNote(

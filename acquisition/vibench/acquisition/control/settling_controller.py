@@ -220,7 +220,7 @@ class SettlingController:
         measured = self.measured()
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
         level = self.level
-        if self.loop.judged_order is not None:
+        if self.loop.settling_order is not None:
             # The phase of one order depends on the level, so all compared periods need the same level.
             level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
         control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
@@ -235,7 +235,7 @@ class SettlingController:
         loop, periods = self.loop, self.loop.periods
         # A slow motion has only just settled, so only its newest periods count.
         newest = periods.last(
-            max(self.rule.periods, periods.count // 2) if loop.judged_order is None else self.rule.periods
+            max(self.rule.periods, periods.count // 2) if loop.settling_order is None else self.rule.periods
         )
         measured = measured_level(newest.base)
         return SettledState(
@@ -256,7 +256,7 @@ class SettlingController:
         )
 
     def _judgement(self, points: Phasors) -> Judgement:
-        order, noise = self.loop.judged_order, self.loop.noise
+        order, noise = self.loop.settling_order, self.loop.noise
         found = judgement_of(points if order is None else points[:, order : order + 1], self.rule, noise)
         newest = points[-self.rule.periods :]
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found

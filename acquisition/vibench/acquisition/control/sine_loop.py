@@ -115,7 +115,7 @@ class SineLoop:
         """Largest setting of the plan [V]."""
         self.drives = 1
         """Drive periods in one period of the motion; set before anything is played."""
-        self.judged_order: int | None = None
+        self.settling_order: int | None = None
         """Order of the response that alone decides whether the motion has settled; set before anything is
         played."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)

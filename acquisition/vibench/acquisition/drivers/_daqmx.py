@@ -297,10 +297,10 @@ class DaqmxDigitizer:
         ):
             self._is_running = False  # until the block is complete
             volts, counts = self._next_samples(samples)
-            told = self._overloaded_roles()
+            overloaded_roles = self._overloaded_roles()
             self._is_running = True
         self._next_sample += samples
-        return Block(first_sample, volts, self._overloads(volts, first_sample, told), counts)
+        return Block(first_sample, volts, self._overloads(volts, first_sample, overloaded_roles), counts)
 
     @property
     def waiting_samples(self) -> int:
@@ -412,10 +412,12 @@ class DaqmxDigitizer:
             self._tells_overloads = False
             return frozenset()
 
-    def _overloads(self, volts: Samples, first_sample: int, told: frozenset[str]) -> tuple[Overload, ...]:
+    def _overloads(
+        self, volts: Samples, first_sample: int, overloaded_roles: frozenset[str]
+    ) -> tuple[Overload, ...]:
         scales_v = tuple(channel.full_scale_v for channel in self._channels)
         seen = overload_ranges(volts, self.roles, scales_v, first_sample)
-        unseen = told - {overload.channel for overload in seen}
+        unseen = overloaded_roles - {overload.channel for overload in seen}
         # A clip too short to show in the samples: only its block is known.
         last_sample = first_sample + volts.shape[1] - 1
         return (*seen, *(Overload(role, first_sample, last_sample) for role in sorted(unseen)))

@@ -138,12 +138,12 @@ def daqmx_call(doing: str) -> Iterator[None]:
 
 def from_code(error: DaqError, doing: str) -> AcquisitionError:
     """Return our error for a DAQmx error; one that is not in the table keeps its text."""
-    said = " ".join(str(error).split())
+    text = " ".join(str(error).split())
     meaning = MEANINGS.get(error.error_type)
     if meaning is None:
-        return InstrumentError(f"{doing} failed: {said}. Look the number up in the NI-DAQmx help")
+        return InstrumentError(f"{doing} failed: {text}. Look the number up in the NI-DAQmx help")
     name = f"{error.error_type.name}, {error.error_code}"
-    return meaning.kind(f"{doing} failed: {meaning.happened} ({name}: {said}). To do: {meaning.advice}")
+    return meaning.kind(f"{doing} failed: {meaning.happened} ({name}: {text}). To do: {meaning.advice}")
 
 
 def _from_server(error: RpcError, doing: str) -> InstrumentError:

@@ -48,13 +48,13 @@ class FilePlayer:
         channels = channels_of(rig)
         missing = [each.role.value for each in channels if each.role.value not in recording.roles]
         scales = {each.role.value: each.units_per_volt for each in channels if not missing}
-        rate_hz, asked_hz = recording.sample_rate_hz, rig.daq.sample_rate_hz
-        if missing or abs(rate_hz - asked_hz) > _SAME_RATE * rate_hz:
+        rate_hz, requested_hz = recording.sample_rate_hz, rig.daq.sample_rate_hz
+        if missing or abs(rate_hz - requested_hz) > _SAME_RATE * rate_hz:
             recording.close()
             raise ConfigurationError(
                 f"{path} has {', '.join(recording.roles)} at {rate_hz:.12g} samples a second; the "
                 f"configuration asks for {', '.join(each.role.value for each in channels)} at "
-                f"{asked_hz:.12g}. Make them agree"
+                f"{requested_hz:.12g}. Make them agree"
             )
         for role, units_per_volt in scales.items():
             made_with = recording.channel(role).physical_per_volt
@@ -122,12 +122,12 @@ class FilePlayer:
                 "a hole cannot be played back"
             )
         self._next_sample = last
-        told = tuple(
+        overloads = tuple(
             Overload(each.channel, max(each.first_sample, first), min(each.last_sample, last - 1))
             for each in self._recording.overloads
             if each.channel in self.roles and each.first_sample < last and each.last_sample >= first
         )
-        return Block(first, volts, told)
+        return Block(first, volts, overloads)
 
     @property
     def waiting_samples(self) -> int:

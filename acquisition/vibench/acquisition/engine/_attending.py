@@ -73,11 +73,11 @@ class _Program:
 
 def main() -> None:
     """Send heartbeats until the engine or the program has ended."""
-    told = json.loads(sys.stdin.buffer.readline())
+    message = json.loads(sys.stdin.buffer.readline())
     program, clock = _Program(), Event()
-    with suppress(OSError), socket.create_connection(told["address"]) as connection:
+    with suppress(OSError), socket.create_connection(message["address"]) as connection:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        _exchange(connection, told["hello"])
+        _exchange(connection, message["hello"])
         while True:
             if not program.is_stopped:
                 _exchange(connection, json.dumps({"ask": "beat", "still_s": program.still_s()}))

@@ -62,8 +62,8 @@ def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str]
 
     Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """
-    told = Announcement.model_validate({**facts_of_this_process(what), "address": address})
-    with announce_program(press, told):
+    announcement = Announcement.model_validate({**facts_of_this_process(what), "address": address})
+    with announce_program(press, announcement):
         yield
 
 
@@ -73,11 +73,11 @@ def announced_engines() -> tuple[Announcement, ...]:
     One that refuses connections is left out; `programs_without_engine` returns it if its process lives.
     """
     found = []
-    for told in announced_programs(Announcement):
-        if not _refuses(told.address):
-            found.append(told)
-        elif not told.process_start:
-            withdraw(told)
+    for announcement in announced_programs(Announcement):
+        if not _refuses(announcement.address):
+            found.append(announcement)
+        elif not announcement.process_start:
+            withdraw(announcement)
     return tuple(found)
 
 
@@ -301,7 +301,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
             return verb.answer.read(*exchange(self._connection, request, verb.work_s))
 
 
-TOLD_EVERY_S = 0.02
+BEAT_EVERY_S = 0.02
 """Shortest interval between signs of life [s]."""
 AGAIN_S = 1.0
 """An attendant that ended before its program is replaced at most once in this time [s]."""
@@ -318,9 +318,9 @@ class Attendant:
 
     def __init__(self, address: EngineAddress) -> None:
         hello = Hello(token=address.token, role=ConnectionRole.ATTENDING)
-        told = {"address": [address.host, address.port], "hello": hello.model_dump_json()}
-        self._first = json.dumps(told).encode() + b"\n"
-        self._told_s = 0.0
+        message = {"address": [address.host, address.port], "hello": hello.model_dump_json()}
+        self._first = json.dumps(message).encode() + b"\n"
+        self._beat_s = 0.0
         self._begin()
 
     @property
@@ -331,9 +331,9 @@ class Attendant:
     def live(self) -> None:
         """Note a sign of life of the program; takes microseconds and never waits."""
         now_s = monotonic()
-        if now_s - self._told_s < TOLD_EVERY_S:
+        if now_s - self._beat_s < BEAT_EVERY_S:
             return
-        self._told_s = now_s
+        self._beat_s = now_s
         try:
             os.write(self._pipe.fileno(), b".")
         except BlockingIOError:  # the pipe is full, because the attendant does not read it
@@ -345,7 +345,7 @@ class Attendant:
 
     def close(self) -> None:
         """Stop attending. Legal at any time."""
-        self._told_s = inf  # `live` sends nothing from now on
+        self._beat_s = inf  # `live` sends nothing from now on
         self._end()
 
     def _end(self) -> None:

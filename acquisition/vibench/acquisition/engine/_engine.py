@@ -244,8 +244,8 @@ def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
         result: sum(point_result.outcome is result for point_result in point_results)
         for result in PointOutcome
     }
-    told = ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)
-    return f"Campaign ended: {told or 'stopped before its first point'}"
+    text = ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)
+    return f"Campaign ended: {text or 'stopped before its first point'}"
 
 
 Job = Callable[[], object]

@@ -249,13 +249,13 @@ class PublishedState:
         )
         self._look_at_disk()
 
-    def twin(self, told: TwinStatus | None) -> None:
+    def twin(self, status: TwinStatus | None) -> None:
         """Set the live twin's report; None without a twin."""
         buffer = self.sample_buffer
-        if told is not None and told.run_id == buffer.run_id and self._status.bench is not None:
-            late = max(0, buffer.samples - told.end_sample)
-            told = told.model_copy(update={"behind_s": late / self._status.bench.sample_rate_hz})
-        self._put(twin=told)
+        if status is not None and status.run_id == buffer.run_id and self._status.bench is not None:
+            late = max(0, buffer.samples - status.end_sample)
+            status = status.model_copy(update={"behind_s": late / self._status.bench.sample_rate_hz})
+        self._put(twin=status)
 
     def note_pause(self, rest_s: float, text: str) -> None:
         """Set the pause between two recordings."""
@@ -283,8 +283,8 @@ class PublishedState:
         self._row(progress.name, "running", "", str(progress.path))
 
     def _row(self, name: str, state: str, reason: str, file: str) -> None:
-        told = RowStatus(name=name, state=state, reason=reason, file=file)
-        self._put_rows(tuple(told if row.name == name else row for row in self._status.rows))
+        status = RowStatus(name=name, state=state, reason=reason, file=file)
+        self._put_rows(tuple(status if row.name == name else row for row in self._status.rows))
 
     def _run_status(self, progress: CampaignProgress) -> RunStatus:
         run = progress.run

@@ -210,7 +210,7 @@ REQUEST_S = 10.0
 class _Viewer:
     connection: socket.socket
     role: ConnectionRole
-    asked_s: float
+    request_s: float
 
 
 class Server:
@@ -254,7 +254,7 @@ class Server:
         with self._coming_and_going:
             viewers = sorted(
                 self._viewers.values(),
-                key=lambda each: (each.role is ConnectionRole.ATTENDING, each.asked_s),
+                key=lambda each: (each.role is ConnectionRole.ATTENDING, each.request_s),
             )
         if viewers:
             # A shutdown wakes the viewer's thread from any wait; closing alone would not.
@@ -281,7 +281,7 @@ class Server:
             self._leave(viewer)
 
     def _note(self, viewer: _Viewer) -> None:
-        viewer.asked_s = monotonic()
+        viewer.request_s = monotonic()
         if viewer.role is ConnectionRole.ATTENDING:
             self._handler.note_presence()
 

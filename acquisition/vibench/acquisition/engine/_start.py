@@ -54,10 +54,10 @@ class AdoptedEngine(ClosedOnLeaving):
 
 def left_alone() -> Announcement | None:
     """Return an engine that carries out a campaign and was left alone by its parent program."""
-    for told in announced_engines():
-        with suppress(EngineGone), EngineClient.attach(told.address) as client:
+    for announcement in announced_engines():
+        with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
             if client.status().is_left_alone:
-                return told
+                return announcement
     return None
 
 

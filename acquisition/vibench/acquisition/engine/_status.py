@@ -300,5 +300,5 @@ class TwinProcess:
             return None
         self._process = None
         with process:
-            said = "" if process.stderr is None else process.stderr.read().strip()
-        return said.splitlines()[-1] if said else f"code {process.returncode}"
+            text = "" if process.stderr is None else process.stderr.read().strip()
+        return text.splitlines()[-1] if text else f"code {process.returncode}"

@@ -146,7 +146,7 @@ def _request(word: str, call: Callable[..., object]) -> type[FrozenModel]:
 
 def _model(kind: type[Model]) -> Answer[Model]:
     return Answer(
-        lambda told: Message(told.model_dump_json().encode()), lambda facts, _: kind.model_validate(facts)
+        lambda value: Message(value.model_dump_json().encode()), lambda facts, _: kind.model_validate(facts)
     )
 
 

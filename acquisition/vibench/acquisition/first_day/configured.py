@@ -111,8 +111,8 @@ def questions_for(text: str) -> tuple[Question, ...]:
             (f"sensors.{role}.calibrated", "The date on that certificate (YYYY-MM-DD)?"),
         )
     ]
-    asked = (*QUESTIONS[:-1], *others, QUESTIONS[-1])
-    return tuple(each for each in asked if _table(text, each.key)[1])
+    questions = (*QUESTIONS[:-1], *others, QUESTIONS[-1])
+    return tuple(each for each in questions if _table(text, each.key)[1])
 
 
 _KEY = r"^(?P<key>{key}[ \t]*=[ \t]*)(?P<value>{value})(?P<comment>[ \t]*(?:#.*)?)$"

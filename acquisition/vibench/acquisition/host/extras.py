@@ -51,7 +51,7 @@ def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[st
     returned raises MissingLibrary when a library of the extra is not installed.
     """
 
-    def told(name: str) -> object:
+    def attribute(name: str) -> object:
         try:
             return found(name)
         except ModuleNotFoundError as error:
@@ -60,7 +60,7 @@ def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[st
             own = (each for each, libraries in EXTRAS.items() if error.name in libraries)
             raise _missing(error.name, next(own, extra)) from error
 
-    return told
+    return attribute
 
 
 def _missing(library: str, extra: str) -> MissingLibrary:

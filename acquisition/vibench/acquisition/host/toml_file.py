@@ -126,12 +126,12 @@ def _faults(error: ValidationError, content: object) -> list[Any]:
     A value derived from a key with a fault is not reported, nor is a list that is too short without an item
     with a fault.
     """
-    said = error.errors()
+    errors = error.errors()
     meant: dict[Place, dict[Place, list[Any]]] = {}
-    for each in said:
+    for each in errors:
         place = each["loc"]
         is_short = each["type"] == "too_short"
-        within = [other for other in said if other["loc"][: len(place)] == place and other is not each]
+        within = [other for other in errors if other["loc"][: len(place)] == place and other is not each]
         if each["type"] == "default_factory_not_called" or (is_short and within):
             continue
         is_key = _of_the_file(each, content)

@@ -199,10 +199,10 @@ class Guarded:
             raise self._broken(member, f"it gave {error}") from error
 
     def _broken(self, member: str, what: str) -> BrokenPromise:
-        asked = "when it was asked" if member == "__call__" else f"in {member}"
+        where = "when it was asked" if member == "__call__" else f"in {member}"
         is_source = member in _SILENCING and self._promise is not Digitizer
         alarm = " THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand." if is_source else ""
-        return BrokenPromise(f"the plug-in {self._name} broke its promise {asked}: {what}.{alarm} {_ADVICE}")
+        return BrokenPromise(f"the plug-in {self._name} broke its promise {where}: {what}.{alarm} {_ADVICE}")
 
 
 def _taken(hint: Any, value: Any) -> Any:

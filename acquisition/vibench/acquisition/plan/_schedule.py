@@ -26,10 +26,10 @@ from ._until import SHORTEST_S, Until
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
 
-def _is_of_a_file(said: object) -> object:
-    if isinstance(said, str) and re.search(_NAME, said) is None:
+def _is_of_a_file(value: object) -> object:
+    if isinstance(value, str) and re.search(_NAME, value) is None:
         raise ValueError("it names a file; give 1 to 64 letters a to z, digits, _ and -, not _ or - first")
-    return said
+    return value
 
 
 Name = Annotated[str, Field(pattern=_NAME), BeforeValidator(_is_of_a_file)]

@@ -132,13 +132,13 @@ def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
     attributes = read_attributes(dataset)
     facts = _read(f"the channel {role!r}", ChannelFacts, attributes)
     header = ChannelHeader.from_attributes(role, attributes)
-    for name, said, follows in (
+    for name, value, follows in (
         ("scale_factor", facts.scale_factor, header.scale_factor),
         ("add_offset", facts.add_offset, header.add_offset),
     ):
-        if not math.isclose(said, follows, rel_tol=SAME_SCALE):
+        if not math.isclose(value, follows, rel_tol=SAME_SCALE):
             raise RecordingError(
-                f"the channel {role!r} says {name} = {said:g}, and its other attributes give {follows:g}"
+                f"the channel {role!r} says {name} = {value:g}, and its other attributes give {follows:g}"
             )
     return header
 

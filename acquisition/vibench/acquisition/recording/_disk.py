@@ -103,9 +103,9 @@ class DiskTrouble:
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
             is_refused = self._refusals > 0
             self._refusals -= is_refused
-            is_asked_again = is_refused and self._has_refused
+            is_refused_again = is_refused and self._has_refused
             self._has_refused |= is_refused
-        if is_asked_again:
+        if is_refused_again:
             self._on_refusal()
         if is_refused:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -348,7 +348,7 @@ class UntilNote(AbstractNote):
     @property
     def sentence(self) -> str:
         """Return a sentence on bounds, requests, and remaining or recorded time."""
-        said = ", ".join(
+        text = ", ".join(
             f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} of {100 * wish:.2g} %"
             for name, wish in self.wishes.items()
             for bound in (self.bounds.get(name),)
@@ -357,14 +357,14 @@ class UntilNote(AbstractNote):
         needed_s = self.looked_s * max(self.shares) ** 2 if self.bounds else inf
         if self.recorded_s is not None:
             end = "known well enough" if self.is_reached else "longest time"
-            said = f"{end} after {self.recorded_s:.4g} s: {said}"
+            text = f"{end} after {self.recorded_s:.4g} s: {text}"
         elif self.is_reached:
-            said = f"{said}: reached"
+            text = f"{text}: reached"
         elif needed_s <= self.longest_s:
-            said = f"{said}, about {needed_s - self.looked_s:.3g} s left"
+            text = f"{text}, about {needed_s - self.looked_s:.3g} s left"
         elif isfinite(needed_s):
-            said = f"{said}, not within {self.longest_s:.3g} s"
-        return f"{said} ({self.hindrance})" if self.hindrance else said
+            text = f"{text}, not within {self.longest_s:.3g} s"
+        return f"{text} ({self.hindrance})" if self.hindrance else text
 
 
 FeedbackNote: TypeAlias = (

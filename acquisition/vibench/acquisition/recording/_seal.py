@@ -173,9 +173,9 @@ def require_reachable(file: h5py.File | str, error: Exception) -> None:
     """Raise RecordingUnreachable where an error comes from the system: it says nothing about the file."""
     if isinstance(error, RecordingUnreachable):
         raise error
-    if said := system_error(error):
+    if reason := system_error(error):
         raise RecordingUnreachable(
-            f"{getattr(file, 'filename', file)} could not be read ({said}). The file may be intact: check "
+            f"{getattr(file, 'filename', file)} could not be read ({reason}). The file may be intact: check "
             "the disk and its connection, copy the file to another disk, and try again."
         ) from error
 
@@ -228,18 +228,18 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
     """Check a result against its own seal."""
     try:
         marks = read_attributes(group)
-        said, signature, key_id = (str(marks.get(each, "")) for each in RESULT_MARKS)
-        if not said and is_of_a_sealing_version(group.file):
+        checksum, signature, key_id = (str(marks.get(each, "")) for each in RESULT_MARKS)
+        if not checksum and is_of_a_sealing_version(group.file):
             return SealCheck(SealState.DAMAGED, "its seal is gone", "")
-        if not said:
+        if not checksum:
             return _unsealed("it was saved before results had one", key)
         text = _result_text(group)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         require_reachable(group.file, error)
         return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
-    if _sha256(text.encode()) != said:
-        return SealCheck(SealState.DAMAGED, "not as it was sealed", said)
-    return _signature_check(text, [signature, key_id], key, said)
+    if _sha256(text.encode()) != checksum:
+        return SealCheck(SealState.DAMAGED, "not as it was sealed", checksum)
+    return _signature_check(text, [signature, key_id], key, checksum)
 
 
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
@@ -265,15 +265,17 @@ def _differing(
 ) -> Iterator[str]:
     found = dict(_sealed_objects(file))
     yield from (f"{path} is new" for path in found if path not in manifest)
-    for path, said in manifest.items():
+    for path, checksums in manifest.items():
         item = found.get(path)
         if item is None:
             yield f"{path} is missing"
-        elif said["attributes"] != _checksum_of_header(item):
+        elif checksums["attributes"] != _checksum_of_header(item):
             yield f"attributes, type or length of {path}"
         elif isinstance(item, h5py.Group) or (depth is SealDepth.QUICK and item.nbytes > QUICK_BYTES):
             continue
-        elif said["data"] != _data_or_nothing(item, [] if states is None else states.setdefault(path, [])):
+        elif checksums["data"] != _data_or_nothing(
+            item, [] if states is None else states.setdefault(path, [])
+        ):
             yield f"data of {path}"
 
 

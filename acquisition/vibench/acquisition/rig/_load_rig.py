@@ -34,7 +34,7 @@ def load_rig(path: Path | str) -> Rig:
 
 def _require_plug_ins(rig: Rig, path: Path) -> None:
     """Refuse names that no installed package offers; reading a recording does not need them."""
-    asked = [
+    plug_ins = [
         ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
         ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
         *(
@@ -44,10 +44,10 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
         ),
     ]
     if rig.controller is not None:
-        asked.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
+        plug_ins.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
     if rig.daq.output is not None:
-        asked.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
-    for key, kind, name in asked:
+        plug_ins.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
+    for key, kind, name in plug_ins:
         if name not in (names := plug_in_names(kind)):
             raise ConfigurationError(
                 f"{path}: {key} = "

@@ -120,8 +120,8 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
 
 def _origin(bench: Bench) -> Origin:
     """Return the origin of samples: simulated for a virtual rig or simulated instruments."""
-    told = {identity.origin for identity in bench.identities.values()}
-    simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in told
+    origins = {identity.origin for identity in bench.identities.values()}
+    simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in origins
     return Origin.SIMULATED if simulated else Origin.REAL
 
 

@@ -137,31 +137,31 @@ class UntilWatch(ClosedOnLeaving):
     def _recorded(self, duration_s: float) -> None:
         """Count the recorded time, and request an analysis when one is due."""
         self._recorded_s += duration_s
-        asked, recorded_s = self.progress, self._recorded_s
-        if asked is None or asked.is_reached or recorded_s < self._due_s * (1 - 1e-9) or self._beside.is_busy:
+        note, recorded_s = self.progress, self._recorded_s
+        if note is None or note.is_reached or recorded_s < self._due_s * (1 - 1e-9) or self._beside.is_busy:
             return
         while self._due_s <= recorded_s * (1 + 1e-9):
             self._due_s *= LOOK_FACTOR
-        self._beside.do(lambda: self._look(asked, recorded_s))
+        self._beside.do(lambda: self._look(note, recorded_s))
 
-    def _look(self, asked: UntilNote, recorded_s: float) -> None:
+    def _look(self, note: UntilNote, recorded_s: float) -> None:
         """Analyse the file up to a time of the stretch, in the thread."""
         bounds: dict[str, float | None] = {}
         try:
-            question = {"path": str(self._path), "stretch": asked.stretch, "recorded_s": recorded_s}
+            question = {"path": str(self._path), "stretch": note.stretch, "recorded_s": recorded_s}
             assert self._process.stdin is not None
             self._process.stdin.write(json.dumps(question) + "\n")
             self._process.stdin.flush()
             answer = json.loads(self._read_answer())
-            bounds = {name: answer["bounds"].get(name) for name in asked.wishes}
+            bounds = {name: answer["bounds"].get(name) for name in note.wishes}
             hindrance = str(answer["hindrance"])
         except (OSError, ValueError, KeyError, AttributeError):
             hindrance = "the analysis beside the run has ended"
-        self._found = asked.model_copy(
+        self._found = note.model_copy(
             update={
                 "bounds": bounds,
                 "looked_s": recorded_s,
-                "looks": asked.looks + 1,
+                "looks": note.looks + 1,
                 "hindrance": hindrance[:LONGEST_HINDRANCE],
             }
         )

@@ -214,13 +214,13 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     Raises AcquisitionError when there is no state folder and none can be made.
     """
     found = []
-    for path, told in _announcements(model):
-        is_here = told.computer in ("", platform.node())
-        if told.place is not Place.HERE:
+    for path, announcement in _announcements(model):
+        is_here = announcement.computer in ("", platform.node())
+        if announcement.place is not Place.HERE:
             continue
         # A computer may be renamed while a program runs; number and start together are unique.
-        if told.is_alive and (is_here or told.process_start):
-            found.append(told)
+        if announcement.is_alive and (is_here or announcement.process_start):
+            found.append(announcement)
         elif is_here:
             with suppress(OSError):
                 path.unlink()

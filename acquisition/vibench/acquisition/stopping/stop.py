@@ -94,7 +94,7 @@ class StopSwitch:
     """
 
     def __init__(self) -> None:
-        self._asked: dict[StopLevel, StopRequest] = {}
+        self._requests: dict[StopLevel, StopRequest] = {}
         self._holding = False
         self._marks: deque[str] = deque()
         self._changes: deque[str] = deque()
@@ -104,21 +104,21 @@ class StopSwitch:
         """The hardest stop requested so far; None without one."""
         # One slot for each level: two threads at the same time cannot lose the harder request.
         for level in reversed(StopLevel):
-            if level in self._asked:
-                return self._asked[level]
+            if level in self._requests:
+                return self._requests[level]
         return None
 
     @property
     def is_holding(self) -> bool:
         """Whether the run is held; a stop ends a hold."""
-        return self._holding and not self._asked
+        return self._holding and not self._requests
 
     def ask(self, request: StopRequest) -> None:
         """Request a stop; the first of each level counts."""
         if request.level is StopLevel.HOLD:
             self.hold()
         else:
-            self._asked.setdefault(request.level, request)
+            self._requests.setdefault(request.level, request)
 
     def hold(self) -> None:
         """Hold the run."""
