@@ -141,15 +141,15 @@ class Task:
     @property
     def rate_hz(self) -> float:
         """Effective rate, the next possible one above the requested [Hz]; -200077 out of range."""
-        side, asked_hz = self.side, self.timing.requested_hz
+        side, requested_hz = self.side, self.timing.requested_hz
         is_shared = isinstance(side, AnalogInputs) and side.conversion is Conversion.MULTIPLEXED
         highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
         lowest = side.rates.minimum_hz
-        asked_hz = max(asked_hz, lowest) if self.timing.kind is None else asked_hz
-        if not lowest * (1 - 1e-9) <= asked_hz <= highest * (1 + 1e-9):
+        requested_hz = max(requested_hz, lowest) if self.timing.kind is None else requested_hz
+        if not lowest * (1 - 1e-9) <= requested_hz <= highest * (1 + 1e-9):
             allowed = f"{lowest:.6g} to {highest:.6g} samples per second"
-            raise unsupported_value("SampClk_Rate", f"{asked_hz:g}", allowed)
-        return min(highest, side.rates.next_up(asked_hz))
+            raise unsupported_value("SampClk_Rate", f"{requested_hz:g}", allowed)
+        return min(highest, side.rates.next_up(requested_hz))
 
     @property
     def buffer_size(self) -> int:
