@@ -135,8 +135,8 @@ class BranchSolver:
             changed = _outputs(point) - _outputs(self._last)
             length = float(moved @ moved)
             if length > _LEARNT**2:
-                told = length + (np.hypot(point.noise, self._last.noise) / _DOUBTED) ** 2
-                self._slope += np.outer((changed - self._slope @ moved) / told, moved)
+                divisor = length + (np.hypot(point.noise, self._last.noise) / _DOUBTED) ** 2
+                self._slope += np.outer((changed - self._slope @ moved) / divisor, moved)
         self._last = point
 
     def probe(self, column: int, here: MeasuredPoint, beside: MeasuredPoint) -> None:

@@ -64,7 +64,7 @@ _LOWERED, _CALM = 0.3, 0.03
 decrease. Both are small because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
 """Bounds on the change of the base level per step of the first coefficient during the increase."""
-_TOLD = 0.01
+_LEAST_CHANGE = 0.01
 """Smallest change in steps from which the slope is computed."""
 _CLOSER, _CLOSE = 0.3, 0.7
 """Parts of the tolerance for fundamental and harmonics of a point; small, as folds move with the level."""
@@ -140,7 +140,7 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
         wrong = float(seen.residual[0])
         if _is_sine(seen.residual, player.plan.tolerance):
             return seen, tries
-        if before is not None and abs(moved := seen.unknowns[1] - before.unknowns[1]) > _TOLD:
+        if before is not None and abs(moved := seen.unknowns[1] - before.unknowns[1]) > _LEAST_CHANGE:
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
         harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
         before, unknowns = seen, solver.correct(harmonics, predicted)
@@ -299,7 +299,7 @@ def _fit(
 
 
 def stability_note(
-    found: OpenLoopMultiplier, number: int, asked: float, before: LoopLook, after: LoopLook
+    found: OpenLoopMultiplier, number: int, perturbation: float, before: LoopLook, after: LoopLook
 ) -> BranchStabilityNote:
     """Return the note on a fit; undetermined if the held motion has changed meanwhile."""
     error = float(np.hypot(before.m0_u[0], after.m0_u[0]) / abs(before.m0_m[0]))
@@ -315,6 +315,6 @@ def stability_note(
         stability=stability,
         multiplier=found.size if known else None,
         multiplier_u=found.error if known else None,
-        perturbation=asked,
+        perturbation=perturbation,
         moved=moved,
     )

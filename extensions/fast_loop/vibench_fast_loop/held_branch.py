@@ -74,9 +74,9 @@ class HeldBranch(Labelled):
 def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
     """Return the points in a fast loop's notes; empty if there are none."""
     points = [each for each in notes if isinstance(each, BranchPointNote)]
-    told = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
-    asked = [told.get(each.point) for each in points]
-    sizes = [(nan, nan) if each is None else (each.multiplier, each.multiplier_u) for each in asked]
+    by_point = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
+    stabilities = [by_point.get(each.point) for each in points]
+    sizes = [(nan, nan) if each is None else (each.multiplier, each.multiplier_u) for each in stabilities]
     multiplier, multiplier_u = np.array(sizes, dtype=np.float64).reshape(-1, 2).T
     return HeldBranch(
         frequency_hz=np.array([each.frequency_hz for each in points]),
@@ -85,7 +85,7 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
         phase_deg=np.array([each.phase_deg for each in points]),
         residue=np.array([each.residue for each in points]),
         residue_acceleration=np.array([each.residue_acceleration for each in points]),
-        stability=tuple("" if each is None else each.stability.value for each in asked),
+        stability=tuple("" if each is None else each.stability.value for each in stabilities),
         multiplier=multiplier,
         multiplier_u=multiplier_u,
     )
@@ -102,17 +102,17 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
         f"harmonics at most {found.residue.max():.2g} of that as displacement and "
         f"{found.residue_acceleration.max():.2g} as acceleration."
     )
-    told = [held]
+    sentences = [held]
     if found.folds:
         turns = ", ".join(f"{found.frequency_hz[each]:.5g}" for each in found.folds)
-        told.append(f"The branch turned at {turns} Hz.")
+        sentences.append(f"The branch turned at {turns} Hz.")
     if any(found.stability):
         counts = ", ".join(f"{found.stability.count(each.value)} {each.value}" for each in Stability)
-        told.append(
+        sentences.append(
             f"Without feedback they would be: {counts}, measured with small perturbations of the drive."
         )
-    told.extend(f"It ended because {each.end.value}." for each in ends)
-    return tuple(told)
+    sentences.extend(f"It ended because {each.end.value}." for each in ends)
+    return tuple(sentences)
 
 
 _HEIGHT_IN = 4.4
@@ -152,12 +152,12 @@ def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, 
     filled: dict[str, Any] = {"marker": "o"}
     empty = filled | {"markerfacecolor": "white"}
     if any(found.stability):
-        told = np.array(found.stability)
+        stability = np.array(found.stability)
         return (
-            ("held, stable without feedback", told == Stability.STABLE.value, filled),
-            ("held, unstable without feedback", told == Stability.UNSTABLE.value, empty),
-            ("held, stability not determined", told == Stability.OPEN.value, {"marker": "x"}),
-            ("held", told == "", {"marker": "."}),
+            ("held, stable without feedback", stability == Stability.STABLE.value, filled),
+            ("held, unstable without feedback", stability == Stability.UNSTABLE.value, empty),
+            ("held, stability not determined", stability == Stability.OPEN.value, {"marker": "x"}),
+            ("held", stability == "", {"marker": "."}),
         )
     back = np.zeros(found.frequency_hz.size, dtype=bool)
     for first, last in zip(found.folds[::2], found.folds[1::2], strict=False):

@@ -98,9 +98,9 @@ class LineController:
                 f"after {self._config.watchdog_s:g} s; check its power and its network"
             ) from error
         try:
-            told = json.loads(line)
-            if isinstance(told, dict) and "refused" in told:
-                raise InstrumentError(f"the real-time controller at {where} refused: {told['refused']}")
+            answer = json.loads(line)
+            if isinstance(answer, dict) and "refused" in answer:
+                raise InstrumentError(f"the real-time controller at {where} refused: {answer['refused']}")
             return kind.model_validate_json(line)
         except (ValueError, RecursionError) as error:  # pydantic raises a ValueError
             raise InstrumentError(
@@ -109,5 +109,5 @@ class LineController:
             ) from error
 
 
-def _laws(told: LoopFacts | ControllerConfig) -> str:
-    return "any linear law" if told.pd_of is None else f"proportional and derivative laws of {told.pd_of}"
+def _laws(facts: LoopFacts | ControllerConfig) -> str:
+    return "any linear law" if facts.pd_of is None else f"proportional and derivative laws of {facts.pd_of}"

@@ -86,9 +86,9 @@ class LoopDrive:
     def _play(self, play: Play, ramp_s: float | None) -> None:
         match play:
             case ProgramTone(program=LoopProgram() as program):
-                told = program
+                next_program = program
             case Tone(frequency_hz, level):
-                told = LoopProgram(
+                next_program = LoopProgram(
                     frequency_hz=frequency_hz, reference_v=((0.5 * self._amplitude_vpp * level, 0.0),)
                 )
             case _:
@@ -96,11 +96,11 @@ class LoopDrive:
                     "a real-time controller plays sines, and was given something else; it stayed silent"
                 )
         if ramp_s is not None:
-            told = told.model_copy(update={"glide_s": ramp_s})
-        if told != self._program:
+            next_program = next_program.model_copy(update={"glide_s": ramp_s})
+        if next_program != self._program:
             # Set before the command, so that a failed command counts as playing.
-            self._program = told
-            self._controller.play(told)  # discards the blocks of the previous program
+            self._program = next_program
+            self._controller.play(next_program)  # discards the blocks of the previous program
 
     def _talking(self, duration_s: float) -> Iterator[float]:
         longest_s = TALK * self._controller.facts.watchdog_s

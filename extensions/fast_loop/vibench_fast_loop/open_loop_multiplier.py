@@ -131,11 +131,11 @@ def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vecto
     most = int(np.argmax(values.real))
     mirror = np.linalg.pinv(vectors)[most]
     rest = (right - left @ found) @ mirror
-    told = (rest * (gains[:2].T @ (vectors[:, most] / scale[:2]))).real
+    residual = (rest * (gains[:2].T @ (vectors[:, most] / scale[:2]))).real
     length = _BLOCK * _EACH
-    sums = np.convolve(told, np.ones(length), mode="valid")
-    count, free = len(told) / _EACH, len(told) / _EACH - left.shape[1] - 2
-    spread = float(np.sqrt(np.mean(sums**2) * len(told) / length * count / max(free, 1.0)))
+    sums = np.convolve(residual, np.ones(length), mode="valid")
+    count, free = len(residual) / _EACH, len(residual) / _EACH - left.shape[1] - 2
+    spread = float(np.sqrt(np.mean(sums**2) * len(residual) / length * count / max(free, 1.0)))
     size = float(np.exp(values[most].real))
     return OpenLoopMultiplier(size, float(np.hypot(size * spread, _MODEL)))
 

@@ -231,8 +231,8 @@ def controller_of(
     config: ControllerConfig, grid_rate_hz: float, clock: Callable[[], float]
 ) -> VirtualController:
     """Return the controller described by a hardware configuration."""
-    told = {name: getattr(config, name) for name in LoopFacts.model_fields if hasattr(config, name)}
-    facts = LoopFacts(name="simulated controller", serial="virtual", **told)
+    values = {name: getattr(config, name) for name in LoopFacts.model_fields if hasattr(config, name)}
+    facts = LoopFacts(name="simulated controller", serial="virtual", **values)
     return VirtualController(facts, clock, grid_rate_hz)
 
 

@@ -56,15 +56,15 @@ def answered(block: LoopBlock, of_base: bool) -> complex:  # noqa: FBT001 - whic
 
 
 def test_it_says_who_it_is_and_what_its_configuration_says_of_it(bench: Bench) -> None:
-    facts, told = controller_of(bench).facts, bench.rig.controller
+    facts, config = controller_of(bench).facts, bench.rig.controller
     assert controller_of(bench).identity.reply
     assert controller_of(bench).identity == controller_of(bench).identity
-    assert told is not None
-    assert facts.rate_hz == pytest.approx(told.rate_hz, rel=0.01)
-    assert facts.latency_s == pytest.approx(told.latency_s, abs=1 / facts.rate_hz)
-    assert facts.limit_v <= 1.01 * told.limit_v
-    assert facts.watchdog_s <= 1.01 * told.watchdog_s
-    assert facts.pd_of == told.pd_of
+    assert config is not None
+    assert facts.rate_hz == pytest.approx(config.rate_hz, rel=0.01)
+    assert facts.latency_s == pytest.approx(config.latency_s, abs=1 / facts.rate_hz)
+    assert facts.limit_v <= 1.01 * config.limit_v
+    assert facts.watchdog_s <= 1.01 * config.watchdog_s
+    assert facts.pd_of == config.pd_of
     assert controller_of(bench).report().state is LoopState.SILENT
 
 
@@ -88,10 +88,10 @@ def test_the_coefficients_are_those_of_what_is_played_and_of_what_its_sensors_sh
     output, level = complex_of(block.output), level_v(bench)
     assert abs(output[1] - level) < 0.01 * level
     assert abs(output[2] - complex(0.1, -0.2) * level) < 0.01 * level
-    for role, told in ((Role.BASE_ACCELERATION, block.base), (Role.M0_VELOCITY, block.m0)):
+    for role, coefficients in ((Role.BASE_ACCELERATION, block.base), (Role.M0_VELOCITY, block.m0)):
         row = volts[bench.digitizer.roles.index(role.value)]
         shown = line_v(row[len(row) // 2 :], TONE_HZ, bench.digitizer.sample_rate_hz)
-        assert abs(complex_of(told)[1]) == pytest.approx(shown, rel=0.05)
+        assert abs(complex_of(coefficients)[1]) == pytest.approx(shown, rel=0.05)
 
 
 def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
@@ -118,9 +118,9 @@ def test_it_falls_silent_when_nobody_talks_to_it_and_says_why(bench: Bench) -> N
     controller.play(series(bench))
     bench.digitizer.read(int((controller.facts.watchdog_s + 0.5) * bench.digitizer.sample_rate_hz))
     assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
-    told = controller.report()
-    assert told.state is LoopState.SILENT
-    assert told.reason
+    report = controller.report()
+    assert report.state is LoopState.SILENT
+    assert report.reason
     controller.play(series(bench))
     assert controller.report().state is LoopState.PLAYING, "it may be told to play again"
 
