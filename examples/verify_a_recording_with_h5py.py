@@ -20,14 +20,14 @@ LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")  # how HDF5 notes what is whose axi
 
 def attributes_sha256(item):
     """Return the hash of an object's attributes, type and shape, as JSON."""
-    said = {}
+    values = {}
     for name in item.attrs:
         if name not in LINKS:
             value = np.asarray(item.attrs[name])
-            said[name] = [value.dtype.str, list(value.shape), value.tobytes().hex()]
+            values[name] = [value.dtype.str, list(value.shape), value.tobytes().hex()]
     if isinstance(item, h5py.Dataset):
-        said["/"] = [item.dtype.str, list(item.shape)]
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        values["/"] = [item.dtype.str, list(item.shape)]
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
 def data_sha256(item):

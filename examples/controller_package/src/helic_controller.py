@@ -121,7 +121,7 @@ class HelicController:
         wanted = np.zeros(self._harmonics, dtype=np.complex128)
         wanted[: len(program.reference_v)] = [complex(*each) for each in program.reference_v]
         with self._turn:
-            told = self._told()
+            report = self._new_report()
             try:
                 self._go_over(Played(program.frequency_hz, wanted), gains, program.glide_s)
             except InstrumentError as error:
@@ -129,7 +129,7 @@ class HelicController:
                 raise
             self._coefficients = Coefficients(program, self._facts.rate_hz)
             self._state, self._reason = LoopState.PLAYING, ""
-            return told.model_copy(update={"state": self._state, "reason": ""})
+            return report.model_copy(update={"state": self._state, "reason": ""})
 
     def report(self) -> LoopReport:
         """Hand over what has been measured since the last report."""
@@ -140,18 +140,18 @@ class HelicController:
             except InstrumentError as error:
                 self._give_up(error)
                 raise
-            return self._told()
+            return self._new_report()
 
     def silence(self, ramp_s: float) -> LoopReport:
         """Ramp down, and close the board's gate."""
         with self._turn:
-            told = self._told()
+            report = self._new_report()
             if self._state is not LoopState.SILENT:
                 if ramp_s == 0.0:
                     self._close_gate()
                 elif self._state is LoopState.PLAYING:
                     self._end("", ramp_s)
-            return told.model_copy(update={"state": self._state})
+            return report.model_copy(update={"state": self._state})
 
     def close(self) -> None:
         """Silence, and end the connection."""
@@ -176,7 +176,7 @@ class HelicController:
         if self._error is not None:
             raise self._error
 
-    def _told(self) -> LoopReport:
+    def _new_report(self) -> LoopReport:
         """Give what a report holds; its host has said something."""
         self._require_there()
         self._talked = self._following

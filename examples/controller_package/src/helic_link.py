@@ -100,17 +100,17 @@ class HelicLink:
             raise
 
     def _discover(self) -> None:
-        told = self.asked(Ask.STATUS)
-        if told[0] != VERSION:
+        status = self.request(Ask.STATUS)
+        if status[0] != VERSION:
             raise InstrumentError(
-                f"the board at {self.where} speaks version {told[0]} of HELIC-DAQ's protocol, and this "
+                f"the board at {self.where} speaks version {status[0]} of HELIC-DAQ's protocol, and this "
                 f"driver version {VERSION}. Nothing was played; install firmware of that version"
             )
-        _, count, _, self.rate_hz, _ = struct.unpack("<BHBfI", told)
+        _, count, _, self.rate_hz, _ = struct.unpack("<BHBfI", status)
         self.parameters: dict[str, Parameter] = {}
         while len(self.parameters) < count:
-            self._take_page(self.asked(Ask.PARAMETERS, struct.pack("<H", len(self.parameters))))
-        words = self.asked(Ask.SOURCES).decode("ascii").split("\0")
+            self._take_page(self.request(Ask.PARAMETERS, struct.pack("<H", len(self.parameters))))
+        words = self.request(Ask.SOURCES).decode("ascii").split("\0")
         self.sources = dict(zip(words[0::2], words[1::2], strict=False))
         """Units by name, in the order of their numbers."""
 
@@ -131,7 +131,7 @@ class HelicLink:
                 "Nothing was played; install firmware of version 3"
             )
 
-    def asked(self, ask: Ask, payload: bytes = b"", what: str = "") -> bytes:
+    def request(self, ask: Ask, payload: bytes = b"", what: str = "") -> bytes:
         """Send one frame, and give the payload of its answer."""
         with self._turn:
             self._sequence = (self._sequence + 1) % 256
@@ -146,9 +146,9 @@ class HelicLink:
                     "closes by itself when it misses the connection, after 10 s at the latest; look at its "
                     "power and its network"
                 ) from error
-            asked = self._sequence
-        told, (crc,) = rest[:-2], struct.unpack("<H", rest[-2:])
-        if magic != MAGIC or sequence != asked or crc != binascii.crc_hqx(head[2:] + told, 0xFFFF):
+            expected = self._sequence
+        answer, (crc,) = rest[:-2], struct.unpack("<H", rest[-2:])
+        if magic != MAGIC or sequence != expected or crc != binascii.crc_hqx(head[2:] + answer, 0xFFFF):
             raise InstrumentError(
                 f"the host at {self.where} is not a HELIC-DAQ board: its frame is damaged. Nothing more was "
                 "sent; correct controller.resource"
@@ -156,10 +156,10 @@ class HelicLink:
         if kind == Ask.ERROR:
             raise InstrumentError(
                 f"the board at {self.where} refused {what or ask.name.lower()}: "
-                f"{_ERRORS.get(told[0], f'error {told[0]}')}. It was silenced; look at what its firmware "
+                f"{_ERRORS.get(answer[0], f'error {answer[0]}')}. It was silenced; look at what its firmware "
                 "allows"
             )
-        return told
+        return answer
 
     def _received(self, count: int) -> bytes:
         parts = b""
@@ -173,19 +173,19 @@ class HelicLink:
     def get(self, *names: str) -> tuple[Any, ...]:
         """Read scalars: numbers, and bytes of an array of characters."""
         wanted = [self.parameters[name] for name in names]
-        told = self.asked(Ask.GET, struct.pack(f"<{len(wanted)}H", *(each.index for each in wanted)))
+        answer = self.request(Ask.GET, struct.pack(f"<{len(wanted)}H", *(each.index for each in wanted)))
         return tuple(
             value
             for each, place in zip(
                 wanted, np.cumsum([0, *(each.layout.size for each in wanted)]), strict=False
             )
-            for value in each.layout.unpack_from(told, int(place))
+            for value in each.layout.unpack_from(answer, int(place))
         )
 
     def set(self, name: str, *values: float) -> None:
         """Write a parameter, whole."""
         parameter = self.parameters[name]
-        self.asked(
+        self.request(
             Ask.SET,
             struct.pack("<H", parameter.index) + parameter.layout.pack(*values),
             f"{values[:1]} as {name}",
@@ -198,9 +198,9 @@ class HelicLink:
         self._samples.bind(("", 0))
         # A firewall then takes what comes back for an answer.
         self._samples.sendto(b"\0", (self._host, self._stream_port))
-        self.asked(Ask.STREAM_STOP)
-        self.asked(Ask.STREAM_SETUP, struct.pack("<HIB", 1, 0, len(numbers)) + numbers)
-        self.asked(Ask.STREAM_START, struct.pack("<H", self._samples.getsockname()[1]))
+        self.request(Ask.STREAM_STOP)
+        self.request(Ask.STREAM_SETUP, struct.pack("<HIB", 1, 0, len(numbers)) + numbers)
+        self.request(Ask.STREAM_START, struct.pack("<H", self._samples.getsockname()[1]))
 
     def heard(self, timeout_s: float) -> list[Packet]:
         """Wait for samples, and give all that have come."""
