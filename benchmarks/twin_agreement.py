@@ -68,13 +68,13 @@ def compared(
         with open_bench(rig) as bench:
             run_measurement(bench, Measurement(name="measured", excitation=excitation, ramp_s=0.3), path)
         with open_recording(path) as recording:
-            laid = overlay(recording, analyse(recording), draws=draws, specimen=specimen)
-    for each in laid.ensemble:
+            simulation = overlay(recording, analyse(recording), draws=draws, specimen=specimen)
+    for each in simulation.ensemble:
         if curves is not None and len(each.draws) == draws:
             curves.setdefault(each.name, []).append(each.draws)
         rank = int(each.rank[0]) if each.compared == 1 else None
         yield Compared(
-            f"{scene}, {laid.run.impact_rate_hz:.0f} impacts/s",
+            f"{scene}, {simulation.run.impact_rate_hz:.0f} impacts/s",
             each.name,
             each.compared,
             each.outside,

@@ -229,10 +229,10 @@ def unit_of(name: str) -> str:
 
 def _unit(part: Any, key: str, unit: str) -> str:
     """Return the unit of a value of a part; ``unit`` is the part's unit in its parent."""
-    said = getattr(part, "OWN_UNITS", {}).get(key)
-    if said is None:
+    pattern = getattr(part, "OWN_UNITS", {}).get(key)
+    if pattern is None:
         return unit_of(key)
-    return "" if "{unit}" in said and not unit else str(said.format(part, unit=unit))
+    return "" if "{unit}" in pattern and not unit else str(pattern.format(part, unit=unit))
 
 
 def _attributes(unit: str) -> dict[str, str]:

@@ -50,7 +50,7 @@ def numbers(path):
 
 def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation(noise_file):
     found = result(noise_file())
-    drawn = transmission_figure(found.analysis, found.laid)
+    drawn = transmission_figure(found.analysis, found.overlay)
     top, phase, strip, difference = drawn.figure.axes
     measured = line(top, "measured")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.frequency_response.magnitude)
@@ -58,7 +58,7 @@ def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation
         measured.get_xdata(), found.analysis.response.frequency_response.frequency_hz
     )
     simulated = line(top, "simulated under the recorded base")
-    np.testing.assert_array_equal(simulated.get_ydata(), found.laid.response.frequency_response.magnitude)
+    np.testing.assert_array_equal(simulated.get_ydata(), found.overlay.response.frequency_response.magnitude)
     assert measured.get_color() != simulated.get_color() == SIMULATED
     assert difference.get_xlabel() == "frequency [Hz]"
     assert phase.get_ylabel() == "phase [°]"
@@ -71,23 +71,23 @@ def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation
 
 def test_a_transmission_caption_names_every_resonance_with_its_uncertainty(noise_file):
     found = result(noise_file())
-    caption = transmission_figure(found.analysis, found.laid).caption
+    caption = transmission_figure(found.analysis, found.overlay).caption
     for each in found.analysis.response.resonances:
         assert f"{plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz)} Hz" in caption
-    assert f"{found.laid.difference.median_abs_db:.2g} dB" in caption
+    assert f"{found.overlay.difference.median_abs_db:.2g} dB" in caption
 
 
 @pytest.mark.thorough
 def test_files_beside_a_figure_hold_its_numbers(noise_file, tmp_path):
     found = result(noise_file())
-    png, svg, table, sines = transmission_figure(found.analysis, found.laid).save(tmp_path / "figures")
+    png, svg, table, sines = transmission_figure(found.analysis, found.overlay).save(tmp_path / "figures")
     assert png.read_bytes().startswith(PNG_HEAD)
     assert ET.fromstring(svg.read_text(encoding="utf-8")).tag.endswith("svg")
     columns = numbers(table)
     frequency_response = found.analysis.response.frequency_response
     np.testing.assert_allclose(columns["magnitude"], frequency_response.magnitude, rtol=1e-9)
     np.testing.assert_allclose(columns["magnitude_upper"], frequency_response.magnitude_upper, rtol=1e-9)
-    assert numbers(sines)["response_i"].size == found.laid.prediction.frequency_hz.size
+    assert numbers(sines)["response_i"].size == found.overlay.prediction.frequency_hz.size
 
 
 def test_the_same_figure_drawn_twice_is_the_same_file(noise_file):
@@ -106,7 +106,7 @@ def test_levels_are_drawn_weak_to_strong(noise_file, tmp_path):
 
 def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     found = result(sweep_file)
-    drawn = sweep_figure(found.analysis, found.laid)
+    drawn = sweep_figure(found.analysis, found.overlay)
     region = found.analysis.collisions.regions[0]
     shaded = drawn.figure.axes[1].patches[0]
     assert shaded.get_x() == pytest.approx(region.low_hz)
@@ -125,12 +125,12 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     ended = replace(found.analysis.collisions, regions=(replace(region, reaches_stop=False),))
     # How long collisions live on is chance: their end has no bounds.
     assert regions_text(ended).endswith(f" to {region.stop.frequency_hz:.1f} Hz in this run")
-    assert f"{found.laid.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
+    assert f"{found.overlay.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
 
 def test_dwells_stand_in_rows_weak_to_strong_with_their_responses_in_the_caption(dwell_file):
     strong, weak = result(dwell_file("strong")), result(dwell_file("weak"))
-    drawn = dwells_figure([(each.analysis, each.laid) for each in (strong, weak)])
+    drawn = dwells_figure([(each.analysis, each.overlay) for each in (strong, weak)])
     assert len(drawn.figure.axes) == 6
     assert drawn.figure.axes[0].get_ylabel().startswith("0.01 Vpp")
     spectrum = drawn.figure.axes[2].get_lines()[-2]
@@ -149,7 +149,7 @@ def test_the_largest_column_of_a_spectrum_is_response_ii(dwell_file):
 
 def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
     found = result(stepped_file)
-    drawn = stepped_sine_figure(found.analysis, found.laid, STEPPED_FREQUENCIES)
+    drawn = stepped_sine_figure(found.analysis, found.overlay, STEPPED_FREQUENCIES)
     measured = line(drawn.figure.axes[1], "measured, up")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_ii)
     assert "2 steps" in drawn.caption

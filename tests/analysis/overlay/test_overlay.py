@@ -14,44 +14,44 @@ from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import base_transmissibility, gong2025
 
 
-def laid_over(path, **how):
+def overlay_of(path, **how):
     with open_recording(path) as recording:
         analysis = analyse(recording)
         return analysis, overlay(recording, analysis, **how)
 
 
 def test_a_weak_dwell_and_its_simulation_differ_by_less_than_a_hundredth_of_a_decibel(dwell_file):
-    analysis, laid = laid_over(dwell_file("weak"))
-    assert isinstance(laid, DwellOverlay)
-    assert laid.run.impacts == 0
-    assert abs(laid.difference.decibel[0]) < 0.01
-    assert laid.response.response_i == pytest.approx(analysis.response.response_i, rel=5e-3)
+    analysis, overlay = overlay_of(dwell_file("weak"))
+    assert isinstance(overlay, DwellOverlay)
+    assert overlay.run.impacts == 0
+    assert abs(overlay.difference.decibel[0]) < 0.01
+    assert overlay.response.response_i == pytest.approx(analysis.response.response_i, rel=5e-3)
     # Delays are aligned: the simulated response has none, the recorded one was taken out.
-    assert laid.response.phase_rad == pytest.approx(analysis.response.phase_rad, abs=2e-3)
-    assert laid.prediction.response_ii[0] == pytest.approx(analysis.response.response_ii, rel=1e-3)
+    assert overlay.response.phase_rad == pytest.approx(analysis.response.phase_rad, abs=2e-3)
+    assert overlay.prediction.response_ii[0] == pytest.approx(analysis.response.response_ii, rel=1e-3)
 
 
 def test_a_colliding_dwell_counts_impacts_and_agrees_in_its_statistics(dwell_file, dwell_motions):
-    analysis, laid = laid_over(dwell_file("strong"))
+    analysis, overlay = overlay_of(dwell_file("strong"))
     true = dwell_motions["strong"][2]
-    assert laid.run.impacts == pytest.approx(np.count_nonzero(true > 2.0), rel=0.15)
-    assert laid.run.impact_rate_hz == pytest.approx(laid.run.impacts / 3.0)
-    for measured, simulated in zip(analysis.terminal, laid.terminal, strict=True):
+    assert overlay.run.impacts == pytest.approx(np.count_nonzero(true > 2.0), rel=0.15)
+    assert overlay.run.impact_rate_hz == pytest.approx(overlay.run.impacts / 3.0)
+    for measured, simulated in zip(analysis.terminal, overlay.terminal, strict=True):
         assert simulated.decibel == pytest.approx(measured.decibel, abs=4)
 
 
 def test_a_sweep_and_its_simulation_collide_within_1_hz(sweep_file):
-    analysis, laid = laid_over(sweep_file)
-    assert isinstance(laid, SweepOverlay)
-    measured, simulated = analysis.collisions.regions[0], laid.collisions.regions[0]
+    analysis, overlay = overlay_of(sweep_file)
+    assert isinstance(overlay, SweepOverlay)
+    measured, simulated = analysis.collisions.regions[0], overlay.collisions.regions[0]
     assert simulated.low_hz == pytest.approx(measured.low_hz, abs=1.0)
-    before = (laid.difference.frequency_hz < measured.low_hz - 3) & (laid.difference.frequency_hz > 230)
-    assert np.max(np.abs(laid.difference.decibel[before])) < 0.02
+    before = (overlay.difference.frequency_hz < measured.low_hz - 3) & (overlay.difference.frequency_hz > 230)
+    assert np.max(np.abs(overlay.difference.decibel[before])) < 0.02
 
 
 def test_disagreements_with_the_twin_are_stated_first(sweep_file):
-    _, laid = laid_over(sweep_file)
-    (curve, *_) = laid.ensemble
+    _, overlay = overlay_of(sweep_file)
+    (curve, *_) = overlay.ensemble
     draws = 1 + 1e-3 * np.random.default_rng(1).standard_normal((9, 1))
     one = np.ones(1)
     fine = [
@@ -59,31 +59,31 @@ def test_disagreements_with_the_twin_are_stated_first(sweep_file):
         for each in "abc"
     ]
     odd = replace(fine[0], name="odd", measured=1.01 * one)
-    found = replace(laid, ensemble=(*fine, odd)).agreement
+    found = replace(overlay, ensemble=(*fine, odd)).agreement
     assert found[0] == "1 of 4 quantities disagree with the twin: odd"
     assert found[1].startswith("odd 1.01 is not the twin's")
     assert len(found) == 5
-    assert replace(laid, ensemble=tuple(fine)).agreement[0].startswith("fine a")
+    assert replace(overlay, ensemble=tuple(fine)).agreement[0].startswith("fine a")
 
 
 def test_weak_noise_and_its_simulation_agree_on_every_line(noise_file):
-    analysis, laid = laid_over(noise_file())
-    assert isinstance(laid, NoiseOverlay)
-    assert laid.run.impacts == 0
-    assert laid.run.played_s == pytest.approx(1.0)
-    assert laid.difference.rms_db < 0.01
-    linear = np.abs(base_transmissibility(gong2025(), laid.prediction.frequency_hz)[:, 0])
-    np.testing.assert_allclose(laid.prediction.linear, linear)
+    analysis, overlay = overlay_of(noise_file())
+    assert isinstance(overlay, NoiseOverlay)
+    assert overlay.run.impacts == 0
+    assert overlay.run.played_s == pytest.approx(1.0)
+    assert overlay.difference.rms_db < 0.01
+    linear = np.abs(base_transmissibility(gong2025(), overlay.prediction.frequency_hz)[:, 0])
+    np.testing.assert_allclose(overlay.prediction.linear, linear)
     amplitude_m, basis = equivalent_amplitude(analysis)
     assert amplitude_m == 1e-6
     assert "0.05" in basis
 
 
 def test_another_specimen_can_be_overlaid(dwell_file):
-    _, laid = laid_over(dwell_file("weak"), specimen=gong2025(damping_time_s=1e-4))
+    _, overlay = overlay_of(dwell_file("weak"), specimen=gong2025(damping_time_s=1e-4))
     exact = np.abs(base_transmissibility(gong2025(damping_time_s=1e-4), 260.0)[0, 0])
-    assert laid.response.response_ii == pytest.approx(exact, rel=2e-3)
-    assert laid.difference.decibel[0] > 1
+    assert overlay.response.response_ii == pytest.approx(exact, rel=2e-3)
+    assert overlay.difference.decibel[0] > 1
 
 
 def test_a_prediction_below_the_gap_is_the_linear_one():

@@ -45,7 +45,7 @@ def recordings(tmp_path_factory):
     return folder
 
 
-def laid(path, **how):
+def twin_of(path, **how):
     with open_recording(path) as recording:
         analysis = analyse(recording)
         return Result(analysis, overlay(recording, analysis, **how))
@@ -53,32 +53,32 @@ def laid(path, **how):
 
 @pytest.fixture(scope="module")
 def chaotic(recordings):
-    return laid(recordings / "dwell.h5")
+    return twin_of(recordings / "dwell.h5")
 
 
 def test_a_chaotic_dwell_is_consistent_with_its_draws(chaotic):
-    run = chaotic.laid.run
+    run = chaotic.overlay.run
     assert run.driven is Driven.AMPLIFIER
     assert run.draws in {8, 12, 16}
     assert run.impact_rate_hz > 300
-    assert all(each.compared == 1 and each.agrees for each in chaotic.laid.ensemble)
+    assert all(each.compared == 1 and each.agrees for each in chaotic.overlay.ensemble)
 
 
 def test_a_dwell_under_the_base_motion_has_no_rank(recordings, chaotic):
-    base = laid(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).laid
+    base = twin_of(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).overlay
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)
     assert all(not each.compared for each in base.ensemble)
     # The recorded base does not yield: the response at the drive is far below the measured one.
-    assert base.response.response_ii < chaotic.laid.quantity("Response II").lower[0]
+    assert base.response.response_ii < chaotic.overlay.quantity("Response II").lower[0]
 
 
 def test_another_gap_lies_outside_the_draws(recordings):
-    found = laid(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6), draws=12).laid
+    found = twin_of(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6), draws=12).overlay
     assert not found.quantity("Response II").agrees
 
 
 def test_weak_noise_agrees_on_every_line(recordings):
-    found = laid(recordings / "noise.h5").laid
+    found = twin_of(recordings / "noise.h5").overlay
     assert found.run.draws == 8
     assert found.quantity("transmission").agrees
     assert found.difference.rms_db < 0.05
@@ -89,8 +89,8 @@ def test_json_and_figures_hold_the_draws(chaotic):
     assert said["drive"] == "recorded amplifier voltage"
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]
     assert all(abs(each["z"][0]) <= each["limit_z"] for each in said["ensemble"])
-    drawn = dwells_figure([(chaotic.analysis, chaotic.laid)])
-    assert f"{chaotic.laid.run.draws} draws" in drawn.caption
+    drawn = dwells_figure([(chaotic.analysis, chaotic.overlay)])
+    assert f"{chaotic.overlay.run.draws} draws" in drawn.caption
     assert "95 % of draws" in [each.get_label() for each in drawn.figure.axes[2].collections]
 
 

@@ -46,7 +46,7 @@ def test_the_incremental_result_reaches_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
     progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)
-    assert counts[-1] == progress.asked == 12
+    assert counts[-1] == progress.requested == 12
     frequency_hz, found = progress.column("linear", "response_ii")
     exact = np.abs(base_transmissibility(gong2025(contact="linear"), frequency_hz)[:, 0])
     assert np.array_equal(frequency_hz, np.arange(50.0, 601.0, 50.0))

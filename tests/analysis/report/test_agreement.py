@@ -17,27 +17,32 @@ GOOD, BAD, OPEN = (
 NOT_SIMULATED = AnalysisFailure("a.h5", FailedStep.SIMULATION, "it did not reach its end")
 
 
-def laid(*ensemble, by_voltage=True, why=""):
-    return Of(laid=Of(run=Of(driven=Of(by_voltage=by_voltage), why=why), ensemble=ensemble))
+def result_with(*ensemble, by_voltage=True, why=""):
+    return Of(overlay=Of(run=Of(driven=Of(by_voltage=by_voltage), why=why), ensemble=ensemble))
 
 
 @pytest.mark.parametrize(
     ("result", "failure", "agreement", "reason"),
     [
-        (laid(GOOD), None, Agreement.YES, ""),
-        (laid(GOOD, OPEN), None, Agreement.YES, "1 of 2 quantities were compared"),
-        (laid(GOOD, BAD, OPEN), None, Agreement.NO, "outside of the simulated draws: Response I"),
-        (laid(OPEN), None, Agreement.OPEN, "too few simulated draws of the measured kind of motion"),
-        (laid(), None, Agreement.OPEN, "too few simulated draws of the measured kind of motion"),
-        (laid(GOOD, by_voltage=False), None, Agreement.OPEN, "simulated once, under the recorded base"),
+        (result_with(GOOD), None, Agreement.YES, ""),
+        (result_with(GOOD, OPEN), None, Agreement.YES, "1 of 2 quantities were compared"),
+        (result_with(GOOD, BAD, OPEN), None, Agreement.NO, "outside of the simulated draws: Response I"),
+        (result_with(OPEN), None, Agreement.OPEN, "too few simulated draws of the measured kind of motion"),
+        (result_with(), None, Agreement.OPEN, "too few simulated draws of the measured kind of motion"),
         (
-            laid(by_voltage=False, why="no gain"),
+            result_with(GOOD, by_voltage=False),
+            None,
+            Agreement.OPEN,
+            "simulated once, under the recorded base",
+        ),
+        (
+            result_with(by_voltage=False, why="no gain"),
             None,
             Agreement.OPEN,
             "recorded base: no gain",
         ),
-        (Of(laid=None), None, Agreement.OPEN, "not simulated"),
-        (Of(laid=None), NOT_SIMULATED, Agreement.OPEN, "it did not reach its end"),
+        (Of(overlay=None), None, Agreement.OPEN, "not simulated"),
+        (Of(overlay=None), NOT_SIMULATED, Agreement.OPEN, "it did not reach its end"),
     ],
 )
 def test_agreement_names_the_compared_quantities(result, failure, agreement, reason):

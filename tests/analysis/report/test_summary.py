@@ -20,7 +20,7 @@ def noise(vpp, *peaks_hz, band_hz=(50.0, 600.0), specimen="paper"):
     )
     facts = Of(name=f"noise {vpp}", bench={"specimen": specimen}, feedback=())
     analysis = Of(excitation=Of(amplitude_vpp=vpp), response=response, facts=facts)
-    return Of(kind="white_noise", analysis=analysis, laid=None)
+    return Of(kind="white_noise", analysis=analysis, overlay=None)
 
 
 def dwell(vpp, kind, frequency_hz=260.0, period=None):

@@ -231,11 +231,11 @@ class BranchDiagram(Labelled):
         count = sum(int(each.sum()) for each in is_unstable)
         held = sum(int((a & b).sum()) for a, b in zip(is_unstable, holdable, strict=True))
         quickest = min(float(line.growth_time_s.min()) for line in self.lines)
-        told = (
+        text = (
             f"A loop of {self.request.loop_time_s:.3g} s can hold motions whose deviations take "
             f"{self.least_growth_time_s:.3g} s or more to grow by e: {held} of {count} unstable motions"
         )
-        return told + (f"; the quickest takes {quickest:.2g} s." if count else ".")
+        return text + (f"; the quickest takes {quickest:.2g} s." if count else ".")
 
     @property
     def least_growth_time_s(self) -> float | None:

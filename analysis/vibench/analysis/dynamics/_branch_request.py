@@ -171,11 +171,11 @@ class BranchRequest(SpecimenChoice):
     @property
     def sentence(self) -> str:
         """Return the caption of a figure, with all options."""
-        said = f"{self.title}; {self.specimen_text}"
+        text = f"{self.title}; {self.specimen_text}"
         if self.resonance_band_hz is not None:
-            return f"{said}."
+            return f"{text}."
         return (
-            f"{said}; motions searched at {self.places} places from {self.starts} random states each, seed "
+            f"{text}; motions searched at {self.places} places from {self.starts} random states each, seed "
             f"{self.seed}, up to {self.most_periods} drive periods long."
         )
 

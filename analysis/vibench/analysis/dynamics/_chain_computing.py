@@ -177,9 +177,9 @@ class ChainAnswer(Labelled):
             else f"{gap.lower_hz:.4g} to {gap.upper_hz:.4g} Hz"
             for gap in self.gaps
         )
-        said = f"Band gaps of the infinite chain: {gaps}."
+        text = f"Band gaps of the infinite chain: {gaps}."
         if not self.runs:
-            return said
+            return text
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
         lost = sum(run.outcome != REACHED for run in self.runs)
         complaint = f"; {lost} did not reach their end" if lost else ""
@@ -188,7 +188,7 @@ class ChainAnswer(Labelled):
             met = sum(bool(np.all(run.transmission_error <= self.request.error)) for run in self.runs)
             exactly = f"; {met} reached an error of {100.0 * self.request.error:g} %"
         return (
-            f"{said} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts "
+            f"{text} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts "
             f"observed{exactly}{complaint}."
         )
 

@@ -71,7 +71,7 @@ def motion_words(motion: MapMotion) -> str:
 def map_caption(results: MapResults) -> str:
     """Return the caption: specimen, computed points, filled points and their error rate."""
     plan = results.plan
-    said = [
+    sentences = [
         (
             f"{', '.join((_specimen_words(plan.specimen), *_fixed(plan)))}; {plan.accuracy.value}; motions "
             f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} start(s)."
@@ -81,13 +81,13 @@ def map_caption(results: MapResults) -> str:
     audit = results.audit
     if audit is not None and audit.audited:
         share = audit.wrong_share
-        said.append(
+        sentences.append(
             f"The others lie between neighbours that agree; {audit.audited} such cells were drawn at "
             f"random and computed, and {audit.wrong} had another motion ({share.low:.1%} to "
             f"{share.high:.1%} of the "
             "filled)."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
@@ -105,9 +105,11 @@ def _fixed(plan: Map) -> list[str]:
     """Return the fixed parameters of a map, except a start at zero."""
     law = [] if plan.model is None else [f"model = {plan.model}"]
     values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
-    is_said = {name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()}
+    is_shown = {
+        name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()
+    }
     return law + [
-        f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and is_said[name]
+        f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and is_shown[name]
     ]
 
 

@@ -23,8 +23,8 @@ ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CO
 
 def _at(field: str, error: ValueError) -> ValidationError:
     """Return the error of one field, so that a form shows it beside the field."""
-    said = PydanticCustomError("value_error", "{said}", {"said": str(error)})
-    return ValidationError.from_exception_data(field, [{"type": said, "loc": (field,), "input": None}])
+    kind = PydanticCustomError("value_error", "{said}", {"said": str(error)})
+    return ValidationError.from_exception_data(field, [{"type": kind, "loc": (field,), "input": None}])
 
 
 class SpecimenChoice(FrozenModel):
@@ -82,12 +82,12 @@ class SpecimenChoice(FrozenModel):
     @property
     def specimen_text(self) -> str:
         """The specimen and its changes, for a caption."""
-        said = [f"specimen {Path(self.specimen).stem}, contact {self.law}"]
+        parts = [f"specimen {Path(self.specimen).stem}, contact {self.law}"]
         if self.gap_m is not None:
-            said.append(f"gap {1e6 * self.gap_m:g} µm")
+            parts.append(f"gap {1e6 * self.gap_m:g} µm")
         if self.damping_time_s is not None:
-            said.append(f"damping time {self.damping_time_s:g} s")
-        return ", ".join(said)
+            parts.append(f"damping time {self.damping_time_s:g} s")
+        return ", ".join(parts)
 
     @property
     def damping_sum_per_s(self) -> float:

@@ -78,10 +78,10 @@ def stated_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]
 
     A fact is a rate or an interval; its name may end with the unit: ``"dt_ms"``, ``"Sample rate [kHz]"``.
     """
-    said = list(_rates_hz(facts))
-    other = next((each for each in said if not agrees(each, (said[0], said[0]))), None)
-    trouble = "" if other is None else f"says {said[0]:.9g} and {other:.9g} samples/s"
-    return (said[0] if said else None), trouble
+    rates_hz = list(_rates_hz(facts))
+    other = next((each for each in rates_hz if not agrees(each, (rates_hz[0], rates_hz[0]))), None)
+    trouble = "" if other is None else f"says {rates_hz[0]:.9g} and {other:.9g} samples/s"
+    return (rates_hz[0] if rates_hz else None), trouble
 
 
 def _rates_hz(facts: Iterable[tuple[str, Any]]) -> Iterator[float]:
@@ -109,7 +109,7 @@ def _text(value: Any) -> str:
     return text_of(single[0]) if isinstance(single[0], bytes) else str(single[0])
 
 
-def told_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
+def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
     """Return the stated time of a channel's first sample, from facts with the nearest first.
 
     If a date and an offset are stated, as in NI's waveforms, their sum is returned.
@@ -133,10 +133,10 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
 
     Any channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
     """
-    found, said = _TIME.fullmatch(channel.label.strip()), channel.unit.casefold()
+    found, unit = _TIME.fullmatch(channel.label.strip()), channel.unit.casefold()
     first = next(iterator := iter(blocks), np.empty(0))
-    scan = _begin(first) if found is not None or said in _NO_UNITS else None
-    is_named = found is not None and said in SECONDS
+    scan = _begin(first) if found is not None or unit in _NO_UNITS else None
+    is_named = found is not None and unit in SECONDS
     # Times that are all the same were rounded too much to contradict anything.
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
@@ -152,7 +152,7 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
         return replace(axis, unit=None)
     # Numbers under another name may have any unit, so the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
-    return replace(axis, unit=channel.unit if said in SECONDS else "", uncertainty=uncertainty)
+    return replace(axis, unit=channel.unit if unit in SECONDS else "", uncertainty=uncertainty)
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
@@ -197,18 +197,20 @@ class TimeAxis:
         if (unit := self.unit) is None:
             return replace(channel, runs=self.runs, time_trouble=trouble)
         bounds = rate_bounds(self.interval, self.uncertainty, unit)
-        told = channel.sample_rate_hz
-        if told is not None and not unit:
+        rate_hz = channel.sample_rate_hz
+        if rate_hz is not None and not unit:
             # Choose the unit of the times that agrees with the stated rate.
             units = {each: rate_bounds(self.interval, self.uncertainty, each) for each in _UNITS}
-            unit, bounds = next(((a, b) for a, b in units.items() if b and agrees(told, b)), (unit, bounds))
+            unit, bounds = next(
+                ((a, b) for a, b in units.items() if b and agrees(rate_hz, b)), (unit, bounds)
+            )
         second = SECONDS[unit.casefold()]
-        if told is not None and bounds is not None and not agrees(told, bounds):
-            trouble = f"says {told:.9g} samples/s, and its times say {sum(bounds) / 2:.9g}"
+        if rate_hz is not None and bounds is not None and not agrees(rate_hz, bounds):
+            trouble = f"says {rate_hz:.9g} samples/s, and its times say {sum(bounds) / 2:.9g}"
         is_exact = bounds is not None and self.uncertainty == 0
         return replace(
             channel,
-            sample_rate_hz=told if told is not None or not is_exact or bounds is None else bounds[0],
+            sample_rate_hz=rate_hz if rate_hz is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
             # Times that start at zero are relative to the stated start.
             start_s=self.start * second
@@ -435,9 +437,9 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
     ]
     lengths = {each.samples for each in placed}
     if len(lengths) > 1 and not any(offsets) and not any(len(each.runs) > 1 for each in placed):
-        said = ", ".join(f"{each.name} {each.samples}" for each in placed)
+        counts = ", ".join(f"{each.name} {each.samples}" for each in placed)
         raise InvalidRequest(
-            f"the channels of {path.name} differ in their numbers of samples ({said}), and those of a "
+            f"the channels of {path.name} differ in their numbers of samples ({counts}), and those of a "
             "recording share one clock; choose channels of one length"
         )
     places = min(each[-1].end for each in cut)
@@ -461,15 +463,15 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
     for each in channels:
         if mapping.time == "even":
             low, high = each.rates_hz
-            told = "no sample rate" if high == inf else f"{(low + high) / 2:.9g} samples/s"
+            rate_text = "no sample rate" if high == inf else f"{(low + high) / 2:.9g} samples/s"
             runs = f", jumps {len(each.runs) - 1} times" if len(each.runs) > 1 else ""
             start = f", starts at {each.start_s:.9g} s" if each.start_s else ""
             trouble = f", {each.time_trouble}" if each.time_trouble else ""
-            said = f"{told}{start}{runs}{trouble}"
-            yield f"the mapping's {given:.9g} samples/s replace what the file says ({said})"
+            text = f"{rate_text}{start}{runs}{trouble}"
+            yield f"the mapping's {given:.9g} samples/s replace what the file says ({text})"
         elif each.time_unit is not None and mapping.time_unit not in {None, each.time_unit}:
-            said = each.time_unit or "no unit"
-            yield f"times are in {mapping.time_unit} according to the mapping; the file says {said}"
+            text = each.time_unit or "no unit"
+            yield f"times are in {mapping.time_unit} according to the mapping; the file says {text}"
         elif each.time_unit == "" and given is not None:
             unit = _with_unit(each, mapping).time_unit
             if unit:
@@ -506,20 +508,20 @@ def _in_unit(channel: SourceChannel, unit: str) -> SourceChannel:
 
 def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> float:
     """Return the sample rate of the mapping, otherwise of the file."""
-    said = sorted({each.sample_rate_hz for each in channels if each.sample_rate_hz is not None})
+    rates_hz = sorted({each.sample_rate_hz for each in channels if each.sample_rate_hz is not None})
     longest = max(each.samples for each in channels)
     given = mapping.sample_rate_hz
-    if given is None and (not said or not _same(said, longest)):
-        why = "does not say its sample rate exactly" if not said else "says several sample rates"
+    if given is None and (not rates_hz or not _same(rates_hz, longest)):
+        why = "does not say its sample rate exactly" if not rates_hz else "says several sample rates"
         raise InvalidRequest(f"{path.name} {why}; give sample_rate_hz in the mapping")
-    rate = given if given is not None else said[0]
+    rate = given if given is not None else rates_hz[0]
     for each in channels:
         low, high = each.rates_hz
         if not agrees(rate, (low, high)):
-            told = f"about {(low + high) / 2:.5g}" if each.sample_rate_hz is None else f"{low:.9g}"
+            rate_text = f"about {(low + high) / 2:.5g}" if each.sample_rate_hz is None else f"{low:.9g}"
             way = "export the file again" if each.sample_rate_hz is None else "leave its sample_rate_hz out"
             raise InvalidRequest(
-                f"{path.name} says {told} samples/s, and the mapping {rate:.9g}; correct the mapping, "
+                f"{path.name} says {rate_text} samples/s, and the mapping {rate:.9g}; correct the mapping, "
                 f"or {way}; or {_IGNORE}"
             )
         highest_hz = mapping.measurement.excitation.band_hz[1]
@@ -528,10 +530,10 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
                 f"the times of {path.name} have no unit; in seconds they give {rate:.6g} samples/s, too few "
                 f"for the {highest_hz:g} Hz of the plan; give time_unit in the mapping"
             )
-    if not _same(said, longest):
+    if not _same(rates_hz, longest):
         raise InvalidRequest(
-            f"{path.name} says {said[0]:.9g} and {said[-1]:.9g} samples/s for channels that belong together: "
-            f"they drift apart; export them on one clock, or {_IGNORE}"
+            f"{path.name} says {rates_hz[0]:.9g} and {rates_hz[-1]:.9g} samples/s for channels that belong "
+            f"together: they drift apart; export them on one clock, or {_IGNORE}"
         )
     return rate
 

@@ -16,7 +16,7 @@ from typing import TextIO
 import numpy as np
 
 from ..signals.arrays import Reals
-from ._alignment import UNITS, stated_rate_hz, told_start_s
+from ._alignment import UNITS, stated_rate_hz, stated_start_s
 from ._clock_times import ClockTimes
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel, TableSource
@@ -141,7 +141,7 @@ Facts = Sequence[tuple[str, float]]
 
 def _channel(name: str, samples: int, label: str, unit: str, own: Facts, shared: Facts) -> SourceChannel:
     rate_hz, trouble = stated_rate_hz((*own, *shared))
-    start_s = told_start_s(own)
+    start_s = stated_start_s(own)
     return SourceChannel(name, samples, label, rate_hz, unit, start_s=start_s, time_trouble=trouble)
 
 
@@ -253,10 +253,10 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
     rows = [row for line in head if any(row := _row(line, layout))]
     named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]
     labels, units = named[-1], next((row for row in reversed(rows) if _are_units(row)), [""] * layout.columns)
-    said = [UNIT.search(each) for each in labels]
+    matches = [UNIT.search(each) for each in labels]
     return (
         [UNIT.sub("", each).strip() for each in labels],
-        [other.strip("[]() ") if own is None else own[1] for own, other in zip(said, units, strict=True)],
+        [other.strip("[]() ") if own is None else own[1] for own, other in zip(matches, units, strict=True)],
     )
 
 

@@ -15,7 +15,7 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz, told_start_s
+from ._alignment import stated_rate_hz, stated_start_s
 from ._source_channel import SourceChannel, scale_among, unit_among
 
 FEWEST_SAMPLES = 2
@@ -84,8 +84,8 @@ def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
             raise UnusableData(
                 f"{path.name} announces {cut[2]} bytes, and {cut[1]} are there; copy or export it again"
             ) from error
-        if said := system_error(error):
-            raise UnusableData(f"{path.name} could not be read ({said}); check the disk") from error
+        if reason := system_error(error):
+            raise UnusableData(f"{path.name} could not be read ({reason}); check the disk") from error
         raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
     with file:
         yield Hdf5Source(file, dict(_places(file)))
@@ -96,15 +96,15 @@ def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
     for dataset in (item for _, item in walk(file) if _holds_samples(item)):
         facts = (*dataset.attrs.items(), *_facts(dataset.parent, known))
         rate_hz, trouble = stated_rate_hz(facts)
-        said = {"sample_rate_hz": rate_hz, "time_trouble": trouble, "start_s": told_start_s(facts)}
+        values = {"sample_rate_hz": rate_hz, "time_trouble": trouble, "start_s": stated_start_s(facts)}
         if dataset.ndim == 1:
-            yield _channel(dataset, dataset.name, dataset.shape[0], 0, said), _Place(dataset.name, None)
+            yield _channel(dataset, dataset.name, dataset.shape[0], 0, values), _Place(dataset.name, None)
             continue
         has_time_first = dataset.shape[0] >= dataset.shape[1]
         samples, rows = dataset.shape if has_time_first else dataset.shape[::-1]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
-            yield _channel(dataset, name, samples, row, said), _Place(dataset.name, row, has_time_first)
+            yield _channel(dataset, name, samples, row, values), _Place(dataset.name, row, has_time_first)
 
 
 def _holds_samples(item: h5py.HLObject) -> bool:
@@ -118,7 +118,7 @@ def _holds_samples(item: h5py.HLObject) -> bool:
 
 
 def _channel(
-    dataset: h5py.Dataset, name: str, samples: int, place: int, said: Mapping[str, Any]
+    dataset: h5py.Dataset, name: str, samples: int, place: int, values: Mapping[str, Any]
 ) -> SourceChannel:
     scale = abs(_number(dataset, "scale_factor", 1.0))
     is_exact = dataset.dtype.itemsize <= EXACT_KINDS.get(dataset.dtype.kind, 0)
@@ -131,14 +131,14 @@ def _channel(
         stated_scale="" if "scale_factor" in dataset.attrs else scale_among(dataset.attrs.items()),
         step=scale if is_exact else None,
         origin=_origin(dataset.file),
-        **said,
+        **values,
     )
 
 
 def _origin(file: h5py.File) -> Origin | None:
     """Read the origin stated by a recording or by an export of one."""
-    said = str(file.attrs.get("origin", ""))
-    return Origin(said) if said in set(Origin) else None
+    origin = str(file.attrs.get("origin", ""))
+    return Origin(origin) if origin in set(Origin) else None
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:

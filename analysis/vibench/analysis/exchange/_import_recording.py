@@ -62,17 +62,17 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
     """
     planned = list(_recorded_steps(mapping.measurement.excitation))
     stretches = _stated_times(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
-    laid = [
+    parts = [
         LaidPart(each.segment, round(start_s * sample_rate_hz), round(min(stop_s * sample_rate_hz, FARTHEST)))
         for each, (start_s, stop_s) in zip(planned, stretches, strict=False)
         if start_s * sample_rate_hz < FARTHEST and round(start_s * sample_rate_hz) < samples
     ]
-    if not laid:
+    if not parts:
         raise InvalidRequest(
             f"no part of the plan begins within the {samples / sample_rate_hz:.3g} s of the file; "
             "correct begins_s or parts"
         )
-    return tuple(laid)
+    return tuple(parts)
 
 
 def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_Planned]:
@@ -199,13 +199,13 @@ def import_recording(
 
 def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
     """Return the origin; one simulated channel makes the whole recording simulated."""
-    told = {each.source.origin for each in wanted if each.source.origin is not None}
-    if mapping.origin is not None and told - {mapping.origin}:
+    origins = {each.source.origin for each in wanted if each.source.origin is not None}
+    if mapping.origin is not None and origins - {mapping.origin}:
         raise InvalidRequest(
             f"the mapping says origin = {mapping.origin.value!r}, and {path.name} that it is "
-            f"{' and '.join(sorted(told))}; leave origin out of the mapping, or import another file"
+            f"{' and '.join(sorted(origins))}; leave origin out of the mapping, or import another file"
         )
-    return Origin.SIMULATED if Origin.SIMULATED in {*told, mapping.origin} else Origin.REAL
+    return Origin.SIMULATED if Origin.SIMULATED in {*origins, mapping.origin} else Origin.REAL
 
 
 def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:

@@ -109,29 +109,29 @@ class ChannelMapping(FrozenModel):
         Raises ValueError when the scale contradicts the unit, or is needed and missing.
         """
         file_unit, unit, scale = self.file_unit or file_unit, self.kind[1], self.scale
-        said = f"{self.role} is in {file_unit!r} in the file"
+        text = f"{self.role} is in {file_unit!r} in the file"
         size, volts = size_of_unit(file_unit, unit), size_of_unit(file_unit, "V")
         if isinstance(scale, str):
             if unit == "V":
                 raise ValueError(f"scale = {scale!r} was given for {self.role}, a voltage; give a number")
             if volts is None and file_unit not in _NO_UNIT:
                 raise ValueError(
-                    f"{said}, but scale = {scale!r} is for a file in volts; give scale as a number of "
+                    f"{text}, but scale = {scale!r} is for a file in volts; give scale as a number of "
                     f'{unit!r} per {file_unit!r}, or file_unit = "V" if the file is wrong'
                 )
             return (volts or 1.0) / volts_per_unit(scale, unit)
         is_known = size_of_unit(unit, unit) is not None and file_unit not in _NO_UNIT
         if size is not None and scale is not None and abs(abs(scale) / size - 1) > _LARGEST_CORRECTION:
             raise ValueError(
-                f"{said}, which is {size:g} {unit}, but scale = {scale:g} was given; leave scale out, or "
+                f"{text}, which is {size:g} {unit}, but scale = {scale:g} was given; leave scale out, or "
                 "give file_unit if the file is wrong"
             )
         if is_known and size is None and (scale is None or _is_another_quantity(file_unit)):
             raise ValueError(
-                f"{said}, and the recording needs {unit!r}; give scale as a number of {unit!r} per "
+                f"{text}, and the recording needs {unit!r}; give scale as a number of {unit!r} per "
                 f"{file_unit!r}, choose another channel, or give file_unit if the file is wrong"
                 if volts is None
-                else f"{said}; give the sensitivity of its sensor as scale, such as '50 mV/({unit})'"
+                else f"{text}; give the sensitivity of its sensor as scale, such as '50 mV/({unit})'"
             )
         return (1.0 if size is None else size) if scale is None else scale
 

@@ -21,7 +21,7 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz, told_start_s
+from ._alignment import stated_rate_hz, stated_start_s
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
@@ -216,7 +216,7 @@ def _numbers(
     # Some programs store start and increment in a struct beside the values.
     own = {**struct, **(axis if isinstance(axis := struct.get("x_values"), dict) else {})}
     facts = (*((name, value) for name, value in own.items() if np.size(value) == 1), *around)
-    start_s = told_start_s(facts)
+    start_s = stated_start_s(facts)
     rate_hz, trouble = stated_rate_hz(facts)
     scale = "" if "scale_factor" in struct else scale_among(facts)
     for name, value in struct.items():
@@ -226,8 +226,8 @@ def _numbers(
             case np.ndarray() if _holds_samples(value):
                 for place, (channel, row) in enumerate(_channels(f"{prefix}{name}", value)):
                     unit = unit_among(struct.items(), place)
-                    told = replace(channel, unit=unit, stated_scale=scale, sample_rate_hz=rate_hz)
-                    yield replace(told, start_s=start_s, time_trouble=trouble), row
+                    with_unit = replace(channel, unit=unit, stated_scale=scale, sample_rate_hz=rate_hz)
+                    yield replace(with_unit, start_s=start_s, time_trouble=trouble), row
 
 
 def _holds_samples(values: np.ndarray[Any, Any]) -> bool:

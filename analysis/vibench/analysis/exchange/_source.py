@@ -125,8 +125,8 @@ def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
             # HDF5 sorts names by alphabet, so their order does not show which times belong to a channel.
             named = ", ".join(shortened(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
             axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
-        told = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
-        yield axes[chosen[0]].of(told) if chosen else told
+        channel = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
+        yield axes[chosen[0]].of(channel) if chosen else channel
 
 
 def _group(channel: SourceChannel) -> str:
@@ -172,8 +172,8 @@ def _readable(path: Path) -> Iterator[None]:
     except (InvalidRequest, UnusableData):
         raise
     except DAMAGE as error:
-        if said := system_error(error):
-            raise UnusableData(f"{path.name} could not be read ({said}); check the disk") from error
+        if reason := system_error(error):
+            raise UnusableData(f"{path.name} could not be read ({reason}); check the disk") from error
         raise UnusableData(
             f"{path.name} is damaged, or not what its suffix says ({shortened(str(error))}); copy or export "
             "it again"

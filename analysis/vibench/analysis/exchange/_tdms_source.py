@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import restarts, stated_rate_hz, told_start_s
+from ._alignment import restarts, stated_rate_hz, stated_start_s
 from ._source_channel import SourceChannel, scale_among, unit_among
 
 SIGNATURE = b"TDSm"
@@ -100,7 +100,7 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
     starts_s = {
         first: start_s
         for first, each in (statements[channel.path] if own else {}).items()
-        if (start_s := told_start_s(each)) is not None and first < len(channel)
+        if (start_s := stated_start_s(each)) is not None and first < len(channel)
     }
     runs, jumps = restarts(starts_s, rate_hz, len(channel))
     return SourceChannel(
@@ -110,7 +110,7 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
         sample_rate_hz=rate_hz,
         unit="s" if channel.dtype.kind == "M" else unit_among(own.items()),
         stated_scale=scale_among(own.items()),
-        start_s=next(iter(starts_s.values()), told_start_s(own.items())),
+        start_s=next(iter(starts_s.values()), stated_start_s(own.items())),
         start_error_s=START_ERROR_S,
         runs=runs,
         time_trouble=trouble or jumps,

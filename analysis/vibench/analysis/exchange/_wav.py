@@ -114,12 +114,12 @@ def _require_whole(path: Path) -> None:
         file.seek(FIRST_CHUNK)
         chunks = 0
         while order is not None:
-            name, told = file.read(4), file.read(4)
-            if len(told) < len(name) or not name:
+            name, size_bytes = file.read(4), file.read(4)
+            if len(size_bytes) < len(name) or not name:
                 if chunks:
                     return
                 raise ValueError("it ends before its samples")
-            (size,) = struct.unpack(f"{order}I", told)
+            (size,) = struct.unpack(f"{order}I", size_bytes)
             left = path.stat().st_size - file.tell()
             if left < size != UNKNOWN_SIZE and not chunks:
                 what = "of samples" if name == b"data" else "about its samples"

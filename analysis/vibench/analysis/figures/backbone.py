@@ -36,12 +36,12 @@ _MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 
 
 
 def backbone_figure(
-    analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None
+    analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None = None
 ) -> style.DrawnFigure:
     """Draw resonance and amplitude over level, and the backbone; mark levels without a resonance."""
     levels = tracked_resonances(analysis.facts.feedback)
     base = np.array([each.base_m_per_s2 for each in levels])
-    simulated_m = _simulated_m(levels, analysis, laid)
+    simulated_m = _simulated_m(levels, analysis, overlay)
     lost = lost_levels(analysis.facts.feedback)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
@@ -147,12 +147,17 @@ def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
 
 
 def _simulated_m(
-    levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None
+    levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None
 ) -> Reals | None:
     """Return m0's simulated amplitude at each level, if each level has one recorded stretch."""
-    if laid is None or not levels[0].is_fundamental or laid.response.left_out or analysis.response.left_out:
+    if (
+        overlay is None
+        or not levels[0].is_fundamental
+        or overlay.response.left_out
+        or analysis.response.left_out
+    ):
         return None
-    found = laid.response.response_ii * laid.response.drive_amplitude_m
+    found = overlay.response.response_ii * overlay.response.drive_amplitude_m
     return found[[each.number for each in levels]] if max(_numbers(levels)) < found.size else None
 
 

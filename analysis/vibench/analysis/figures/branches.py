@@ -119,12 +119,12 @@ def _growth(
     """Draw the growth rates of unstable motions; this bench cannot hold motions below the line."""
     for line, held in zip(diagram.lines, holdable, strict=True):
         place, grows = _place(diagram, line), ~line.is_stable
-        for told, chosen, colour in (
+        for label, chosen, colour in (
             ("holdable", grows & held, style.MEASURED),
             ("not holdable by this bench", grows & ~held, style.SIMULATED),
         ):
             if np.any(chosen):
-                axes.plot(place[chosen], line.growth_time_s[chosen], ".", color=colour, label=told)
+                axes.plot(place[chosen], line.growth_time_s[chosen], ".", color=colour, label=label)
     axes.axhline(least_s, color=style.MEASURED, linewidth=0.8, linestyle=":", label=f"{least_s:.3g} s")
     axes.set_yscale("log")
     low, high = axes.get_ylim()

@@ -48,17 +48,17 @@ def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
 
 
 def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
-    said = (
+    caption = (
         "Above: phase and decay from unit to unit in the endless chain without contact; grey: gaps. Below: "
         "transmission from the base to m0 of cells, without contact and as driven."
     )
     if last is not None:
         what = "x of m0" if found.request.drive is ChainDrive.STEADY else "root mean square of x of m0"
-        said += (
+        caption += (
             f" Map: {what} over place and time in the last run, dots: impacts. Bottom: mean energy, with its "
             "standard error, and impacts of every cell."
         )
-    return f"{said} {found.cost_sentence} {found.request.sentence}"
+    return f"{caption} {found.cost_sentence} {found.request.sentence}"
 
 
 def _shade(axes: Axes, found: ChainAnswer) -> None:

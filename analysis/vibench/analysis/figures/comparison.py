@@ -117,15 +117,15 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
 
 def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
     """Return the caption: note of each curve, and the difference of the pair."""
-    said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
-    said.append("Shaded: two standard deviations.")
+    sentences = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
+    sentences.append("Shaded: two standard deviations.")
     if pair is not None:
         difference = curve_difference(*pair)
-        said.append(
+        sentences.append(
             f"Difference of {pair[0].name} over {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
             f"root mean square {difference.rms_db:.2g} dB."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def comparison_tables(

@@ -88,7 +88,7 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     """Return the caption with the shares of noise and distortion in the scatter."""
     found = distortion(periodic)
-    said = [
+    parts = [
         (
             f"From {periodic.realisations} realisations: noise of the channels or chaos of the specimen, "
             "which do not repeat from period to period, give one realisation a standard deviation of "
@@ -96,14 +96,14 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
         )
     ]
     if found.distortion_share is None:
-        said.append("; one realisation cannot show distortion.")
+        parts.append("; one realisation cannot show distortion.")
     else:
         # Near a narrow mode whose frequency drifts, some of the drift remains and counts as distortion.
         most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
-        said.append(f", distortion {most}{_percent(found.distortion_share)}.")
+        parts.append(f", distortion {most}{_percent(found.distortion_share)}.")
     if periodic.drift is not None:
-        said.append(f" The {periodic.drift.text}; this is not distortion.")
-    return "".join(said) + _quiet_text(found)
+        parts.append(f" The {periodic.drift.text}; this is not distortion.")
+    return "".join(parts) + _quiet_text(found)
 
 
 def _percent(share: float) -> str:

@@ -39,10 +39,10 @@ def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
     with style.styled():
         figure = style.new_figure(_FRAME_IN + _ROW_IN * len(rising))
         panels = figure.subplots(len(rising), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.5))
-        for row, (analysis, laid) in zip(panels, rising, strict=True):
+        for row, (analysis, overlay) in zip(panels, rising, strict=True):
             _whole(row[0], analysis)
-            _zoom(row[1], analysis.response, laid)
-            _spectrum(row[2], analysis.response, laid, at)
+            _zoom(row[1], analysis.response, overlay)
+            _spectrum(row[2], analysis.response, overlay, at)
         for axes, label in zip(panels[-1], ("time [s]", "time [ms]", "frequency [Hz]"), strict=True):
             axes.set_xlabel(label)
         panels[0, 0].set_title("whole dwell")
@@ -78,24 +78,24 @@ def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
     return time_s, response.displacement.settled[-count:]
 
 
-def _zoom(axes: Axes, response: DwellResponse, laid: DwellOverlay | None) -> None:
+def _zoom(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None) -> None:
     time_s, motion = last_periods(response)
     factor, unit = style.prefixed(float(np.max(np.abs(motion))), "m")
     axes.plot(1e3 * time_s, factor * motion, color=style.MEASURED, linewidth=1.2, label="measured")
-    if laid is not None:
-        simulated = factor * last_periods(laid.response)[1]
-        axes.plot(1e3 * time_s, simulated, label=simulated_label(laid.run), **style.SIMULATED_CURVE)
+    if overlay is not None:
+        simulated = factor * last_periods(overlay.response)[1]
+        axes.plot(1e3 * time_s, simulated, label=simulated_label(overlay.run), **style.SIMULATED_CURVE)
     axes.set_xlim(1e3 * float(time_s[0]), 0)
     axes.set_ylabel(f"x [{unit}]")
 
 
-def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at: ModelResonances) -> None:
+def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None, at: ModelResonances) -> None:
     mark_resonances(axes, ModelResonances((), at.bound_hz))
     frequency_hz, size = spectrum_columns(response)
     axes.plot(frequency_hz, size, color=style.MEASURED, linewidth=1.0)
-    if laid is not None:
-        middle = draw_band(axes, frequency_hz, laid, SPECTRUM)
-        curve = spectrum_columns(laid.response) if middle is None else (frequency_hz, middle)
+    if overlay is not None:
+        middle = draw_band(axes, frequency_hz, overlay, SPECTRUM)
+        curve = spectrum_columns(overlay.response) if middle is None else (frequency_hz, middle)
         axes.plot(*curve, color=style.SIMULATED, linewidth=0.6, zorder=3)
     style.magnitude_axis(axes)
     top = float(np.max(size))
@@ -106,24 +106,24 @@ def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at
 
 def dwells_caption(rising: Sequence[Pair]) -> str:
     """Return the caption with responses and terminal-band amplitudes for each level."""
-    said = []
-    for analysis, laid in rising:
+    sentences = []
+    for analysis, overlay in rising:
         found = analysis.response
         text = (
             f"{analysis.excitation.amplitude_vpp:g} Vpp (A0 = {1e6 * found.drive.amplitude_m:.3g} µm): "
             f"Response I {found.response_i:.3g}, Response II "
             f"{plus_minus(found.response_ii, 2 * found.sd_response_ii)}"
         )
-        if laid is not None:
-            text += f". {run_text(laid)}"
+        if overlay is not None:
+            text += f". {run_text(overlay)}"
         bands = ", ".join(
             f"{each.decibel:.1f} dB around {each.towards_hz:.0f} Hz" for each in analysis.terminal
         )
-        said.append(f"{text} Measured bands: {bands} re the drive's line." if bands else text)
+        sentences.append(f"{text} Measured bands: {bands} re the drive's line." if bands else text)
     window_s = rising[0][0].response.window_s
     text = (
         f"Displacement of {rising[0][0].facts.mass} and its spectrum over the last {window_s:.3g} s "
-        f"(largest line in each {COLUMN_HZ:g} Hz). {' '.join(said)}"
+        f"(largest line in each {COLUMN_HZ:g} Hz). {' '.join(sentences)}"
     )
     if all(analysis.motion.verdict.kind is MotionKind.PERIODIC for analysis, _ in rising):
         return text
@@ -134,16 +134,16 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
 
 
 def _tables(pair: Pair) -> tuple[Table, ...]:
-    analysis, laid = pair
+    analysis, overlay = pair
     name = f"dwell_{analysis.facts.name}"
     frequency_hz, size = spectrum_columns(analysis.response)
     time_s, motion = last_periods(analysis.response)
     spectrum = {"frequency_hz": frequency_hz, "amplitude_over_a0": size}
     signal = {"time_s": time_s, "displacement_m": motion}
-    if laid is not None:
-        spectrum |= band_columns(laid, SPECTRUM, "amplitude_over_a0")
-        spectrum["amplitude_over_a0_simulated"] = spectrum_columns(laid.response)[1]
-        signal["displacement_simulated_m"] = last_periods(laid.response)[1]
+    if overlay is not None:
+        spectrum |= band_columns(overlay, SPECTRUM, "amplitude_over_a0")
+        spectrum["amplitude_over_a0_simulated"] = spectrum_columns(overlay.response)[1]
+        signal["displacement_simulated_m"] = last_periods(overlay.response)[1]
     whole = analysis.displacement
     return (
         table(f"{name}_spectrum", **spectrum),

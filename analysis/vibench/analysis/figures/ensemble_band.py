@@ -38,7 +38,7 @@ def simulated_label(run: SimulatedRun) -> str:
 def draw_band(
     axes: Axes,
     along: Reals,
-    laid: AbstractOverlay[Any],
+    overlay: AbstractOverlay[Any],
     name: str,
     shown: Callable[[Reals], Reals] = lambda values: values,
 ) -> Reals | None:
@@ -46,8 +46,8 @@ def draw_band(
 
     ``along`` has the abscissae of the quantity; ``shown`` converts its values to those of the axis.
     """
-    found = laid.quantity(name)
-    if found is None or laid.run.draws == 1:
+    found = overlay.quantity(name)
+    if found is None or overlay.run.draws == 1:
         return None
     # The label omits the number of draws, which differs between recordings; the caption states it.
     look: dict[str, Any] = {"color": style.SIMULATED, "alpha": 0.25, "zorder": 1.5, "label": "95 % of draws"}
@@ -55,37 +55,37 @@ def draw_band(
     return shown(found.median)
 
 
-def run_text(laid: AbstractOverlay[Any]) -> str:
+def run_text(overlay: AbstractOverlay[Any]) -> str:
     """Return sentences on the simulation, and on where the measurement lies among its draws."""
-    run = laid.run
+    run = overlay.run
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
         return (
             f"Simulated under the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
-            f"median difference {laid.difference.median_abs_db:.2g} dB, "
-            f"{100 * laid.difference.share_within_two:.0f} % of the values within two standard errors. The "
-            "simulated impacts do not move the recorded base, so that in chaos the two differ."
+            f"median difference {overlay.difference.median_abs_db:.2g} dB, "
+            f"{100 * overlay.difference.share_within_two:.0f} % of the values within two standard errors. "
+            "The simulated impacts do not move the recorded base, so that in chaos the two differ."
         )
-    said = [
+    parts = [
         (
             f"Rig and specimen simulated together under the {run.driven.value}, {run.draws} draws from "
             f"slightly different starts, {run.impact_rate_hz:.0f} impacts per second"
         ),
-        *laid.agreement,
+        *overlay.agreement,
     ]
-    ending = [] if laid.escape is None else [laid.escape.sentence]
+    ending = [] if overlay.escape is None else [overlay.escape.sentence]
     known = [run.why] if run.why else []
-    return ". ".join(["; ".join(said), *ending, *known]) + "."
+    return ". ".join(["; ".join(parts), *ending, *known]) + "."
 
 
-def agreement_text(laid: AbstractOverlay[Any]) -> str:
+def agreement_text(overlay: AbstractOverlay[Any]) -> str:
     """Return the end of a sentence: where the measurement lies among the draws; empty under a base motion."""
-    if not laid.run.driven.by_voltage:
+    if not overlay.run.driven.by_voltage:
         return ""
-    said = [*laid.agreement]
-    if laid.escape is not None:
-        said.append(laid.escape.sentence)
-    return "".join(f"; {each}" for each in said)
+    parts = [*overlay.agreement]
+    if overlay.escape is not None:
+        parts.append(overlay.escape.sentence)
+    return "".join(f"; {each}" for each in parts)
 
 
 def sines_table(name: str, sines: ResponsePrediction) -> Table:
@@ -94,10 +94,10 @@ def sines_table(name: str, sines: ResponsePrediction) -> Table:
     return table(f"{name}_sines", **columns(sines, keys))
 
 
-def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
+def band_columns(overlay: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
     """Return table columns with median and band of the draws of a quantity."""
-    found = laid.quantity(name)
-    if found is None or laid.run.draws == 1:
+    found = overlay.quantity(name)
+    if found is None or overlay.run.draws == 1:
         return {}
     return {
         f"{column}_draws_median": found.median,
@@ -108,12 +108,12 @@ def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str
     }
 
 
-def simulated_responses(laid: SweepOverlay | SteppedSineOverlay) -> dict[str, Reals]:
+def simulated_responses(overlay: SweepOverlay | SteppedSineOverlay) -> dict[str, Reals]:
     """Return table columns with the simulated responses to sines, and median and band of their draws."""
     return {
-        **columns(laid.response, "response_i_simulated=response_i response_ii_simulated=response_ii"),
-        **band_columns(laid, RESPONSE_I, "response_i"),
-        **band_columns(laid, RESPONSE_II, "response_ii"),
+        **columns(overlay.response, "response_i_simulated=response_i response_ii_simulated=response_ii"),
+        **band_columns(overlay, RESPONSE_I, "response_i"),
+        **band_columns(overlay, RESPONSE_II, "response_ii"),
     }
 
 

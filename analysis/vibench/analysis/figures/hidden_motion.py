@@ -57,9 +57,12 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     length = max(1, motion.tracked.p.size // _COLUMNS)
     count = motion.tracked.p.size // length
     pieces = motion.tracked.p[: count * length].reshape(count, length)
-    told = ~np.isnan(pieces).all(axis=1)
+    is_tracked = ~np.isnan(pieces).all(axis=1)
     low, high = np.full(count, np.nan), np.full(count, np.nan)
-    low[told], high[told] = np.nanmin(pieces[told], axis=1), np.nanmax(pieces[told], axis=1)
+    low[is_tracked], high[is_tracked] = (
+        np.nanmin(pieces[is_tracked], axis=1),
+        np.nanmax(pieces[is_tracked], axis=1),
+    )
     time_s = motion.time_s[: count * length : length]
     axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED)
     _stops(axes, motion)
@@ -132,8 +135,8 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     axes.set_xlabel("penetration [µm]")
     axes.set_ylabel("force [N]")
     at_1um, exponent = found.get(Hidden.FORCE), found.get(Hidden.EXPONENT)
-    is_told = at_1um is not None and exponent is not None and at_1um.is_determined
-    if not is_told or at_1um is None or exponent is None:
+    is_determined = at_1um is not None and exponent is not None and at_1um.is_determined
+    if not is_determined or at_1um is None or exponent is None:
         axes.set_title("as described: not told by this motion", fontsize="small")
         return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
     low, high = _band(depth, at_1um, exponent)

@@ -181,9 +181,9 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
     _, label = _axis_edges(results, quantity)
     factor = _axis_edges(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
     for index, start in enumerate(results.plan.start_labels):
-        colour, said = _UP_AND_DOWN.get(start, (style.LEVELS[index % len(style.LEVELS)], f"from {start}"))
+        colour, text = _UP_AND_DOWN.get(start, (style.LEVELS[index % len(style.LEVELS)], f"from {start}"))
         dots = {"color": colour, "linestyle": "none", "marker": "."}
-        panels[0].plot([], [], markersize=5.0, label=said, **dots)
+        panels[0].plot([], [], markersize=5.0, label=text, **dots)
         panels[0].plot(factor * values, results.shown("response_i", index), markersize=2.0, **dots)
         sections = MICRO * results.shown("section_p", index)
         places = np.repeat(factor * values[:, None], sections.shape[1], axis=1)

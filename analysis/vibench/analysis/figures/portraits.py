@@ -70,14 +70,14 @@ def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
 
 
 def _caption(rising: Sequence[DwellAnalysis]) -> str:
-    said = []
+    sentences = []
     for each in rising:
         verdict = each.motion.verdict
         text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict_text(verdict)} ({verdict.why})"
         if verdict.least_exponent_per_s is not None:
             text += f", largest exponent at least {verdict.least_exponent_per_s:.3g} per second"
-        said.append(text)
+        sentences.append(text)
     return (
         f"Velocity over displacement of {rising[0].facts.mass} (grey) and one point at the same "
-        f"phase of every recorded drive period (colour). {'. '.join(said)}."
+        f"phase of every recorded drive period (colour). {'. '.join(sentences)}."
     )

@@ -49,15 +49,15 @@ class SteppedLook(Generic[P]):
 
 
 def stepped_sine_figure(
-    analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]
+    analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, look: SteppedLook[Any]
 ) -> style.DrawnFigure:
     """Draw Responses I and II over the stepped quantity, with one marker for each direction."""
     along = look.along(analysis.response)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
         first, second = figure.subplots(2, 1, sharex=True)
-        _responses(first, along, analysis, laid, RESPONSE_I)
-        _responses(second, along, analysis, laid, RESPONSE_II)
+        _responses(first, along, analysis, overlay, RESPONSE_I)
+        _responses(second, along, analysis, overlay, RESPONSE_II)
         second.set_xlabel(look.axis)
         style.legend_above(figure, [first], columns=2)
     found = analysis.response
@@ -66,31 +66,31 @@ def stepped_sine_figure(
         "frequency_hz direction amplitude_vpp drive_amplitude_m response_i response_ii sd_response_ii "
         "phase_rad",
     )
-    if laid is not None:
-        content |= simulated_responses(laid)
+    if overlay is not None:
+        content |= simulated_responses(overlay)
     name = f"stepped_sine_{analysis.facts.name}"
     return style.DrawnFigure(
         name=name,
         title=look.title(analysis.excitation, found),
-        caption=_caption(analysis, laid, look),
+        caption=_caption(analysis, overlay, look),
         figure=figure,
         tables=(table(name, **content),),
     )
 
 
 def _responses(
-    axes: Axes, along: Reals, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str
+    axes: Axes, along: Reals, analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, what: str
 ) -> None:
     found, attribute = analysis.response, ATTRIBUTES[what]
-    if laid is not None:
-        draw_sines(axes, along, laid.prediction, what, "steady sines from rest")
+    if overlay is not None:
+        draw_sines(axes, along, overlay.prediction, what, "steady sines from rest")
     for direction in sorted(set(found.direction)):
         chosen = np.array([each == direction for each in found.direction])
         marker = _MARKERS.get(direction, "o")
         values = getattr(found, attribute)[chosen]
         axes.plot(along[chosen], values, marker, color=style.MEASURED, label=f"measured, {direction}")
-        if laid is not None:
-            _draw_simulated(axes, along, chosen, laid, what, (marker, direction))
+        if overlay is not None:
+            _draw_simulated(axes, along, chosen, overlay, what, (marker, direction))
     for jump in noted_jumps(analysis.facts.feedback):
         axes.axvspan(jump.low_hz, jump.high_hz, color=style.MEASURED, alpha=0.3)
     style.magnitude_axis(axes)
@@ -98,27 +98,29 @@ def _responses(
 
 
 def _draw_simulated(
-    axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
+    axes: Axes, along: Reals, chosen: Flags, overlay: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
     """Draw the median of the draws at each step in one direction, with the 95 % band as error bars."""
-    values, reach = getattr(laid.response, ATTRIBUTES[what])[chosen], None
-    found = laid.quantity(what)
-    if found is not None and laid.run.draws > 1:
+    values, reach = getattr(overlay.response, ATTRIBUTES[what])[chosen], None
+    found = overlay.quantity(what)
+    if found is not None and overlay.run.draws > 1:
         values = found.median[chosen]
         reach = np.clip([values - found.lower[chosen], found.upper[chosen] - values], 0.0, None)
     marker, direction = look
-    label = f"{simulated_label(laid.run)}, {direction}"
+    label = f"{simulated_label(overlay.run)}, {direction}"
     empty: dict[str, Any] = {"markerfacecolor": "none", "elinewidth": 0.8, "capsize": 1.5}
     axes.errorbar(along[chosen], values, reach, fmt=marker, color=style.SIMULATED, label=label, **empty)
 
 
-def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
+def _caption(
+    analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, look: SteppedLook[Any]
+) -> str:
     """Return the caption, with the agreement of the simulation if there is one."""
     text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
-    if laid is None:
+    if overlay is None:
         return text
-    return f"{text} {run_text(laid)}"
+    return f"{text} {run_text(overlay)}"
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
@@ -139,15 +141,17 @@ def stepped_level_caption(found: SteppedResponse) -> str:
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
     )
     jumps = level_jumps(found)
-    told = [
+    sentences = [
         f"Going {each.direction}, Response II changes by a factor of {each.factor:.3g} between "
         f"{each.before_vpp:.4g} and {each.after_vpp:.4g} Vpp."
         for each in jumps
     ]
     apart = hysteresis_vpp(jumps)
     if apart is not None:
-        told.append(f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back.")
-    return " ".join([text, *(told or ["No jump by more than a factor of two."])])
+        sentences.append(
+            f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back."
+        )
+    return " ".join([text, *(sentences or ["No jump by more than a factor of two."])])
 
 
 def tracked_caption(found: SteppedResponse) -> str:

@@ -26,14 +26,14 @@ from .hysteresis import jumps_text
 _HEIGHT_IN = 6.4
 
 
-def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> style.DrawnFigure:
+def sweep_figure(analysis: SweepAnalysis, overlay: SweepOverlay | None = None) -> style.DrawnFigure:
     """Draw the envelope in time with a frequency axis, and Responses I and II over frequency."""
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
-        _envelope(envelope, analysis, laid)
-        _responses(first, analysis, laid, RESPONSE_I)
-        _responses(second, analysis, laid, RESPONSE_II)
+        _envelope(envelope, analysis, overlay)
+        _responses(first, analysis, overlay, RESPONSE_I)
+        _responses(second, analysis, overlay, RESPONSE_II)
         second.set_xlabel("drive frequency [Hz]")
         first.tick_params(labelbottom=False)
         style.legend_above(figure, [envelope, first], columns=3)
@@ -41,13 +41,13 @@ def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> s
     return style.DrawnFigure(
         name=f"sweep_{analysis.facts.name}",
         title=f"Sweep, {analysis.excitation.amplitude_vpp:g} Vpp",
-        caption=sweep_caption(analysis, laid),
+        caption=sweep_caption(analysis, overlay),
         figure=figure,
-        tables=_tables(analysis, laid),
+        tables=_tables(analysis, overlay),
     )
 
 
-def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) -> None:
+def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None) -> None:
     found = analysis.response
     largest = float(max(np.max(found.upper), -np.min(found.lower)))
     factor, unit = style.prefixed(largest, "m/s")
@@ -56,11 +56,11 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) ->
         axes.axvspan(region.start.time_s, region.stop.time_s, color=style.COLLIDING, zorder=0, label=label)
     low, high, label = factor * found.lower, factor * found.upper, f"measured {analysis.facts.mass} velocity"
     axes.fill_between(found.time_s, low, high, color=style.MEASURED, alpha=0.85, label=label)
-    if laid is not None:
-        for number, outline in enumerate((laid.response.upper, laid.response.lower)):
-            label = simulated_label(laid.run) if number == 0 else None
+    if overlay is not None:
+        for number, outline in enumerate((overlay.response.upper, overlay.response.lower)):
+            label = simulated_label(overlay.run) if number == 0 else None
             axes.plot(
-                laid.response.time_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label
+                overlay.response.time_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label
             )
     axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
     axes.set_ylabel(f"{analysis.facts.mass} velocity\n[{unit}]")
@@ -82,19 +82,19 @@ def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
     top.set_xlabel("drive frequency [Hz]")
 
 
-def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, what: str) -> None:
+def _responses(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None, what: str) -> None:
     measured, attribute = analysis.response, ATTRIBUTES[what]
     for region in analysis.collisions.regions:
         axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
-    if laid is not None:
-        sines = laid.prediction
+    if overlay is not None:
+        sines = overlay.prediction
         draw_sines(axes, sines.frequency_hz, sines, what, "steady sines of the measured A0")
     response = getattr(measured, attribute)
     axes.plot(measured.frequency_hz, response, color=style.MEASURED, label="measured response")
-    if laid is not None:
-        middle = draw_band(axes, measured.frequency_hz, laid, what)
-        simulated = getattr(laid.response, attribute) if middle is None else middle
-        axes.plot(laid.response.frequency_hz, simulated, **style.SIMULATED_CURVE)
+    if overlay is not None:
+        middle = draw_band(axes, measured.frequency_hz, overlay, what)
+        simulated = getattr(overlay.response, attribute) if middle is None else middle
+        axes.plot(overlay.response.frequency_hz, simulated, **style.SIMULATED_CURVE)
     for number, jump in enumerate(analysis.jumps):
         named = "jump" if number == 0 else None
         axes.axvline(jump.frequency_hz, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=named)
@@ -104,11 +104,11 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
     axes.set_ylabel(RESPONSE_LABELS[what])
 
 
-def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
+def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
     """Return the caption with the collisions, their bounds, and the agreement of the simulation."""
     found = analysis.response
     amplitudes = 1e6 * found.drive_amplitude_m
-    said = [
+    sentences = [
         (
             f"Sweep at {analysis.excitation.amplitude_vpp:g} Vpp from {found.frequency_hz[0]:.0f} to "
             f"{found.frequency_hz[-1]:.0f} Hz; the base moved by A0 = "
@@ -118,21 +118,21 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
         f"Grey: {regions_text(analysis.collisions)}.",
         f"Response II has {jumps_text(analysis.jumps)}.",
     ]
-    if laid is not None:
+    if overlay is not None:
         outside = ~analysis.collisions.is_colliding
-        apart = laid.difference.where(outside)
+        apart = overlay.difference.where(outside)
         smooth = (
             f" Outside of the measured collisions {apart.median_abs_db:.2g} dB median difference, "
             f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors."
             if outside.any()
             else ""
         )
-        said += [
-            run_text(laid),
-            f"In the first of these runs {regions_text(laid.collisions)}.{smooth}",
+        sentences += [
+            run_text(overlay),
+            f"In the first of these runs {regions_text(overlay.collisions)}.{smooth}",
             "Blue dots: steady sines from rest, which know nothing of the sweep's history.",
         ]
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def regions_text(found: Collisions) -> str:
@@ -154,7 +154,7 @@ def regions_text(found: Collisions) -> str:
     return f"the masses collide {' and '.join(parts)}{unclear}"
 
 
-def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, ...]:
+def _tables(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> tuple[Table, ...]:
     name = f"sweep_{analysis.facts.name}"
     found = analysis.response
     content = columns(
@@ -163,8 +163,8 @@ def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, 
         "response_i response_ii sd_response_ii phase_rad",
     )
     content["is_colliding"] = analysis.collisions.is_colliding.astype(np.int64)
-    if laid is None:
+    if overlay is None:
         return (table(name, **content),)
     envelope = "velocity_upper_simulated_m_per_s=upper velocity_lower_simulated_m_per_s=lower"
-    content |= columns(laid.response, envelope) | simulated_responses(laid)
-    return table(name, **content), sines_table(name, laid.prediction)
+    content |= columns(overlay.response, envelope) | simulated_responses(overlay)
+    return table(name, **content), sines_table(name, overlay.prediction)

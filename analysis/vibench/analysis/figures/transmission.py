@@ -34,21 +34,21 @@ _BELOW = 0.5
 """Lower end of the axis relative to the smallest value."""
 
 
-def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = None) -> style.DrawnFigure:
+def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = None) -> style.DrawnFigure:
     """Draw the measured transmission with bounds, the simulation, coherence and difference."""
-    at = model_resonances(specimen_of(analysis.facts.bench) if laid is None else laid.run.specimen)
+    at = model_resonances(specimen_of(analysis.facts.bench) if overlay is None else overlay.run.specimen)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
-        rows = 3 if laid is None else 4
+        rows = 3 if overlay is None else 4
         panels = figure.subplots(
             rows, 1, sharex=True, height_ratios=(3.6, 1.2, 1.0, 1.0)[:rows], squeeze=False
         )
         top = panels[0, 0]
-        _magnitudes(top, analysis, laid, at)
-        _phases(panels[1, 0], analysis, laid, at)
+        _magnitudes(top, analysis, overlay, at)
+        _phases(panels[1, 0], analysis, overlay, at)
         _coherence(panels[2, 0], analysis, at)
-        if laid is not None:
-            _differences(panels[3, 0], laid, at)
+        if overlay is not None:
+            _differences(panels[3, 0], overlay, at)
         panels[-1, 0].set_xlabel("frequency [Hz]")
         found = analysis.response.frequency_response.frequency_hz
         style.frequency_axis(top, float(found[0]), float(found[-1]))
@@ -58,13 +58,15 @@ def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = Non
     return style.DrawnFigure(
         name=f"transmission_{analysis.facts.name}",
         title=f"Transmission, {analysis.facts.measurement.excitation.amplitude_vpp:g} Vpp noise",
-        caption=transmission_caption(analysis, laid),
+        caption=transmission_caption(analysis, overlay),
         figure=figure,
-        tables=_tables(analysis, laid),
+        tables=_tables(analysis, overlay),
     )
 
 
-def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
+def _magnitudes(
+    axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances
+) -> None:
     view = analysis.request.view
     measured = view.shown(analysis.response.frequency_response)
     size = measured.magnitude
@@ -75,10 +77,10 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
     axes.fill_between(
         measured.frequency_hz, view.drawn(low), view.drawn(high), color=style.BOUNDS, alpha=0.45, label=bounds
     )
-    if laid is not None:
-        simulated, sines = view.shown(laid.response.frequency_response), laid.prediction
+    if overlay is not None:
+        simulated, sines = view.shown(overlay.response.frequency_response), overlay.prediction
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
-        linear = np.abs(base_transmissibility(laid.run.specimen, fine_hz)[:, 0])
+        linear = np.abs(base_transmissibility(overlay.run.specimen, fine_hz)[:, 0])
         linear = view.drawn(linear * view.factor(fine_hz))
         axes.plot(fine_hz, linear, **style.LINEAR_CURVE)
         micrometres = 1e6 * float(sines.amplitude_m[0])
@@ -87,10 +89,10 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
         axes.plot(sines.frequency_hz, response_i, color=style.PREDICTED, linewidth=0.9, label=label)
         factor = view.factor(simulated.frequency_hz)
         middle = draw_band(
-            axes, simulated.frequency_hz, laid, TRANSMISSION, lambda values: view.drawn(values * factor)
+            axes, simulated.frequency_hz, overlay, TRANSMISSION, lambda values: view.drawn(values * factor)
         )
         curve = view.drawn(simulated.magnitude) if middle is None else middle
-        axes.plot(simulated.frequency_hz, curve, label=simulated_label(laid.run), **style.SIMULATED_CURVE)
+        axes.plot(simulated.frequency_hz, curve, label=simulated_label(overlay.run), **style.SIMULATED_CURVE)
     axes.plot(measured.frequency_hz, view.drawn(size), color=style.MEASURED, label="measured", zorder=3)
     peaks = analysis.response.resonances
     peaks_hz = np.array([each.peak_frequency_hz for each in peaks])
@@ -105,15 +107,15 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
     axes.set_ylabel(view.label(analysis.facts.mass))
 
 
-def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
+def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances) -> None:
     """Draw the phase in degrees, -180 to 180, with bounds where they are narrower than a turn."""
     view = analysis.request.view
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
     axes.fill_between(measured.frequency_hz, low, high, color=style.BOUNDS, alpha=0.45)
-    if laid is not None:
-        simulated = view.shown(laid.response.frequency_response)
+    if overlay is not None:
+        simulated = view.shown(overlay.response.frequency_response)
         phase = _unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad))
         axes.plot(*phase, **style.SIMULATED_CURVE)
     axes.plot(
@@ -139,17 +141,17 @@ def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None
     axes.set_ylabel("coherence")
 
 
-def _differences(axes: Axes, laid: NoiseOverlay, at: ModelResonances) -> None:
+def _differences(axes: Axes, overlay: NoiseOverlay, at: ModelResonances) -> None:
     mark_resonances(axes, at)
-    shown = np.clip(laid.difference.decibel, -_DIFFERENCE_LIMIT_DB, _DIFFERENCE_LIMIT_DB)
-    axes.plot(laid.difference.frequency_hz, shown, color=style.SIMULATED, linewidth=0.8)
+    shown = np.clip(overlay.difference.decibel, -_DIFFERENCE_LIMIT_DB, _DIFFERENCE_LIMIT_DB)
+    axes.plot(overlay.difference.frequency_hz, shown, color=style.SIMULATED, linewidth=0.8)
     axes.axhline(0, color=style.MEASURED, linewidth=0.6)
     reach = max(1.0, float(np.nanmax(np.abs(shown))) * 1.1)
     axes.set_ylim(-reach, reach)
     axes.set_ylabel("meas. − sim.\n[dB]")
 
 
-def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> str:
+def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> str:
     """Return the caption with level, resonances, coherence and agreement of the simulation."""
     response = analysis.response
     view = analysis.request.view
@@ -159,7 +161,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
         f"{each.peak_magnitude * float(view.factor(np.array([each.peak_frequency_hz]))[0]):.3g}{unit})"
         for each in response.resonances
     )
-    said = [
+    sentences = [
         (
             f"Noise at {analysis.excitation.amplitude_vpp:g} Vpp, base acceleration "
             f"{response.base_level.rms_acceleration:.3g} m/s² rms between {response.base_level.low_hz:g} and "
@@ -173,13 +175,13 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
             "noises would show."
         ),
     ]
-    if laid is not None:
-        said.append(
-            f"{run_text(laid)} Median difference {laid.difference.median_abs_db:.2g} dB. "
-            f"The blue curve is Response I under sines, {laid.amplitude_basis}; "
+    if overlay is not None:
+        sentences.append(
+            f"{run_text(overlay)} Median difference {overlay.difference.median_abs_db:.2g} dB. "
+            f"The blue curve is Response I under sines, {overlay.amplitude_basis}; "
             f"it is a different excitation and no fit."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def estimate_sentence(response: NoiseResponse) -> str:
@@ -204,7 +206,7 @@ def estimate_sentence(response: NoiseResponse) -> str:
     )
 
 
-def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, ...]:
+def _tables(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> tuple[Table, ...]:
     view = analysis.request.view
     measured = view.shown(analysis.response.frequency_response)
     name = f"transmission_{analysis.facts.name}"
@@ -215,9 +217,9 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
     )
     found["magnitude_h1"] = view.shown(analysis.response.h1).magnitude
     found["magnitude_h2"] = view.shown(analysis.response.h2).magnitude
-    if laid is None:
+    if overlay is None:
         return (table(name, **found),)
-    found |= band_columns(laid, TRANSMISSION, "transmission")
-    found["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
-    found |= columns(laid.difference, "difference_db=decibel difference_standard_errors=standard_errors")
-    return table(name, **found), sines_table(name, laid.prediction)
+    found |= band_columns(overlay, TRANSMISSION, "transmission")
+    found["magnitude_simulated"] = view.shown(overlay.response.frequency_response).magnitude
+    found |= columns(overlay.difference, "difference_db=decibel difference_standard_errors=standard_errors")
+    return table(name, **found), sines_table(name, overlay.prediction)

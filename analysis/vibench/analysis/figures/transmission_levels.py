@@ -61,13 +61,13 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
 
 def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
     """Return the caption with the resonances at each level."""
-    said = []
+    levels = []
     for each in rising:
         peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]
         where = f"resonances at {', '.join(peaks)} Hz" if peaks else "no clear resonance"
-        said.append(f"{each.excitation.amplitude_vpp:g} Vpp: {where}")
+        levels.append(f"{each.excitation.amplitude_vpp:g} Vpp: {where}")
     return (
         f"Measured transmission from base to {rising[0].facts.mass} at {len(rising)} noise levels. "
-        f"{'; '.join(said)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
+        f"{'; '.join(levels)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
         "m2, where strong collisions move the motion to."
     )

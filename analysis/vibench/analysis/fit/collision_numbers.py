@@ -86,7 +86,7 @@ class CollisionNumbers:
         """Return a sentence for each parameter."""
         how = {Way.TRACKED: "Tracked", Way.STATISTICS: "From statistics,"}[self.way]
         rows = (each.row for each in self.parameters)
-        return tuple(f"{how} {label}: {said}; described as {known}." for label, said, known in rows)
+        return tuple(f"{how} {label}: {value}; described as {known}." for label, value, known in rows)
 
     @property
     def gap_fields(self) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ class CollisionNumbers:
             if each.what in _JUDGED
         ]
         surely = sorted((each for each in apart if each[0] > 1.0), reverse=True)
-        return tuple(f"{label} of {said} instead of {described}" for _, label, said, described in surely)
+        return tuple(f"{label} of {value} instead of {described}" for _, label, value, described in surely)
 
 
 def peakedness(dwell: DwellAnalysis) -> float:

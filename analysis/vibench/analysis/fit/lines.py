@@ -290,8 +290,8 @@ def _fit_from_description(lines: Lines, allowed: Freedom, found: _Ended) -> Desc
     wider = lines.correlation[0] * (spread + 2) / spread
     whole = np.asarray(wider * np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True), np.float64)
     # Welch and Satterthwaite (JCGM 100:2008, G.4): magnitude and phase of a line share its scatter.
-    told = (whole @ slopes.T)[:count, : 2 * lines.frequency_hz.size] ** 2
-    shares = told[:, : lines.frequency_hz.size] + told[:, lines.frequency_hz.size :]
+    squares = (whole @ slopes.T)[:count, : 2 * lines.frequency_hz.size] ** 2
+    shares = squares[:, : lines.frequency_hz.size] + squares[:, lines.frequency_hz.size :]
     shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
     return Descended(
         specimen=lines.specimen(found.x[:count]),

@@ -267,7 +267,7 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
 """Search range as factors; gaps are given by their geometric mean and the root of upper over lower."""
 _CONFIDENCE = 0.95
-_TOLD = 0.5
+_WIDEST = 0.5
 """Width of bounds, relative to the search range, above which a parameter is undetermined."""
 _LIKELY = 2.0
 """Largest factor between the recorded base motion and that of the first draw."""
@@ -404,7 +404,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
     parts = {Hidden.MEAN_GAP: np.log(sides / (lower + upper)), **parts}
     for what, each in parts.items():
         low, high = np.quantile(each, [0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE])
-        flat = high - low > _TOLD * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
+        flat = high - low > _WIDEST * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
         why = "the statistics of the motion do not determine it better than the description" if flat else ""

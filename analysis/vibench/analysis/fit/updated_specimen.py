@@ -163,7 +163,7 @@ class UpdatedSpecimen(Labelled):
     def to_dict(self) -> dict[str, Any]:
         """Return the results as JSON."""
         values = {each.parameter: each for each in self.values}
-        told = {key: value for way in Way for key, value in self._collision_results(way).items()}
+        collisions = {key: value for way in Way for key, value in self._collision_results(way).items()}
         linear = columns(
             self,
             "lines=linear.lines reduced_chi_square=linear.reduced_chi_square chi_square_limit=linear.limit "
@@ -172,7 +172,7 @@ class UpdatedSpecimen(Labelled):
         document = {
             "fits": self.fits,
             "values": values,
-            **told,
+            **collisions,
             "linear_from": self.linear_from or None,
             **linear,
             "lines": linear["lines"] or 0,
@@ -272,10 +272,10 @@ def update_model(
         raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")
     described = described_specimen(results.facts[0].bench)
     nominal = described.specimen()
-    not_told: list[str] = []
+    reasons: list[str] = []
     free = (*LINEAR, *(Parameter(each) for each in also_free))
-    linear = _linear(results, nominal, free, not_told)
-    table = _table(results.noise[0], linear, not_told) if linear is not None and linear.fits else None
+    linear = _linear(results, nominal, free, reasons)
+    table = _table(results.noise[0], linear, reasons) if linear is not None and linear.fits else None
     updated = UpdatedSpecimen(
         specimen=nominal if linear is None else linear.specimen,
         values=() if linear is None else linear.values,
@@ -287,19 +287,19 @@ def update_model(
         nominal=described,
     )
     if linear is not None and not linear.fits:
-        not_told.append("Gaps and contacts stay as the bench says: the linear model does not fit.")
+        reasons.append("Gaps and contacts stay as the bench says: the linear model does not fit.")
     else:
-        updated = _with_gaps(updated, results, not_told, observer)
+        updated = _with_gaps(updated, results, reasons, observer)
         if not updated.fitted:
-            raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(not_told)}")
-    return replace(updated, not_told=tuple(not_told))
+            raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(reasons)}")
+    return replace(updated, not_told=tuple(reasons))
 
 
 def _linear(
-    results: CampaignResults, nominal: Specimen, free: Sequence[Parameter], not_told: list[str]
+    results: CampaignResults, nominal: Specimen, free: Sequence[Parameter], reasons: list[str]
 ) -> SpecimenFit | None:
     if not results.noise:
-        not_told.append("Damping and frequencies stay as the bench says: no noise was recorded.")
+        reasons.append("Damping and frequencies stay as the bench says: no noise was recorded.")
         return None
     facts, weakest = results.noise[0].analysis.facts, results.noise[0].analysis.response
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
@@ -312,27 +312,27 @@ def _linear(
             is_nonlinear=is_nonlinear,
         )
     except NotEnoughData as error:
-        not_told.append(f"Damping and frequencies stay as the bench says: {error}.")
+        reasons.append(f"Damping and frequencies stay as the bench says: {error}.")
         return None
 
 
-def _table(weakest: NoiseResult, linear: SpecimenFit, not_told: list[str]) -> TableFit | None:
+def _table(weakest: NoiseResult, linear: SpecimenFit, reasons: list[str]) -> TableFit | None:
     try:
         return fitted_table(weakest.analysis, linear.specimen)
     except AnalysisError as error:
-        not_told.append(f"The table's mass stays as the bench says: {error}.")
+        reasons.append(f"The table's mass stays as the bench says: {error}.")
         return None
 
 
 def _with_gaps(
-    updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str], observer: Observer
+    updated: UpdatedSpecimen, results: CampaignResults, reasons: list[str], observer: Observer
 ) -> UpdatedSpecimen:
     """Add the gaps by tracking, else by statistics, else the smaller one by the onset of collisions."""
     found, why = tracked_numbers(results, updated.specimen)
     if found is None:
         found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
         both = f"{why}; by statistics: {why_not}" if why_not else why
-        not_told.append(
+        reasons.append(
             f"Each side's gap, m1, c1 and the contact law are not determined: {both}."
             if found is None
             else f"No motion could be tracked: {why}."
@@ -341,7 +341,7 @@ def _with_gaps(
         updated = replace(updated, collisions=found, specimen=found.on(updated.specimen))
         if found.gap_fields:
             return updated
-    gap = _onset_gap(results, updated.specimen, updated.linear, not_told)
+    gap = _onset_gap(results, updated.specimen, updated.linear, reasons)
     if gap is None:
         return updated
     return replace(
@@ -352,7 +352,7 @@ def _with_gaps(
 
 
 def _onset_gap(
-    results: CampaignResults, model: Specimen, linear: SpecimenFit | None, not_told: list[str]
+    results: CampaignResults, model: Specimen, linear: SpecimenFit | None, reasons: list[str]
 ) -> FittedValue | None:
     """Return the narrower gap of those from sweeps and from dwells."""
     sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
@@ -368,6 +368,6 @@ def _onset_gap(
         except NotEnoughData as error:
             why.append(str(error))
     if not found:
-        not_told.append(f"The gap stays as the bench says: {'; '.join(why)}.")
+        reasons.append(f"The gap stays as the bench says: {'; '.join(why)}.")
         return None
     return min(found, key=lambda each: each.high / each.low)

@@ -183,8 +183,8 @@ class _Unusable:
     def text(self) -> str:
         """Return the counts, to append to a sentence; empty if all samples are usable."""
         found = ((self.lost, "lost"), (self.overloaded, "near full scale"))
-        said = " and ".join(f"{count} samples {what}" for count, what in found if count)
-        return f" ({said})" if said else ""
+        text = " and ".join(f"{count} samples {what}" for count, what in found if count)
+        return f" ({text})" if text else ""
 
 
 def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _Unusable) -> Reals | None:
@@ -297,16 +297,16 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
         (f"about {each.frequency_hz:.4g} Hz", each.half_power_bandwidth_hz, each.frequency_hz)
         for each in found
     ]
-    said = []
+    deviations = []
     for where, width_hz, middle_hz in stretches:
         lines = known & (np.abs(chosen.frequency_hz - middle_hz) <= width_hz)
         worth = np.count_nonzero(lines) / _ALIKE_LINES
         if worth >= 1:
             off = float(np.median(chosen.magnitude[lines] / referenced.magnitude[lines])) - 1
             if abs(off) > np.median(sd[lines]) * max(0.5, _SURELY / np.sqrt(worth)):
-                said.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} it {where}")
+                deviations.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} it {where}")
     name = chosen.settings.estimator
-    return f"noise biases {name}; use drive: {name} lies {' and '.join(said)}" if said else ""
+    return f"noise biases {name}; use drive: {name} lies {' and '.join(deviations)}" if deviations else ""
 
 
 def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse:

@@ -118,11 +118,11 @@ def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, real
     numbers of lines.
     """
     alike = [each for each in rest if 0.5 < each.lines_used / found.lines_used < 2.0]
-    told, moved = (
+    values, moved = (
         np.array([getattr(each, name) for each in some]) for some in (rest, alike if len(alike) > 2 else rest)
     )
     jackknife = (realisations - 1) * np.sqrt(moved.size / realisations) * standard_uncertainty(moved)
-    choice = np.std(np.append(told, getattr(found, name)), ddof=1)
+    choice = np.std(np.append(values, getattr(found, name)), ddof=1)
     return float(max(getattr(found, f"sd_{name}"), jackknife, choice))
 
 
@@ -178,10 +178,10 @@ def _fit_peak(band: FrequencyResponse, line: int, half_width: int, most: int) ->
             for split in _split_poles(start, modes):
                 reaches = np.tile([span, _REACH_DAMPING], modes)
                 fit = modal_fit(band, lines, split, reaches, _powers(centre_hz, degree))
-                told = () if fit is None else _determined_modes(fit, lines)
-                if fit is not None and told and fit.explains:
-                    return told
-                first = told if modes == 1 and told else first
+                determined_modes = () if fit is None else _determined_modes(fit, lines)
+                if fit is not None and determined_modes and fit.explains:
+                    return determined_modes
+                first = determined_modes if modes == 1 and determined_modes else first
         if not first:
             return ()
         start = _poles(first)
@@ -210,7 +210,7 @@ def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
         yield np.stack((log_frequency + off, np.full(modes, log_damping - np.log(modes) / 2)), axis=1).ravel()
 
 
-def _is_told(found: Resonance, lines: Lines) -> bool:
+def _is_determined(found: Resonance, lines: Lines) -> bool:
     """Return whether lines determine a mode: inside the band, damping above zero, no ripple of noise."""
     natural_hz, damping = found.frequency_hz, found.damping_ratio
     first_hz, last_hz = lines.frequency_hz[[0, -1]]
@@ -253,9 +253,12 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         fit = _best(band, lines, starts)
         if fit is None or fit.chi_square * fit.freedom > last - _LEAST_GAIN:
             break
-        told = _determined_modes(fit, lines)
-        best = told if fit.explains and told else best
-        if best is told and max(each.reduced_chi_square for each in told) <= fit.chi_square:
+        determined_modes = _determined_modes(fit, lines)
+        best = determined_modes if fit.explains and determined_modes else best
+        if (
+            best is determined_modes
+            and max(each.reduced_chi_square for each in determined_modes) <= fit.chi_square
+        ):
             break
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
@@ -276,8 +279,8 @@ def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> Mod
 
 def _determined_modes(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
     """Return the modes of a fit that its lines determine, sorted by frequency."""
-    told = (each for each in fit.resonances if _is_told(each, lines))
-    return tuple(sorted(told, key=lambda one: one.frequency_hz))
+    determined_modes = (each for each in fit.resonances if _is_determined(each, lines))
+    return tuple(sorted(determined_modes, key=lambda one: one.frequency_hz))
 
 
 def _poles(found: Sequence[Resonance]) -> Reals:

@@ -241,21 +241,21 @@ def measured_gaps(impacts: FreeImpacts) -> Reals:
 
 def _gap_line(impacts: FreeImpacts) -> _GapLine:
     sides = [impacts.sides < 0, impacts.sides > 0]
-    told = [each for each in sides if each.sum() >= FEWEST_IMPACTS]
+    usable_sides = [each for each in sides if each.sum() >= FEWEST_IMPACTS]
     residuals = np.full(impacts.samples.size, np.nan)
-    if not told:
+    if not usable_sides:
         return _GapLine((None, None), residuals)
-    used = np.logical_or.reduce(told)
+    used = np.logical_or.reduce(usable_sides)
     depth = impacts.impulses**_DEPTH_POWER
     if np.subtract(*np.quantile(depth[used], [0.95, 0.05])) < _LEAST_SPREAD * depth[used].mean():
-        residuals[used] = _apart_by_side(np.abs(impacts.p), told)[used]
+        residuals[used] = _apart_by_side(np.abs(impacts.p), usable_sides)[used]
         return _GapLine((None, None), residuals)
-    matrix = np.column_stack([*(each.astype(float) for each in told), depth / depth.mean()])[used]
+    matrix = np.column_stack([*(each.astype(float) for each in usable_sides), depth / depth.mean()])[used]
     target = np.abs(impacts.p[used])
     solution, covariance = _robust_line(matrix, target)
     residuals[used] = target - matrix @ solution
     unknown = _LAW_UNKNOWN * abs(float(solution[-1]))
-    places = iter(range(len(told)))
+    places = iter(range(len(usable_sides)))
     gaps = [
         _gap(float(solution[n := next(places)]), covariance[n, n], unknown, each)
         if each.sum() >= FEWEST_IMPACTS

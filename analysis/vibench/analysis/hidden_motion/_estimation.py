@@ -217,12 +217,12 @@ def search_start(
     numbers = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
     first = (motion.samples - count) // 2
-    told = free_motion(motion_model(numbers.tracked, motion), motion.part(first, first + count))
-    gaps = free_gaps(told.impacts)
+    free = free_motion(motion_model(numbers.tracked, motion), motion.part(first, first + count))
+    gaps = free_gaps(free.impacts)
     if not any(gaps):
-        gaps = _gaps_by_law(numbers.tracked, told.impacts)
+        gaps = _gaps_by_law(numbers.tracked, free.impacts)
     if not any(gaps):
-        count = told.impacts.samples.size
+        count = free.impacts.samples.size
         seen = f"{count} impacts that were found determine no gap" if count else "no impacts were found"
         return numbers.tracked, (
             f"{seen} without a contact model, so m1 hardly reached its stops in this motion or stayed at one "
@@ -233,7 +233,7 @@ def search_start(
         side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
     }
     start = with_values(numbers.tracked, {side: gap.value_m for side, gap in known.items()})
-    loss = free_loss(told.impacts)
+    loss = free_loss(free.impacts)
     if loss is not None and loss > _TELLING_LOSS:
         start = with_values(start, {Hidden.LOSS: loss})
     near = {**NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}

@@ -67,8 +67,8 @@ class Forecaster:
         matrix = np.column_stack([*_tones(turned * numbers), states[:, _YIELDING]])
         scale = np.sqrt(np.mean(matrix**2, axis=0)) + np.finfo(float).tiny
         stop = at.sample + 1
-        told = motion.accelerations(stop - len(matrix), stop)
-        weights = np.linalg.lstsq(matrix / scale, told, rcond=1e-9)[0] / scale
+        accelerations = motion.accelerations(stop - len(matrix), stop)
+        weights = np.linalg.lstsq(matrix / scale, accelerations, rcond=1e-9)[0] / scale
         ahead = numbers[-1] + np.arange(self._count + 1)
         tone = _tones(turned * ahead).T @ weights[: 2 * _HARMONICS]
         yielding = _on_a_table(model, motion, weights[2 * _HARMONICS :])
@@ -90,10 +90,10 @@ class Forecaster:
     def compare(self, first: int, p: Reals) -> None:
         """Compare forecasts with the tracked ``p`` from sample ``first`` on, NaN where the track was lost."""
         while self._pending and self._pending[0][0] + self._count <= first + p.size:
-            begin, told = self._pending.popleft()
+            begin, forecast = self._pending.popleft()
             if begin < first:
                 continue
-            error = (told - p[begin - first : begin - first + self._count]) ** 2
+            error = (forecast - p[begin - first : begin - first + self._count]) ** 2
             if not np.isnan(error).any():
                 self._errors.append(np.sqrt(error.reshape(-1, self._bin).mean(axis=1)))
 

@@ -31,7 +31,7 @@ _FITTING_LEVEL = 1.6
 """Mean squared innovation of a track up to which the described parameters are only refined."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 """Shifts of gaps found without a contact model, in standard deviations, tried if no track holds."""
-_TOLD = 0.5
+_LARGEST_SD = 0.5
 """Largest standard deviation of a determined parameter, relative to that of the description."""
 _WIDE = 3.0
 """Standard deviation of the wide prior that replaces a narrow one, relative to that of the description."""
@@ -112,9 +112,9 @@ class FoundParameter:
     def row(self) -> tuple[str, str, str]:
         """Name, value with 95 % bounds or the reason for none, and described value."""
         label, factor, unit = _SHOWN[self.what]
-        said = self.not_determined and f"not determined: {self.not_determined}"
+        reason = self.not_determined and f"not determined: {self.not_determined}"
         value = with_unit(factor * self.value, factor * self.half_width, unit)
-        return label, said or value, f"{factor * self.described:.6g} {unit}".strip()
+        return label, reason or value, f"{factor * self.described:.6g} {unit}".strip()
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,10 +179,10 @@ def _refine(
         independent = max(1.0, min(len(good), motion.samples / (_STRETCH_S * motion.sample_rate_hz)))
         found = combine(good, described, independent)
         narrow = np.array([near[each] * scale_of(start, each) for each in wanted])
-        is_told = (found.sd < _TOLD * found.assumed) & (found.sd < _FAR * narrow)
-        is_beyond = is_told & (found.beyond > _SETTLED * narrow)
+        is_determined = (found.sd < _LARGEST_SD * found.assumed) & (found.sd < _FAR * narrow)
+        is_beyond = is_determined & (found.beyond > _SETTLED * narrow)
         start = with_values(
-            start, {each: float(found.values[n]) for n, each in enumerate(wanted) if is_told[n]}
+            start, {each: float(found.values[n]) for n, each in enumerate(wanted) if is_determined[n]}
         )
         if not np.any(is_beyond):
             break
@@ -193,12 +193,12 @@ def _refine(
             found.values[n],
             float(np.hypot(found.half[n], _Z * shared.get(what, 0.0))),
             value_of(described, what),
-            is_told=bool(is_told[n] and not is_beyond[n]),
+            is_determined=bool(is_determined[n] and not is_beyond[n]),
         )
         for n, what in enumerate(wanted)
     )
-    told = {each.what: each.value for each in parameters if each.is_determined}
-    return FoundSpecimen(with_values(start, told), parameters, len(good), searched=False)
+    values = {each.what: each.value for each in parameters if each.is_determined}
+    return FoundSpecimen(with_values(start, values), parameters, len(good), searched=False)
 
 
 def _restarts(
@@ -290,8 +290,10 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     return found.begun_at + found.prior_sd * moved, variance * scale, likely * scale
 
 
-def _parameter(what: Hidden, value: float, half: float, described: float, *, is_told: bool) -> FoundParameter:
-    why = "" if is_told else "this motion does not determine it better than the description"
+def _parameter(
+    what: Hidden, value: float, half: float, described: float, *, is_determined: bool
+) -> FoundParameter:
+    why = "" if is_determined else "this motion does not determine it better than the description"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 

@@ -301,7 +301,7 @@ def _tracked_motion(
     motion: PreparedMotion,
     tracked: TrackedSpecimen,
     found: FoundSpecimen | None,
-    told: Callable[[int], None],
+    on_progress: Callable[[int], None],
     masses: Sequence[MeasuredMass],
 ) -> TrackedMotion:
     model = motion_model(tracked, motion)
@@ -310,7 +310,7 @@ def _tracked_motion(
     collisions: list[Collisions] = []
     lost: list[NotFollowed] = []
     squared, used = 0.0, 0
-    for part in follow(model, motion, told):
+    for part in follow(model, motion, on_progress):
         match part:
             case TrackedPiece():
                 place = slice(part.first, part.stop)
@@ -342,8 +342,8 @@ def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> st
     for each in checks:
         if each.confirms is False:
             return f"{each.channel} refutes a track with the numbers that were found"
-    told = ~np.isnan(tracked.p)
-    held = float(np.mean(told[int(np.argmax(told)) :]))
+    is_tracked = ~np.isnan(tracked.p)
+    held = float(np.mean(is_tracked[int(np.argmax(is_tracked)) :]))
     if held < _LEAST_HELD:
         return f"a track with the numbers that were found held in {100 * held:.3g} % of the motion only"
     if not tracked.innovation_level <= _HIGHEST_LEVEL:
@@ -369,16 +369,16 @@ def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
 
 
 def _free_sentence(motion: HiddenMotion) -> str:
-    said = f"Without a contact model, impacts: {motion.free.impacts.samples.size}"
+    text = f"Without a contact model, impacts: {motion.free.impacts.samples.size}"
     for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True):
         if gap is not None and motion.is_confirmed:
-            said += f", {side} gap {with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
+            text += f", {side} gap {with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
         elif gap is not None:
-            said += f", {side} gap {MICRO * gap.value_m:.3g} µm"
+            text += f", {side} gap {MICRO * gap.value_m:.3g} µm"
     if not any(motion.free_gaps):
-        return f"{said}; too few to determine a gap."
+        return f"{text}; too few to determine a gap."
     no_bounds = "without bounds, since no track confirms the specimen's parameters that were used"
-    return f"{said}." if motion.is_confirmed else f"{said}, {no_bounds}."
+    return f"{text}." if motion.is_confirmed else f"{text}, {no_bounds}."
 
 
 def _sentences(motion: HiddenMotion) -> Iterator[str]:
@@ -400,11 +400,11 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     yield _free_sentence(motion)
     untold: dict[str, list[str]] = {}
     for parameter in motion.parameters:
-        label, said, described = parameter.row
+        label, value, described = parameter.row
         if parameter.is_determined:
             # Symbols such as m1 stay in lower case.
             begun = label if label[-1].isdigit() else f"{label[0].upper()}{label[1:]}"
-            yield f"{begun}: {said} (described as {described})."
+            yield f"{begun}: {value} (described as {described})."
         else:
             untold.setdefault(parameter.not_determined, []).append(label)
     yield from (f"Not determined, {', '.join(labels)}: {why}." for why, labels in untold.items())

@@ -322,11 +322,11 @@ class LiveTwin:
             return ()
         self.next_sample = first_sample + acceleration.size
         self._append(acceleration, velocity)
-        said: list[str] = []
-        self._follow(said)
-        self._find(said)
+        sentences: list[str] = []
+        self._follow(sentences)
+        self._find(sentences)
         self._foresee(frequency_hz)
-        return tuple(said)
+        return tuple(sentences)
 
     def _append(self, acceleration: Reals, velocity: Reals) -> None:
         """Correct and store new samples; drop the oldest."""
@@ -356,7 +356,7 @@ class LiveTwin:
         if self._at is not None:
             self._at.sample -= surplus
 
-    def _follow(self, said: list[str]) -> None:
+    def _follow(self, sentences: list[str]) -> None:
         """Track up to the newest sample, and test every complete block for changes."""
         motion = self._motion
         while True:
@@ -368,7 +368,7 @@ class LiveTwin:
             if motion.first_sample + motion.samples < self._block_end:
                 return
             self._block_end += self._block
-            self._check_block(said)
+            self._check_block(sentences)
 
     def _acquire(self) -> None:
         motion = self._motion
@@ -414,7 +414,7 @@ class LiveTwin:
         longest = round(_LONGEST_PAUSE_S * self._rate)
         self._pause = min(2 * self._pause + round(_FIRST_PAUSE_S * self._rate), longest)
 
-    def _check_block(self, said: list[str]) -> None:
+    def _check_block(self, sentences: list[str]) -> None:
         """Compare the finished block with the usual level."""
         squares = np.concatenate(self._squares or [np.empty(0)])
         self._squares = []
@@ -427,7 +427,7 @@ class LiveTwin:
         # Before any parameter is known, a wrong description is not a change.
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
-            said.append(
+            sentences.append(
                 f"The specimen is not what it was, at {time_s:.1f} s: what is measured no longer fits its "
                 f"numbers (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
@@ -437,11 +437,11 @@ class LiveTwin:
             self._wait = round(_FIND_S * self._rate)
             self._find_at = self.next_sample + self._wait
 
-    def _find(self, said: list[str]) -> None:
+    def _find(self, sentences: list[str]) -> None:
         """Take a finished search for gaps and masses; start the next one in parallel with tracking."""
         if self._finding is not None and self._finding.done():
             finding, self._finding = self._finding, None
-            self._take_found(finding.result(), said)
+            self._take_found(finding.result(), sentences)
         enough = self._motion.samples >= round(_FIND_S * self._rate)
         is_quiet = self._state is LiveState.WAITING
         if self._finding is None and enough and not is_quiet and self.next_sample >= self._find_at:
@@ -451,27 +451,29 @@ class LiveTwin:
             self._wait = round(_PATIENCE * self._wait)
             self._find_at = self.next_sample + self._wait
 
-    def _take_found(self, found: FoundSpecimen, said: list[str]) -> None:
-        told = {each.what: each for each in found.parameters if each.is_determined}
-        if not told:
+    def _take_found(self, found: FoundSpecimen, sentences: list[str]) -> None:
+        parameters = {each.what: each for each in found.parameters if each.is_determined}
+        if not parameters:
             return
-        if Hidden.LOWER_GAP in told or Hidden.UPPER_GAP in told:
+        if Hidden.LOWER_GAP in parameters or Hidden.UPPER_GAP in parameters:
             self._find_at = np.iinfo(np.int64).max
         # Dampers and contact law depend on the level, without a change of the specimen.
         compared = (
-            told.values() if self.watch.has_changed else [told[each] for each in _STEADY if each in told]
+            parameters.values()
+            if self.watch.has_changed
+            else [parameters[each] for each in _STEADY if each in parameters]
         )
         changed = [each for each in compared if self._is_other(each)]
         for each in changed:
             label, value, _ = each.row
             before = replace(each, value=(was := self._known[each.what]).value, low=was.low, high=was.high)
-            said.append(f"The specimen's {label} is {value}; it was {before.row[1]}.")
+            sentences.append(f"The specimen's {label} is {value}; it was {before.row[1]}.")
         is_first = not self._known and not self.found
         self.found = tuple(found.parameters)
         if is_first or changed or self.watch.has_changed:
             self._known |= {
                 each.what: KnownNumber(value=each.value, low=each.low, high=each.high)
-                for each in told.values()
+                for each in parameters.values()
             }
             self._track_with(found.tracked)
             self.watch = ChangeWatch()

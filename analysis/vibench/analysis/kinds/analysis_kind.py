@@ -31,7 +31,7 @@ class Result(Labelled, Generic[A, L]):
     """A measurement and its simulation."""
 
     analysis: A
-    laid: L | None
+    overlay: L | None
 
     @property
     def kind(self) -> str:

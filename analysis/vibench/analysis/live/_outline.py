@@ -206,7 +206,7 @@ OnRead = Callable[[int, int], None]
 """Callback (values read, total values) while an overview is computed."""
 
 
-def ignore_reading(done: int, asked: int) -> None:
+def ignore_reading(done: int, total: int) -> None:
     """Ignore the progress."""
 
 

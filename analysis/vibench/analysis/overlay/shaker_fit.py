@@ -51,13 +51,13 @@ class FittedShaker:
     @property
     def sentence(self) -> str:
         """Return a sentence on the parameters with two standard deviations."""
-        said = ", ".join(
+        values = ", ".join(
             f"{name} = {plus_minus(value := getattr(self.shaker, name), 2 * sd * value)}"
             for name, sd in self.relative_sd.items()
         )
         return (
             f"The shaker was fitted to {self.lines} lines of {self.source} (chi² {self.chi2:.2g} per degree "
-            f"of freedom): {said}"
+            f"of freedom): {values}"
         )
 
     def drawn(self, rng: np.random.Generator) -> Shaker:

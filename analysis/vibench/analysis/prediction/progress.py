@@ -115,7 +115,7 @@ class MapPicture:
     response_i: NDArray[np.float32]
     motions: NDArray[np.float32]
     """Number of motions found in each cell."""
-    said: str
+    text: str
 
 
 class MotionRequest(SpecimenChoice):
@@ -132,7 +132,7 @@ class SettledMotion:
 
     frequency_hz: float
     amplitude_m: float
-    said: str
+    text: str
     time_s: Reals
     displacement_m: Reals
     """x, of m0, shape (samples,)."""
@@ -150,18 +150,18 @@ class PicturingStore(MemoryStore):
     def __init__(self, plan: Map, tell: Callable[[MapPicture], None]) -> None:
         super().__init__(plan)
         self._plan, self._tell = plan, tell
-        self._told_s = -BETWEEN_PICTURES_S
+        self._picture_s = -BETWEEN_PICTURES_S
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Store results, and send a picture if the last one is old."""
         super().keep(answers)
-        if time.monotonic() - self._told_s >= BETWEEN_PICTURES_S:
+        if time.monotonic() - self._picture_s >= BETWEEN_PICTURES_S:
             self.show()
 
     def show(self) -> None:
         """Send a picture of the results."""
         self._tell(picture_of(MapResults(self._plan, self.arrays)))
-        self._told_s = time.monotonic()
+        self._picture_s = time.monotonic()
 
 
 def map_pictures(
@@ -185,14 +185,14 @@ def picture_of(results: MapResults) -> MapPicture:
         there = tuple(nearest)
     else:
         there = tuple(np.indices(classes.shape))
-    said = map_caption(results) if results.is_complete else f"{results.computed} points computed so far."
+    text = map_caption(results) if results.is_complete else f"{results.computed} points computed so far."
     return MapPicture(
         frequency_hz=(frequency[0], frequency[-1]),
         amplitude_m=(amplitude[0], amplitude[-1]),
         classes=np.nan_to_num(classes[there], nan=-1.0).astype(np.int8),
         response_i=results.shown("response_i")[there].astype(np.float32),
         motions=results.motion_counts[there].astype(np.float32),
-        said=said,
+        text=text,
     )
 
 
@@ -225,7 +225,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
     return SettledMotion(
         frequency_hz=request.frequency_hz,
         amplitude_m=request.amplitude_m,
-        said=(
+        text=(
             f"{request.frequency_hz:.5g} Hz, {1e6 * request.amplitude_m:.4g} µm, from rest: {kind}, Response "
             f"I {found.response_i or 0.0:.3g}, {found.impact_rate_hz:.4g} impacts a second"
         ),
@@ -404,7 +404,7 @@ class SimulationProgress:
 
     def __init__(self, amplitude_m: float, points: int, note: str) -> None:
         self._amplitude_m = amplitude_m
-        self.asked = points
+        self.requested = points
         """Number of requested points."""
         self._note = note
         self._found: dict[str, dict[float, SimulatedPoint]] = {}

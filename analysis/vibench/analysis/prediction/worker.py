@@ -56,8 +56,8 @@ class _TellingStore(MemoryStore):
             place = study.grid.place(answer.number)
             model, frequency_hz = study.models[place[0]], study.frequencies_hz[place[-1]]
             if answer.state is PointState.FAILED:
-                said = bytes(self.arrays[MESSAGE][answer.number]).decode()
-                yield Trouble(f"{model} at {frequency_hz:g} Hz: {said}")
+                message = bytes(self.arrays[MESSAGE][answer.number]).decode()
+                yield Trouble(f"{model} at {frequency_hz:g} Hz: {message}")
                 continue
             amplitude_m = study.amplitudes_m[place[-3]]
             found = prediction_at(

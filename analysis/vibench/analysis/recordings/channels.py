@@ -65,8 +65,8 @@ def described_sensor(bench: Mapping[str, Any], role: str) -> Mapping[str, Any]:
 
 def _number(sensor: Mapping[str, Any], key: str) -> float:
     """Return a stated frequency of a sensor [Hz]; infinite if not stated."""
-    said = sensor.get(key)
-    return float(said) if isinstance(said, int | float) and said > 0 else np.inf
+    value = sensor.get(key)
+    return float(value) if isinstance(value, int | float) and value > 0 else np.inf
 
 
 OnRead = Callable[[int, int], None]

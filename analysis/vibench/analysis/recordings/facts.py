@@ -229,8 +229,8 @@ def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
 
     Raises UnusableData for an invalid specimen.
     """
-    said = bench.get("specimen", {})
-    known = {key: said[key] for key in said if key in SpecimenTable.model_fields or key == "model"}
+    table = bench.get("specimen", {})
+    known = {key: table[key] for key in table if key in SpecimenTable.model_fields or key == "model"}
     try:
         return SpecimenTable.model_validate(known)
     except ValidationError as error:

@@ -96,10 +96,10 @@ def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> T
         ]
     if pair is not None:
         difference = curve_difference(*pair)
-        said = f"{pair[0].name} over {pair[1].name}"
+        names = f"{pair[0].name} over {pair[1].name}"
         columns += [
-            (f"frequency [Hz] ({said})", _cells(difference.frequency_hz)),
-            (f"difference [dB] ({said})", _cells(difference.decibel)),
+            (f"frequency [Hz] ({names})", _cells(difference.frequency_hz)),
+            (f"difference [dB] ({names})", _cells(difference.decibel)),
         ]
     return Table(name, tuple(columns))
 

@@ -57,11 +57,11 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
     where = f"resonances at {peaks} Hz" if peaks else "no resonance above its uncertainty"
     yield f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}."
     yield from feedback_sentences(result.analysis.facts.feedback)
-    if result.laid is not None:
+    if result.overlay is not None:
         yield (
-            f"The simulation under the {result.laid.run.driven.value} lies "
-            f"{result.laid.difference.median_abs_db:.2g} dB away (median) and strikes "
-            f"{result.laid.run.impact_rate_hz:.0f} times per second{agreement_text(result.laid)}."
+            f"The simulation under the {result.overlay.run.driven.value} lies "
+            f"{result.overlay.difference.median_abs_db:.2g} dB away (median) and strikes "
+            f"{result.overlay.run.impact_rate_hz:.0f} times per second{agreement_text(result.overlay)}."
         )
     remarks = [each.remark for each in result.analysis.response.resonances if each.remark]
     if remarks:
@@ -75,8 +75,8 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz, "
         f"{result.analysis.rate_text}: {regions_text(result.analysis.collisions)}."
     )
-    if result.laid is not None:
-        yield f"Simulated: {regions_text(result.laid.collisions)}{agreement_text(result.laid)}."
+    if result.overlay is not None:
+        yield f"Simulated: {regions_text(result.overlay.collisions)}{agreement_text(result.overlay)}."
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
@@ -101,10 +101,10 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
     if verdict.kind is MotionKind.UNDECIDED:
         text += f" ({verdict.why})"
     yield f"{text}."
-    if result.laid is not None:
-        simulated = result.laid.response
-        told = agreement_text(result.laid).removeprefix("; ")
-        yield f"Simulated: {told or f'{simulated.response_i:.3g} and {simulated.response_ii:.3g}'}."
+    if result.overlay is not None:
+        simulated = result.overlay.response
+        agreement = agreement_text(result.overlay).removeprefix("; ")
+        yield f"Simulated: {agreement or f'{simulated.response_i:.3g} and {simulated.response_ii:.3g}'}."
 
 
 def limits(results: CampaignResults) -> Iterator[str]:
@@ -116,12 +116,12 @@ def limits(results: CampaignResults) -> Iterator[str]:
             "over the measurement: agreement shows that the whole chain from generator to figure is right, "
             "not that the model is."
         )
-    laid = [each.laid.run for each in results.results if each.laid is not None]
-    if laid:
-        specimen = laid[0].specimen
+    runs = [each.overlay.run for each in results.results if each.overlay is not None]
+    if runs:
+        specimen = runs[0].specimen
         damping = specimen.dampings[0] / specimen.stiffnesses[0]
         gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
-        lows_hz = [each.base_band_hz[0] for each in laid if each.base_band_hz is not None]
+        lows_hz = [each.base_band_hz[0] for each in runs if each.base_band_hz is not None]
         yield (
             f"The simulation takes the damping as c = {damping:.3g} s · k and a gap of "
             f"{gaps} µm. The paper does not state the damping; other values give "
@@ -134,7 +134,7 @@ def limits(results: CampaignResults) -> Iterator[str]:
                 "under it, and the recorded base does not yield to the blows of a specimen that moves "
                 "otherwise."
             )
-        if any(each.driven.by_voltage for each in laid):
+        if any(each.driven.by_voltage for each in runs):
             yield (
                 "Draws under the recorded voltage differ by their starts, the channels' noise and the "
                 f"tolerance of the converter's clock ({1e6 * CLOCK_TOLERANCE:.0f} ppm), and by the "
@@ -177,7 +177,7 @@ class Drawing(Generic[A, L]):
 
 
 def _noise_figures(noise: NoiseResult) -> Iterator[DrawnFigure]:
-    yield transmission_figure(noise.analysis, noise.laid)
+    yield transmission_figure(noise.analysis, noise.overlay)
     if noise.analysis.response.periodic is not None:
         yield distortion_figure(noise.analysis, noise.analysis.response.periodic)
 
@@ -188,7 +188,7 @@ def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
 
 
 def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
-    yield dwells_figure([(each.analysis, each.laid) for each in dwells])
+    yield dwells_figure([(each.analysis, each.overlay) for each in dwells])
     yield portraits_figure([each.analysis for each in dwells])
 
 
@@ -201,15 +201,15 @@ def _dwell_levels(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
 
 
 def _stepped_figures(look: SteppedLook[Any]) -> Callable[[SteppedSineResult], Iterator[DrawnFigure]]:
-    return lambda stepped: iter((stepped_sine_figure(stepped.analysis, stepped.laid, look),))
+    return lambda stepped: iter((stepped_sine_figure(stepped.analysis, stepped.overlay, look),))
 
 
 def _tracked_figures(tracked: SteppedSineResult) -> Iterator[DrawnFigure]:
     """Draw the resonance over level, where one was found."""
     if tracked_resonances(tracked.analysis.facts.feedback):
-        yield backbone_figure(tracked.analysis, tracked.laid)
+        yield backbone_figure(tracked.analysis, tracked.overlay)
     else:
-        yield stepped_sine_figure(tracked.analysis, tracked.laid, TRACKED_RESONANCE)
+        yield stepped_sine_figure(tracked.analysis, tracked.overlay, TRACKED_RESONANCE)
 
 
 def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
@@ -275,7 +275,7 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
         ),
         Family.SWEEP: Drawing(
             lambda sweep: iter(
-                (sweep_figure(sweep.analysis, sweep.laid), sweep_orders_figure(sweep.analysis))
+                (sweep_figure(sweep.analysis, sweep.overlay), sweep_orders_figure(sweep.analysis))
             ),
             sweep_findings,
             _sweep_numbers,
@@ -335,13 +335,15 @@ def findings(results: CampaignResults) -> Iterator[str]:
     """
     yield from results.model_said
     for each in results.in_order:
-        yield from (f"{each.analysis.facts.name}: {said}" for said in DRAWINGS[each.kind].findings(each))
+        yield from (
+            f"{each.analysis.facts.name}: {sentence}" for sentence in DRAWINGS[each.kind].findings(each)
+        )
 
 
 def result_sentence(result: AnyResult) -> str:
     """Return the first finding, or a description of the plan if nothing was found."""
-    said = next(DRAWINGS[result.kind].findings(result), "")
-    return said or f"{excitation_text(result.analysis.excitation)}: no result."
+    sentence = next(DRAWINGS[result.kind].findings(result), "")
+    return sentence or f"{excitation_text(result.analysis.excitation)}: no result."
 
 
 def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:

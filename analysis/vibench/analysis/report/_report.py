@@ -113,8 +113,8 @@ def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
         levels = kinds.setdefault(verdict_text(each.analysis.motion.verdict), [])
         levels.append(f"{each.analysis.excitation.amplitude_vpp:g}")
     for frequency_hz, kinds in by_place.items():
-        said = [f"{kind} at {_join(levels)} Vpp" for kind, levels in kinds.items()]
-        yield f"At {frequency_hz:g} Hz the motion is {_join(said)}."
+        texts = [f"{kind} at {_join(levels)} Vpp" for kind, levels in kinds.items()]
+        yield f"At {frequency_hz:g} Hz the motion is {_join(texts)}."
 
 
 def _agreement(verdicts: Sequence[Agreement]) -> str:
@@ -201,8 +201,8 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
             continue
         curves = [curve for result, _ in levels for curve in _curves(result)]
         drawn = branches_figure(diagram, curves)
-        said = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
-        yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {said}")
+        sentences = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
+        yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {sentences}")
 
 
 def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
@@ -217,8 +217,8 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
     ]
     tracked = [each for notes in near for each in tracked_resonances(notes)]
     drawn = branches_figure(diagram, tracked=tracked)
-    said = [_lost_sentence(diagram, level) for notes in near for level in lost_levels(notes)]
-    return replace(drawn, caption=" ".join((drawn.caption, *said)))
+    sentences = [_lost_sentence(diagram, level) for notes in near for level in lost_levels(notes)]
+    return replace(drawn, caption=" ".join((drawn.caption, *sentences)))
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
@@ -227,11 +227,11 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
         sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
-    told = f"At {level_m_per_s2:g} m/s² no periodic motion was locked on;"
+    text = f"At {level_m_per_s2:g} m/s² no periodic motion was locked on;"
     if not sizes:
-        return f"{told} none of these branches has one there."
+        return f"{text} none of these branches has one there."
     multipliers = ", ".join(f"{each:.3g}" for each in sizes)
-    return f"{told} the largest multiplier of the model's is {multipliers}."
+    return f"{text} the largest multiplier of the model's is {multipliers}."
 
 
 def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
@@ -288,8 +288,8 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
     ]
     specimen = facts.bench.get("specimen")
     if specimen:
-        said = (f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources")
-        rows.append(("specimen", ", ".join(said)))
+        values = (f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources")
+        rows.append(("specimen", ", ".join(values)))
     rows.append(("bench check", bench_check_text(facts)))
     rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} requested"
     rows.append(("sample rate", rate))
@@ -441,8 +441,8 @@ def _about(results: CampaignResults) -> str:
     unread = sum(each.what is FailedStep.ANALYSIS for each in results.failures)
     count = len(results.facts) + unread
     which = "Some of these recordings come" if len(origins) > 1 or unread else "These recordings come"
-    said = "This recording comes" if count == 1 else which
-    where = f" {said} from {'simulated instruments' if True in origins else 'a real bench'}."
+    subject = "This recording comes" if count == 1 else which
+    where = f" {subject} from {'simulated instruments' if True in origins else 'a real bench'}."
     return f"Report of {count} recording{'' if count == 1 else 's'}.{where if origins else ''}"
 
 
@@ -483,16 +483,19 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
     failure
         Reason why a simulation failed.
     """
-    laid = result.laid
-    if laid is None:
+    overlay = result.overlay
+    if overlay is None:
         return Agreement.OPEN, "not simulated" if failure is None else failure.sentence
-    if not laid.run.driven.by_voltage:
-        return Agreement.OPEN, f"simulated once, under the recorded base{laid.run.why and ': '}{laid.run.why}"
-    outside = [each.name for each in laid.ensemble if each.compared and not each.agrees]
+    if not overlay.run.driven.by_voltage:
+        return (
+            Agreement.OPEN,
+            f"simulated once, under the recorded base{overlay.run.why and ': '}{overlay.run.why}",
+        )
+    outside = [each.name for each in overlay.ensemble if each.compared and not each.agrees]
     if outside:
-        known = f". {laid.run.why}" if laid.run.why else ""
+        known = f". {overlay.run.why}" if overlay.run.why else ""
         return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}{known}"
-    compared, every = sum(each.compared > 0 for each in laid.ensemble), len(laid.ensemble)
+    compared, every = sum(each.compared > 0 for each in overlay.ensemble), len(overlay.ensemble)
     if not compared:
         return Agreement.OPEN, "too few simulated draws of the measured kind of motion"
     return Agreement.YES, "" if compared == every else f"{compared} of {every} quantities were compared"
@@ -520,7 +523,7 @@ def _benches(results: CampaignResults) -> Iterator[Fold]:
     """Group recordings with the same bench, so that it is described once."""
     groups: dict[tuple[ReportTable, ...], list[str]] = {}
     for facts in results.facts:
-        said = (bench_table(facts), channel_table(facts), version_table(facts))
-        groups.setdefault(said, []).append(facts.name)
+        bench_tables = (bench_table(facts), channel_table(facts), version_table(facts))
+        groups.setdefault(bench_tables, []).append(facts.name)
     for tables, names in groups.items():
         yield Fold("Bench, settings and versions", (f"Recordings: {', '.join(names)}",), tables)

@@ -76,7 +76,7 @@ def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
     paper = [(each, "") for each in PAPER_RESONANCES_HZ] + [
         (each, " (terminal)") for each in PAPER_TERMINAL_RESONANCES_HZ
     ]
-    simulated = () if result.laid is None else result.laid.response.resonances
+    simulated = () if result.overlay is None else result.overlay.response.resonances
     found = result.analysis.response.resonances
     if not found:
         yield level, "none above its uncertainty", *([ABSENT] * 5)
@@ -123,7 +123,7 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
     plan = result.analysis.excitation
     name = f"{plan.amplitude_vpp:g} Vpp, {plan.start_hz:g} to {plan.stop_hz:g} Hz"
     measured = result.analysis.collisions.regions
-    simulated = () if result.laid is None else result.laid.collisions.regions
+    simulated = () if result.overlay is None else result.overlay.collisions.regions
     if not measured and not simulated:
         found = "not determined" if result.analysis.collisions.too_fast_hz else "no collision"
         yield name, found, ABSENT, ABSENT, ABSENT, _PAPER_COLLISION
@@ -176,7 +176,7 @@ def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
 
 
 def _dwell_row(result: DwellResult) -> tuple[str, ...]:
-    found, laid = result.analysis.response, result.laid
+    found, overlay = result.analysis.response, result.overlay
     plan = result.analysis.excitation
     amplitude, first, second = budgets_of(result)
     if np.isnan(found.noise_bias_i):
@@ -191,29 +191,29 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
         bias,
         second.text,
         verdict_text(result.analysis.motion.verdict),
-        *_simulated_response(laid, RESPONSE_I),
-        *_simulated_response(laid, RESPONSE_II),
-        ABSENT if laid is None else f"{laid.run.impact_rate_hz:.0f}",
+        *_simulated_response(overlay, RESPONSE_I),
+        *_simulated_response(overlay, RESPONSE_II),
+        ABSENT if overlay is None else f"{overlay.run.impact_rate_hz:.0f}",
     )
 
 
-def _simulated_response(laid: DwellOverlay | None, name: str) -> tuple[str, str]:
+def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, str]:
     """Return one response of the draws with the 95 % band, and the z of the measured one."""
-    found = None if laid is None else laid.quantity(name)
-    if laid is None or found is None:
+    found = None if overlay is None else overlay.quantity(name)
+    if overlay is None or found is None:
         return ABSENT, ABSENT
-    if laid.run.draws == 1:
+    if overlay.run.draws == 1:
         return f"{found.draws[0, 0]:.4g}", ABSENT
     if not found.compared:
         return "none of this motion", ABSENT
     return f"{found.median[0]:.4g} ({found.lower[0]:.4g} to {found.upper[0]:.4g})", f"{found.z[0]:+.2f}"
 
 
-def _simulated_band(laid: DwellOverlay, towards_hz: float) -> str:
+def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
     """Return a band's level in the draws [dB]; for a single run or a low level, that of the first run."""
-    found = next((each for each in laid.ensemble if each.frequency_hz[0] == towards_hz), None)
+    found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
-        levels = [each.decibel for each in laid.terminal if each.towards_hz == towards_hz]
+        levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]
         return f"{levels[0]:.1f}" if levels else ABSENT
     low, middle, high = (
         f"{20 * np.log10(each[0]):.1f}" if each[0] > 0.0 else "nothing"
@@ -237,7 +237,7 @@ def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
             what = f"band around {band.towards_hz:.0f} Hz"
             place = f"{band.low_hz:.0f} to {band.high_hz:.0f}"
             size = f"{plus_minus(1e6 * band.rms_m, 2e6 * band.rms_m * band.relative_sd)} rms"
-            simulated = ABSENT if each.laid is None else _simulated_band(each.laid, band.towards_hz)
+            simulated = ABSENT if each.overlay is None else _simulated_band(each.overlay, band.towards_hz)
             rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
     return ReportTable(
         "Dwells: lines and terminal bands of the displacement",

@@ -80,8 +80,8 @@ def overlay(
     row = ANALYSES[analysis.excitation.kind]
     found = drawn(source, row.draws(analysis), row.compared(analysis))
     stage("predicting the response to sines")
-    laid: AbstractOverlay[Any] = row.lay(analysis, found)
-    return laid
+    model_overlay: AbstractOverlay[Any] = row.lay(analysis, found)
+    return model_overlay
 
 
 def _source(
@@ -242,8 +242,8 @@ def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
     for place, (first, each) in enumerate(zip(firsts, results, strict=True)):
         if place != first:
             counted, copy = kept[first].analysis, each.analysis.facts
-            said = copy_sentence(counted.facts, counted.facts.path.name, copy)
-            check = Check("Copies", Verdict.WARNING, f"{copy.path.name} {said}; it is counted once")
+            sentence = copy_sentence(counted.facts, counted.facts.path.name, copy)
+            check = Check("Copies", Verdict.WARNING, f"{copy.path.name} {sentence}; it is counted once")
             analysis = replace(counted, checks=(*counted.checks, check))
             kept[first] = replace(kept[first], analysis=analysis)
     return tuple(kept.values())
@@ -318,7 +318,7 @@ def result_of(
     if simulation is Simulation.LEFT_OUT or response is not None:
         return Result(analysis, None), ()
     try:
-        laid = overlay(
+        model_overlay = overlay(
             recording,
             analysis,
             specimen=specimen,
@@ -329,7 +329,7 @@ def result_of(
         )
     except AnalysisError as error:
         return Result(analysis, None), (AnalysisFailure(name, FailedStep.SIMULATION, str(error)),)
-    return Result(analysis, laid), ()
+    return Result(analysis, model_overlay), ()
 
 
 def recordings_in(folder: Path) -> tuple[Path, ...]:
@@ -362,7 +362,7 @@ def result_summary(result: AnyResult) -> Json:
         "kind": ANALYSES[result.kind].family,
         "measured": plain(analysis),
         "uncertainty": plain(budgets_of(result)),
-        "simulated": plain(result.laid),
+        "simulated": plain(result.overlay),
     }
 
 
@@ -375,7 +375,7 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
     Responses, noise for frequency, damping and transmissibility at each resonance. If the recording lasted
     until a bound was met, budgets are widened: see `Budget.widened`.
     """
-    found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
+    found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.overlay)
     has_chosen_end = result.analysis.facts.measurement.until is not None
     return tuple(each.widened() for each in found) if has_chosen_end else found
 

@@ -117,11 +117,11 @@ def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
             return ()
 
 
-def _of_draws(curve: Curve, laid: AbstractOverlay[Any]) -> Curve:
+def _of_draws(curve: Curve, overlay: AbstractOverlay[Any]) -> Curve:
     """Replace the values of the first draw by the median and the scatter of all draws."""
-    note = f"{curve.note}; under the {laid.run.driven.value}"
-    found = laid.quantity(curve.response.value)
-    if found is None or laid.run.draws == 1:
+    note = f"{curve.note}; under the {overlay.run.driven.value}"
+    found = overlay.quantity(curve.response.value)
+    if found is None or overlay.run.draws == 1:
         return replace(curve, note=note)
     order = np.argsort(found.frequency_hz)
     at = np.searchsorted(found.frequency_hz[order], curve.frequency_hz)
@@ -132,16 +132,16 @@ def _of_draws(curve: Curve, laid: AbstractOverlay[Any]) -> Curve:
         curve,
         magnitude=found.median[place],
         relative_sd=found.relative_sd[place],
-        note=f"median of {laid.run.draws} draws under the {laid.run.driven.value}",
+        note=f"median of {overlay.run.draws} draws under the {overlay.run.driven.value}",
     )
 
 
 def _curves(result: AnyResult, name: str) -> Iterator[Curve]:
     curves = ANALYSES[result.kind].curves
     yield from curves(name, CurveOrigin.MEASURED, result.analysis.response)
-    if result.laid is None:
+    if result.overlay is None:
         return
-    for each in curves(name, CurveOrigin.SIMULATED, result.laid.response):
-        yield _of_draws(each, result.laid)
-    if result.laid.prediction.frequency_hz.size > 1:
-        yield from predicted_curves(name, result.laid.prediction)
+    for each in curves(name, CurveOrigin.SIMULATED, result.overlay.response):
+        yield _of_draws(each, result.overlay)
+    if result.overlay.prediction.frequency_hz.size > 1:
+        yield from predicted_curves(name, result.overlay.prediction)

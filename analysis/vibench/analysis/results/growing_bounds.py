@@ -114,15 +114,19 @@ def main() -> None:
     sys.stdout.write("{}\n")
     sys.stdout.flush()
     for line in sys.stdin:
-        asked = json.loads(line)
+        question = json.loads(line)
         bounds: dict[str, float | None] = {}
         hindrance = ""
         try:
-            with _open_when_there(Path(asked["path"]), asked["stretch"], asked["recorded_s"]) as recording:
-                if asked["path"] not in facts:
-                    facts[asked["path"]] = recording_facts(recording)
-                known = facts[asked["path"]]
-                bounds = bounds_of(result_so_far(recording, known, asked["stretch"], asked["recorded_s"]))
+            with _open_when_there(
+                Path(question["path"]), question["stretch"], question["recorded_s"]
+            ) as recording:
+                if question["path"] not in facts:
+                    facts[question["path"]] = recording_facts(recording)
+                known = facts[question["path"]]
+                bounds = bounds_of(
+                    result_so_far(recording, known, question["stretch"], question["recorded_s"])
+                )
         except (AnalysisError, RecordingError, *CONTRADICTIONS) as error:
             hindrance = str(error)
         sys.stdout.write(json.dumps({"bounds": bounds, "hindrance": hindrance}) + "\n")

@@ -205,8 +205,10 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
     """Yield sentences on the findings of feedback; none without feedback."""
     jumps = noted_jumps(notes)
     if jumps:
-        said = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
-        yield f"Jumps between {said}."
+        places = ", ".join(
+            f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps
+        )
+        yield f"Jumps between {places}."
     yield from _motions([each for each in notes if isinstance(each, SegmentNote)])
     yield from (_resonance(each) for each in notes if isinstance(each, ResonanceNote))
     yield from _spectrum([each for each in notes if isinstance(each, NoiseNote) and each.realisation >= 0])
@@ -236,9 +238,9 @@ def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
         return
     worst = max(kept, key=lambda each: abs(each.worst_db))
     rms = sqrt(fmean(each.base_rms**2 for each in kept))
-    asked = sqrt(fmean(each.asked_rms**2 for each in kept))
+    requested = sqrt(fmean(each.asked_rms**2 for each in kept))
     yield (
-        f"The base moved with {rms:.3g} m/s² rms, requested was {asked:.3g}; "
+        f"The base moved with {rms:.3g} m/s² rms, requested was {requested:.3g}; "
         f"{fmean(each.within for each in kept):.1%} of the lines were within the tolerance, the worst "
         f"{worst.worst_db:+.1f} dB at {worst.worst_hz:g} Hz; kurtosis "
         f"{fmean(each.kurtosis for each in kept):.2f}."

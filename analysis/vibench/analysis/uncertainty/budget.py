@@ -100,8 +100,8 @@ class Budget(Labelled):
     @property
     def text(self) -> str:
         """The value with its expanded uncertainty and unit."""
-        said = plus_minus(self.value, self.expanded)
-        return f"({said}) {self.unit}" if self.unit and "±" in said else f"{said} {self.unit}".strip()
+        number = plus_minus(self.value, self.expanded)
+        return f"({number}) {self.unit}" if self.unit and "±" in number else f"{number} {self.unit}".strip()
 
     def share(self, cause: Cause) -> float | None:
         """Return the relative standard uncertainty of one cause: 0 if irrelevant, None if not stated."""
@@ -130,9 +130,9 @@ class Budget(Labelled):
         causes = dict.fromkeys(each.cause for each in self.contributions)
         parts = sorted(((size, cause.value) for cause in causes if (size := self.share(cause))), reverse=True)
         each = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
-        said = [f"k = {COVERAGE:g}; standard uncertainties: {each}"] if each else []
-        said += [f"not stated: {', '.join(self.not_stated)}"] if self.not_stated else []
-        return f"{self.quantity} {self.text} ({'; '.join(said) or 'no uncertainty'})"
+        remarks = [f"k = {COVERAGE:g}; standard uncertainties: {each}"] if each else []
+        remarks += [f"not stated: {', '.join(self.not_stated)}"] if self.not_stated else []
+        return f"{self.quantity} {self.text} ({'; '.join(remarks) or 'no uncertainty'})"
 
     @property
     def parts(self) -> list[dict[str, object]]:
@@ -190,11 +190,11 @@ def stated_uncertainties(bench: Mapping[str, Any], response: str) -> Stated:
 
 
 def _channel(bench: Mapping[str, Any], role: str, mine: Mapping[str, Any]) -> Iterator[Contribution]:
-    said, cause = described_sensor(bench, role), _SENSORS[role.partition("_")[2]]
+    facts, cause = described_sensor(bench, role), _SENSORS[role.partition("_")[2]]
     sensor = cause.value.removesuffix(" calibration")
-    yield _calibration(cause, said, sensor)
+    yield _calibration(cause, facts, sensor)
     yield _calibration(Cause.CONVERTER, mine, f"input of {role}")
-    angle = said.get("alignment_deg")
+    angle = facts.get("alignment_deg")
     if angle is None:
         yield Contribution(Cause.ALIGNMENT, None, f"{sensor}: alignment_deg is not stated")
     else:
@@ -203,8 +203,8 @@ def _channel(bench: Mapping[str, Any], role: str, mine: Mapping[str, Any]) -> It
         yield Contribution(Cause.ALIGNMENT, float(relative), f"{sensor}: {angle['source']}")
 
 
-def _calibration(cause: Cause, said: Mapping[str, Any], what: str) -> Contribution:
-    found, dated = said.get("uncertainty"), said.get("calibrated")
+def _calibration(cause: Cause, facts: Mapping[str, Any], what: str) -> Contribution:
+    found, dated = facts.get("uncertainty"), facts.get("calibrated")
     when = f"calibrated {dated}" if dated else "no date of calibration"
     if found is None:
         return Contribution(cause, None, f"{what}: uncertainty is not stated ({when})")

@@ -177,12 +177,12 @@ class Expected(Labelled):
             return f"not known beforehand, for {self._hindrance}"
         if self.scatter == 0.0:
             return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, whatever the time; k = 2)"
-        told = ", ".join(
+        text = ", ".join(
             f"{100 * half:.2g} % after {time_s:.3g} s" + (" as planned" if time_s == self.time_s else "")
             for time_s, half in self.curve
             if half
         )
-        return f"± {told} ({self.cause.value}; k = 2)"
+        return f"± {text} ({self.cause.value}; k = 2)"
 
     @property
     def _hindrance(self) -> str:
@@ -323,10 +323,12 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
         expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
     except ValidationError:  # imported, or written by another version
         expected_s = None
-    said = "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
+    prediction = (
+        "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
+    )
     last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
     reached = sum(each.is_reached for each in notes)
-    text = f"{last}{reached} of {len(notes)} stretches known well enough, {time_s:.4g} s in all; {said}"
+    text = f"{last}{reached} of {len(notes)} stretches known well enough, {time_s:.4g} s in all; {prediction}"
     yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 
@@ -479,5 +481,5 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
             yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
         else:
             # Noise of generator and amplifier moves the masses, and no rig states it.
-            told = None if name == RESPONSE_I else by_noise
-            yield Expected(name, window_s, told, Cause.NOISE, lasting, missing)
+            error = None if name == RESPONSE_I else by_noise
+            yield Expected(name, window_s, error, Cause.NOISE, lasting, missing)

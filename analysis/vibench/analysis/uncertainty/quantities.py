@@ -24,7 +24,7 @@ _BLOCKS, _FEWEST_BLOCKS = 50, 10
 _ALIKE = 1e-12
 """Relative difference of maxima that is only rounding error."""
 _FEWEST_DRAWS = 5
-_UNTOLD = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
+_NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
 """Unstated chance, for a maximum or a sweep's interval of a tenth of a second without draws of the twin."""
 _ENDS = 2
 """Intervals at either end of a sweep; a largest value there is no peak, as it depends on where they begin."""
@@ -87,7 +87,7 @@ def _chance_share(found: NoiseResponse) -> float:
     return more / (more + least) if more > 0.0 else 0.0
 
 
-def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
+def dwell_budgets(analysis: DwellAnalysis, overlay: DwellOverlay | None) -> tuple[Budget, ...]:
     """Return budgets for the base amplitude and both responses of a dwell."""
     found = analysis.response
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
@@ -96,7 +96,7 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
     drive = found.drive
     of_base = from_scatter(scatter, drive.sd_amplitude_m, drive.amplitude_m, "parts of the window")
     is_chance = not (is_steady or np.isnan(found.slow_change))
-    one_draw = [_scatter(laid, RESPONSE_I, 0) or of_one_draw(found)] if is_chance else []
+    one_draw = [_scatter(overlay, RESPONSE_I, 0) or of_one_draw(found)] if is_chance else []
     noise = from_scatter(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
     return (
         _amplitude(drive.amplitude_m, stated, of_base),
@@ -188,7 +188,7 @@ def sd_of_largest(maxima: Reals) -> float:
     return float(np.std(maxima, ddof=1) * count**-shape)
 
 
-def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+def sweep_budgets(analysis: SweepAnalysis, overlay: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
     """Return budgets for base amplitude and largest Responses of a sweep, with their frequencies."""
     found = analysis.response
     top = found.largest(found.response_ii)
@@ -196,25 +196,27 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
-    scatter = _UNTOLD if collides[top] else from_scatter(Cause.NOISE, sd_m, value_m, "parts of the window")
+    scatter = _NO_DRAWS if collides[top] else from_scatter(Cause.NOISE, sd_m, value_m, "parts of the window")
     amplitude = _amplitude(value_m, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
-    return amplitude, *_largest(analysis.facts, found, collides, laid)
+    return amplitude, *_largest(analysis.facts, found, collides, overlay)
 
 
-def stepped_budgets(analysis: SteppedSineAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+def stepped_budgets(
+    analysis: SteppedSineAnalysis, overlay: AbstractOverlay[Any] | None
+) -> tuple[Budget, ...]:
     """Return budgets for the largest Responses of the steps, with their frequencies."""
     found = analysis.response
     if not found.response_ii.size:
         return ()
     collides = found.response_i - np.nan_to_num(found.noise_bias_i) > _PEAKED * found.response_ii
-    return tuple(_largest(analysis.facts, found, collides, laid))
+    return tuple(_largest(analysis.facts, found, collides, overlay))
 
 
 def _largest(
     facts: RecordingFacts,
     found: SweepResponse | SteppedResponse,
     collides: Flags,
-    laid: AbstractOverlay[Any] | None,
+    overlay: AbstractOverlay[Any] | None,
 ) -> Iterator[Budget]:
     stated = stated_uncertainties(facts.bench, facts.response)
     rate = f", swept at {abs(found.sweep_rate_hz_per_s):.3g} Hz/s" if isinstance(found, SweepResponse) else ""
@@ -233,8 +235,8 @@ def _largest(
                 own.append(Contribution(Cause.CHANCE, None, "drop-outs may hide the largest value"))
         if collides[top]:
             is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
-            of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _UNTOLD
-            own = [_scatter(laid, name, top) or of_window]
+            of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _NO_DRAWS
+            own = [_scatter(overlay, name, top) or of_window]
         elif name == RESPONSE_I and isinstance(found, SteppedResponse):
             own += _of_change(float(found.slow_change[top]))
         if not collides[top] and name == RESPONSE_I:
@@ -244,9 +246,9 @@ def _largest(
         yield Budget(f"largest {name}, at {at}{rate}", value, "", (*_ratio(stated), *own))
 
 
-def _scatter(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
+def _scatter(overlay: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
     """Return the scatter of one value over draws with the measured kind of motion; None below five draws."""
-    curve = None if laid is None else laid.quantity(name)
+    curve = None if overlay is None else overlay.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
     source = f"{int(curve.count[place])} simulated draws"

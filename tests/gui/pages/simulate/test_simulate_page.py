@@ -44,7 +44,7 @@ def test_a_simulation_completes_and_is_drawn(page, wait_for):
     wait_for(lambda: not page.simulator.is_busy, 60.0)
     for _ in page.plots.plots:
         page.refresh()
-    assert page.progress.done == page.progress.asked == 56
+    assert page.progress.done == page.progress.requested == 56
     assert page._state.text() == "Complete."
     assert page._bar.value() == 56
     first, _second = lines(page.plots.responses)
@@ -59,11 +59,11 @@ def test_cancelling_is_immediate_and_keeps_partial_results(page, wait_for):
     page.cancel()
     assert not page.simulator.is_busy
     found = page.progress.done
-    assert 0 < found < page.progress.asked
+    assert 0 < found < page.progress.requested
     assert page._state.text().startswith("Cancelled")
     simulate(page, step_hz=100.0)
     wait_for(lambda: not page.simulator.is_busy, 60.0)
-    assert page.progress.done == page.progress.asked == 6
+    assert page.progress.done == page.progress.requested == 6
 
 
 @pytest.mark.thorough

@@ -171,7 +171,7 @@ class MotionView(QWidget):
 
     def show_motion(self, motion: SettledMotion) -> None:
         """Draw a motion."""
-        self.caption.setText(motion.said)
+        self.caption.setText(motion.text)
         shown = motion.time_s <= SHOWN_PERIODS / motion.frequency_hz
         is_low = (motion.line_hz > 0.0) & (motion.line_hz < HIGHEST_MULTIPLE * motion.frequency_hz)
         data = (
@@ -307,7 +307,7 @@ class MapsPage(Page):
             match part:
                 case MapPicture():
                     self.picture, self._is_stale = part, True
-                    self._show_text(part.said)
+                    self._show_text(part.text)
                 case Trouble():
                     self.context.say(Notice(NoticeKind.WARNING, part.sentence))
                 case _:

@@ -164,7 +164,7 @@ class SimulatePage(Page):
 
     def _say_progress(self, text: str) -> None:
         is_busy = self.simulator.is_busy
-        done, total = (0, 0) if self.progress is None else (self.progress.done, self.progress.asked)
+        done, total = (0, 0) if self.progress is None else (self.progress.done, self.progress.requested)
         self._bar.show_done(done, total)
         self._state.setText(text)
         self._cancel.setEnabled(is_busy)
