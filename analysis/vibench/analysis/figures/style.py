@@ -105,7 +105,7 @@ def plain_label(name: str) -> str:
 
 
 def new_figure(height_in: float) -> Figure:
-    """Make a figure of the common width and a given height [in], laid out without overlaps."""
+    """Make a figure of the common width and of ``height_in`` inches, laid out without overlaps."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -122,7 +122,7 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None
 
 
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
-    """Set a logarithmic frequency axis with ticks such as 20, 50, 100; a narrow band stays linear."""
+    """Give ``axes`` a logarithmic frequency axis with ticks at 20, 50, 100; a narrow band stays linear."""
     axes.set_xlim(low_hz * (1 - _EDGE), high_hz * (1 + _EDGE))
     if high_hz < _LINEAR_BELOW * low_hz:
         return
@@ -136,7 +136,7 @@ def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
 
 
 def magnitude_axis(axes: Axes) -> None:
-    """Set a logarithmic magnitude axis with ticks at powers of ten; a narrow range has more."""
+    """Give ``axes`` a logarithmic magnitude axis with ticks at powers of ten, or more in a narrow range."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.yaxis.set_minor_formatter(_Between(minor_thresholds=_FEW_DECADES))
