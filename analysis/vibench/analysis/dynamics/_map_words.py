@@ -105,11 +105,9 @@ def _fixed(plan: Map) -> list[str]:
     """Return the fixed parameters of a map, except a start at zero."""
     law = [] if plan.model is None else [f"model = {plan.model}"]
     values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
-    is_shown = {
-        name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()
-    }
+    is_set = {name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()}
     return law + [
-        f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and is_shown[name]
+        f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and is_set[name]
     ]
 
 

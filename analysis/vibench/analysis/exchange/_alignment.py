@@ -197,20 +197,18 @@ class TimeAxis:
         if (unit := self.unit) is None:
             return replace(channel, runs=self.runs, time_trouble=trouble)
         bounds = rate_bounds(self.interval, self.uncertainty, unit)
-        rate_hz = channel.sample_rate_hz
-        if rate_hz is not None and not unit:
+        rate = channel.sample_rate_hz
+        if rate is not None and not unit:
             # Choose the unit of the times that agrees with the stated rate.
             units = {each: rate_bounds(self.interval, self.uncertainty, each) for each in _UNITS}
-            unit, bounds = next(
-                ((a, b) for a, b in units.items() if b and agrees(rate_hz, b)), (unit, bounds)
-            )
+            unit, bounds = next(((a, b) for a, b in units.items() if b and agrees(rate, b)), (unit, bounds))
         second = SECONDS[unit.casefold()]
-        if rate_hz is not None and bounds is not None and not agrees(rate_hz, bounds):
-            trouble = f"says {rate_hz:.9g} samples/s, and its times say {sum(bounds) / 2:.9g}"
+        if rate is not None and bounds is not None and not agrees(rate, bounds):
+            trouble = f"says {rate:.9g} samples/s, and its times say {sum(bounds) / 2:.9g}"
         is_exact = bounds is not None and self.uncertainty == 0
         return replace(
             channel,
-            sample_rate_hz=rate_hz if rate_hz is not None or not is_exact or bounds is None else bounds[0],
+            sample_rate_hz=rate if rate is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
             # Times that start at zero are relative to the stated start.
             start_s=self.start * second

@@ -57,12 +57,9 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     length = max(1, motion.tracked.p.size // _COLUMNS)
     count = motion.tracked.p.size // length
     pieces = motion.tracked.p[: count * length].reshape(count, length)
-    is_tracked = ~np.isnan(pieces).all(axis=1)
+    has_any = ~np.isnan(pieces).all(axis=1)
     low, high = np.full(count, np.nan), np.full(count, np.nan)
-    low[is_tracked], high[is_tracked] = (
-        np.nanmin(pieces[is_tracked], axis=1),
-        np.nanmax(pieces[is_tracked], axis=1),
-    )
+    low[has_any], high[has_any] = np.nanmin(pieces[has_any], axis=1), np.nanmax(pieces[has_any], axis=1)
     time_s = motion.time_s[: count * length : length]
     axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED)
     _stops(axes, motion)

@@ -141,17 +141,15 @@ def stepped_level_caption(found: SteppedResponse) -> str:
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
     )
     jumps = level_jumps(found)
-    sentences = [
+    texts = [
         f"Going {each.direction}, Response II changes by a factor of {each.factor:.3g} between "
         f"{each.before_vpp:.4g} and {each.after_vpp:.4g} Vpp."
         for each in jumps
     ]
     apart = hysteresis_vpp(jumps)
     if apart is not None:
-        sentences.append(
-            f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back."
-        )
-    return " ".join([text, *(sentences or ["No jump by more than a factor of two."])])
+        texts.append(f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back.")
+    return " ".join([text, *(texts or ["No jump by more than a factor of two."])])
 
 
 def tracked_caption(found: SteppedResponse) -> str:

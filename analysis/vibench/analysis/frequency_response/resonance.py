@@ -253,12 +253,9 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         fit = _best(band, lines, starts)
         if fit is None or fit.chi_square * fit.freedom > last - _LEAST_GAIN:
             break
-        determined_modes = _determined_modes(fit, lines)
-        best = determined_modes if fit.explains and determined_modes else best
-        if (
-            best is determined_modes
-            and max(each.reduced_chi_square for each in determined_modes) <= fit.chi_square
-        ):
+        modes = _determined_modes(fit, lines)
+        best = modes if fit.explains and modes else best
+        if best is modes and max(each.reduced_chi_square for each in modes) <= fit.chi_square:
             break
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))

@@ -193,7 +193,7 @@ def _refine(
             found.values[n],
             float(np.hypot(found.half[n], _Z * shared.get(what, 0.0))),
             value_of(described, what),
-            is_determined=bool(is_determined[n] and not is_beyond[n]),
+            is_known=bool(is_determined[n] and not is_beyond[n]),
         )
         for n, what in enumerate(wanted)
     )
@@ -291,9 +291,9 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
 
 
 def _parameter(
-    what: Hidden, value: float, half: float, described: float, *, is_determined: bool
+    what: Hidden, value: float, half: float, described: float, *, is_known: bool
 ) -> FoundParameter:
-    why = "" if is_determined else "this motion does not determine it better than the description"
+    why = "" if is_known else "this motion does not determine it better than the description"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 

@@ -335,9 +335,7 @@ def findings(results: CampaignResults) -> Iterator[str]:
     """
     yield from results.model_said
     for each in results.in_order:
-        yield from (
-            f"{each.analysis.facts.name}: {sentence}" for sentence in DRAWINGS[each.kind].findings(each)
-        )
+        yield from (f"{each.analysis.facts.name}: {text}" for text in DRAWINGS[each.kind].findings(each))
 
 
 def result_sentence(result: AnyResult) -> str:

@@ -114,19 +114,15 @@ def main() -> None:
     sys.stdout.write("{}\n")
     sys.stdout.flush()
     for line in sys.stdin:
-        question = json.loads(line)
+        query = json.loads(line)
         bounds: dict[str, float | None] = {}
         hindrance = ""
         try:
-            with _open_when_there(
-                Path(question["path"]), question["stretch"], question["recorded_s"]
-            ) as recording:
-                if question["path"] not in facts:
-                    facts[question["path"]] = recording_facts(recording)
-                known = facts[question["path"]]
-                bounds = bounds_of(
-                    result_so_far(recording, known, question["stretch"], question["recorded_s"])
-                )
+            with _open_when_there(Path(query["path"]), query["stretch"], query["recorded_s"]) as recording:
+                if query["path"] not in facts:
+                    facts[query["path"]] = recording_facts(recording)
+                known = facts[query["path"]]
+                bounds = bounds_of(result_so_far(recording, known, query["stretch"], query["recorded_s"]))
         except (AnalysisError, RecordingError, *CONTRADICTIONS) as error:
             hindrance = str(error)
         sys.stdout.write(json.dumps({"bounds": bounds, "hindrance": hindrance}) + "\n")

@@ -205,10 +205,8 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
     """Yield sentences on the findings of feedback; none without feedback."""
     jumps = noted_jumps(notes)
     if jumps:
-        places = ", ".join(
-            f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps
-        )
-        yield f"Jumps between {places}."
+        text = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
+        yield f"Jumps between {text}."
     yield from _motions([each for each in notes if isinstance(each, SegmentNote)])
     yield from (_resonance(each) for each in notes if isinstance(each, ResonanceNote))
     yield from _spectrum([each for each in notes if isinstance(each, NoiseNote) and each.realisation >= 0])

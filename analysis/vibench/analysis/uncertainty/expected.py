@@ -323,12 +323,10 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
         expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
     except ValidationError:  # imported, or written by another version
         expected_s = None
-    prediction = (
-        "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
-    )
+    forecast = "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
     last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
     reached = sum(each.is_reached for each in notes)
-    text = f"{last}{reached} of {len(notes)} stretches known well enough, {time_s:.4g} s in all; {prediction}"
+    text = f"{last}{reached} of {len(notes)} stretches known well enough, {time_s:.4g} s in all; {forecast}"
     yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 
