@@ -30,9 +30,9 @@ from vibench.stop_files import stop_path, taken_path
 from ..errors import AcquisitionError
 from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 
-# Stops without a connection: a file in the state folder, for which a driving program looks all the time. Its
-# name contains process, start time and level, so it can be found by a process that may open no more files,
-# and be written on a full disk; its content is the reason, if there is room for one (decision 0029).
+# A stop needs no connection: it is a file in the state folder, which a driving program checks all the time.
+# The file name contains process, start time and level. A process that may open no more files can still find
+# it, and a full disk has room for it. The file contains the reason if there is space (decision 0029).
 
 SILENT_REASON = "a stop that was left in the state folder"
 
@@ -47,7 +47,7 @@ def engines_folder() -> Path:
 
 
 class KeptStops:
-    """The stops that are written for one process."""
+    """Stop files that are addressed to one process."""
 
     def __init__(
         self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path
@@ -59,7 +59,7 @@ class KeptStops:
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
         self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """Released to read a reason."""
+        """File descriptor that is closed to make one available for reading a reason."""
 
     @classmethod
     def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
@@ -67,16 +67,16 @@ class KeptStops:
         return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
 
     def obey(self) -> None:
-        """Carry out new stops, the hardest first; confirm those obeyed."""
+        """Carry out new stops, the hardest first, and confirm those that were carried out."""
         for level, path in self._paths.items():
             try:
                 found = path.stat()
-            except OSError:  # not there, or the folder is not
+            except OSError:  # no such stop, or no folder
                 continue
             mark = (found.st_ino, found.st_mtime_ns)
             if self._obeyed.get(path) == mark:
                 continue
-            self._obeyed[path] = mark  # if it cannot be removed, it is obeyed only once
+            self._obeyed[path] = mark  # a stop that cannot be removed is carried out only once
             # Reading a pipe could wait for ever.
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             taken = Path(taken_path(str(path)))
@@ -86,7 +86,7 @@ class KeptStops:
         self.confirm()
 
     def confirm(self) -> None:
-        """Remove obeyed stops when nothing drives; until then, show that the program is alive."""
+        """Remove completed stops when no drive is on; until then, update their times as a sign of life."""
         is_advancing = DRIVES_ON.take_advance()
         for taken in tuple(self._taken):
             with suppress(OSError):  # somebody has emptied the folder
@@ -114,7 +114,7 @@ class KeptStops:
 
 
 INTERVAL_S = 0.05
-"""Interval of the look [s]."""
+"""Interval between two calls of a watchdog [s]."""
 LEFT_ALONE_S = 1.0
 
 
@@ -146,7 +146,7 @@ class Watchdog:
             try:
                 if not self._closing.wait(INTERVAL_S):
                     self._look()
-            except MemoryError:  # a record of it would take more memory
+            except MemoryError:  # logging it would need more memory
                 MEMORY_RESERVE.release()
             except Exception:
                 getLogger(__name__).exception("%s", self._thread.name)
@@ -162,16 +162,16 @@ class Program(BaseModel):
 
     pid: int
     what: str
-    """Its purpose: a campaign's name, or ``"window"``."""
+    """Purpose of the program: a campaign's name, or ``"window"``."""
     started_utc: str
     process_start: str = ""
-    """Start of its process, as the system counts: a number is used again, this pair is not."""
+    """Start of the process, from the system: numbers are reused, number and start together are not."""
     computer: str = ""
     """A state folder may be in a home folder that several computers share."""
 
     @property
     def place(self) -> Place:
-        """Where it runs: containers and computers may share a state folder."""
+        """Place where the program runs: containers and computers may share a state folder."""
         return place_of(self.process_start)
 
     @property
@@ -182,7 +182,7 @@ class Program(BaseModel):
         try:
             with closing(OpenFile(_path(self))) as file:
                 return not file.is_locked_alone()
-        except OSError:  # gone by now, or on a disk without locks
+        except OSError:  # file removed, or a disk without locks
             return False
 
     @property
@@ -259,14 +259,14 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
 def _read_stop(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except PermissionError:  # started as root, say: anyone who may write in this folder may stop it
+    except PermissionError:  # for example started as root; write access to the folder permits a stop
         pid, start, _ = path.name.split(".")
         facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
         return facts.model_dump_json().encode()
 
 
 def withdraw(program: Program) -> None:
-    """Remove a program's announcement; legal if there is none, or it cannot be removed."""
+    """Remove a program's announcement, if there is one; ignore a failure."""
     with suppress(OSError):
         _path(program).unlink()
 
@@ -274,7 +274,7 @@ def withdraw(program: Program) -> None:
 class _Reached:
     """Everything in this process that a stop from outside must reach: an engine, runs, checks.
 
-    The first of them represents the process until it ends, an engine also the runs in it.
+    The first entry is announced for the whole process until it ends, so an engine also covers its runs.
     """
 
     def __init__(self) -> None:
@@ -286,7 +286,7 @@ class _Reached:
         self._changing = Lock()
 
     def enter(self, entry: tuple[Press, Program]) -> None:
-        """Add one more; raises OSError when the state folder cannot be written."""
+        """Add an entry; raises OSError when the state folder cannot be written."""
         with self._changing:
             if not self._inside:
                 announced_programs(Program)  # removes entries of killed programs
@@ -300,7 +300,7 @@ class _Reached:
             self._inside.append(entry)
 
     def leave(self, entry: tuple[Press, Program]) -> None:
-        """Remove one; after the last, the look ends."""
+        """Remove an entry; stop looking for stops after the last one."""
         with self._changing:
             spoke = self._inside[0] is entry
             self._inside = [each for each in self._inside if each is not entry]
@@ -393,15 +393,15 @@ def _lock(path: Path) -> OpenFile | None:
 def _write(program: Program) -> Path:
     path = _path(program)
     coming = path.with_suffix(".coming")
-    coming.unlink(missing_ok=True)  # left by a killed process of this number
+    coming.unlink(missing_ok=True)  # left by a killed process with the same number
     # Nobody else may read a token, not even for the moment before the mode is set.
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(program.model_dump_json())
-        rename(coming, path)  # whole, or not there
+        rename(coming, path)  # readers never see a half-written file
     except OSError:
-        coming.unlink(missing_ok=True)  # a full disk has room for a name
+        coming.unlink(missing_ok=True)  # an empty file may remain on a full disk
         raise
     return path
 
@@ -412,7 +412,7 @@ def _sweep() -> None:
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
         start, _, rest = rest.rpartition(".")
-        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps of another computer
+        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps by another computer
         is_here = place_of(start) is Place.HERE
         if is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
             with suppress(OSError):
@@ -424,7 +424,7 @@ LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SI
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 """By default these neither end nor stop a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
-"""They stop a process, as Ctrl-Z does; a terminal sends the last two again and again."""
+"""Signals that suspend a process, as Ctrl-Z does; a terminal sends the last two repeatedly."""
 _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
 """Always handled; other signals are handled only if the program does not handle them itself."""
 

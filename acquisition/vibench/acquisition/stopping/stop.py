@@ -24,7 +24,7 @@ class StopLevel(StrEnum):
     """The output is switched off at once, with a step."""
 
     def is_harder_than(self, other: "StopLevel") -> bool:
-        """Whether this one ends sooner."""
+        """Whether this level ends the drive sooner."""
         return _HARDNESS[self] > _HARDNESS[other]
 
 
@@ -42,7 +42,7 @@ class Cause(StrEnum):
     TERMINATED = "terminated"
     """The system ended the process."""
     VIEWER_GONE = "viewer gone"
-    """Attended, without requests for too long: the window froze, was closed or was killed."""
+    """No request for too long in an attended run: the window froze, was closed or was killed."""
     PARENT_GONE = "parent gone"
     """The program that started the engine has ended."""
     PROGRAM = "program left"
@@ -87,7 +87,7 @@ class StopRequest:
 
 
 class StopSwitch:
-    """Used by any thread, and by signal handlers, to hold, to mark or to end a run or a campaign.
+    """Switch by which any thread or signal handler can hold, mark or end a run or a campaign.
 
     It takes no lock, so that a signal handler cannot wait for one. A stop cannot be withdrawn, only replaced
     by a harder one.
@@ -163,11 +163,11 @@ class DrivesOn:
         return bool(self._drives)
 
     def begin(self, drive: object) -> None:
-        """Note that a drive may be on, which resets an earlier unconfirmed state."""
+        """Note that a drive may be on, and forget earlier drives that were not confirmed as off."""
         self._drives = {drive}
 
     def confirm_silence(self, drive: object) -> None:
-        """Note that its output was read back as off. Legal at any time."""
+        """Note that the output of a drive was read back as off. Legal at any time."""
         self._drives.discard(drive)
 
     def note_advance(self) -> None:
@@ -185,18 +185,18 @@ DRIVES_ON = DrivesOn()
 
 
 RESERVE_BYTES = 16_000_000
-"""Commands of a generator take some kB; the rest is for other threads in the meantime."""
+"""Memory reserve. Generator commands take some kB; other threads may use the rest meanwhile."""
 
 
 class MemoryReserve:
-    """Reserved address space."""
+    """Reserved address space, released so that a drive can be silenced when memory is exhausted."""
 
     def __init__(self) -> None:
         self._held: mmap.mmap | None = None
         self._changing = Lock()
 
     def hold(self) -> None:
-        """Reserve it before any drive. Raises AcquisitionError when memory is too short."""
+        """Reserve memory before any drive. Raises AcquisitionError when memory is too short."""
         with self._changing:
             if self._held is None:
                 try:
