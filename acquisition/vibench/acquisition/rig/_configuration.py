@@ -49,7 +49,7 @@ COARSEST_GRID_RATE_HZ = 12_800.0
 WATCHED_HZ = 500.0
 """The highest resonance of the specimen, and the top of the paper's sines."""
 _MEASURED = 0.55
-"""Factor of `level_error`, measured against 409.6 thousand steps a second, at 60 Hz to 1 kHz."""
+"""Factor of `level_error`, from a comparison with 409,600 steps per second at 60 Hz to 1 kHz."""
 LARGEST_LEVEL_ERROR = 0.01
 """Largest level error of a plan on a coarser grid than the default."""
 STEPS_PER_SAMPLE = 2
@@ -95,10 +95,10 @@ class VirtualConfig(FrozenModel):
 
 
 def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
-    """Return the largest relative error by which the base moves too little in a sine.
+    """Return the largest relative shortfall of the base motion in a sine.
 
-    The drive is averaged over a step and held, (pi f h)^2 / 3; the rest is the specimen's force on the
-    table, which is extrapolated over the step. The specimen's response to the base is exact.
+    Averaging and holding the drive over a step causes (pi f h)^2 / 3. Extrapolating the specimen's force on
+    the table over the step causes the rest. The specimen's response to the base is exact.
     """
     return _MEASURED * (pi * frequency_hz / grid_rate_hz) ** 2
 
@@ -376,7 +376,7 @@ class ControllerConfig(FrozenModel):
     @property
     def loop_time_s(self) -> float:
         """Time from a motion to the resulting drive [s]."""
-        # The mean over a sample delays by half a sample, and the held voltage by one.
+        # Averaging over a sample delays by half a sample, and holding the voltage by one.
         return self.latency_s + 1.5 / self.rate_hz
 
 

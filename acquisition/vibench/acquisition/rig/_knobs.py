@@ -63,7 +63,7 @@ def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
 def transducer(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Return the sensor that the hardware configuration describes for a channel.
 
-    Raises ConfigurationError when it describes none.
+    Raises ConfigurationError when the configuration describes no sensor for it.
     """
     role, sensor = config.role, rig.sensor(config.role)
     if sensor is None:
@@ -132,7 +132,7 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# Validity of a sheet: a campaign of a day and a night; later, settings may have changed.
+# A sheet covers a campaign of a day and a night; after that, settings may have changed.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 
@@ -158,7 +158,7 @@ def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
 def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
     """Return a function that asks one question about each setting.
 
-    ``ask`` shows a question and returns the answer, as ``input`` does; ``operator`` is who answers.
+    ``ask`` shows a question and returns the answer, as ``input`` does; ``operator`` is the name to record.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -283,7 +283,7 @@ class Calibration:
 
     @property
     def advice(self) -> str:
-        """Advice about an invalid one."""
+        """Advice about an invalid calibration."""
         if self.is_to_come:
             return "the date is in the future: enter the one on the certificate in the configuration"
         return "have it calibrated, and enter the date in the configuration"

@@ -1,4 +1,4 @@
-"""Read hardware configurations, and find the drivers and scripts of faults that they name."""
+"""Read hardware configurations, and find the drivers and fault scripts named in them."""
 
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -75,7 +75,7 @@ def with_faults(rig: Rig, script: Path) -> Rig:
 
 
 class GeneratorDriver(Protocol):
-    """Entry point of ``vibench.generators``: usually a class with both as class methods."""
+    """Entry point of ``vibench.generators``: usually a class with these two class methods."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
         """Return the generator's abilities with this configuration, without opening it."""
@@ -83,7 +83,7 @@ class GeneratorDriver(Protocol):
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open a generator with its output off, at its smallest amplitude.
 
-        Raises InstrumentError when none answers, or another one; nothing stays open then.
+        Raises InstrumentError when no generator or another instrument answers; nothing stays open then.
         """
 
 
@@ -95,7 +95,7 @@ class DigitizerDriver(Protocol):
 
 
 class OutputDriver(Protocol):
-    """Entry point of ``vibench.outputs``; it has the name of the digitizer that it starts with."""
+    """Entry point of ``vibench.outputs``; registered under the name of the digitizer that starts with it."""
 
     def open(self, physical: str, config: OutputConfig, digitizer: Any) -> AnalogOutput:
         """Set an output to zero volts and reserve it.

@@ -24,9 +24,9 @@ class BaseQuantity(StrEnum):
     """A quantity of the chain that has a limit."""
 
     AMPLIFIER_VOLTAGE = "amplifier_voltage"
-    """At the amplifier's output [V]."""
+    """Voltage at the amplifier's output [V]."""
     CURRENT = "current"
-    """In the coil [A]."""
+    """Current in the coil [A]."""
     FORCE = "force"
     """Force of the coil on the table, force constant times current [N]."""
     STROKE = "stroke"
@@ -38,11 +38,11 @@ class BaseQuantity(StrEnum):
     AMPLITUDE = "amplitude"
     """Amplitude of the specimen: displacement of m0 against the table [m]."""
     M0_DISPLACEMENT = "m0_displacement"
-    """Motion of m0, absolute [m]."""
+    """Absolute displacement of m0 [m]."""
     M0_VELOCITY = "m0_velocity"
-    """[m/s]"""
+    """Absolute velocity of m0 [m/s]."""
     M0_ACCELERATION = "m0_acceleration"
-    """[m/s2]"""
+    """Absolute acceleration of m0 [m/s2]."""
     P = "p"
     """Displacement of m1 relative to m2 [m]."""
 
@@ -59,7 +59,7 @@ _COLUMNS = {
     BaseQuantity.M0_ACCELERATION: (_M0, 2),
     BaseQuantity.P: (_P, 0),
 }
-"""Column of the motion, and the power of i w that multiplies it."""
+"""Column of the linear motion, and the power of i omega by which it is multiplied."""
 
 
 class OnTable(StrEnum):
@@ -67,7 +67,7 @@ class OnTable(StrEnum):
 
     SPECIMEN = "specimen"
     NOTHING = "nothing"
-    """Smooth over frequency: for feedback, which measures the specimen's influence."""
+    """Bare table, with a smooth response: for feedback, which measures the specimen's influence."""
 
 
 @dataclass(frozen=True)

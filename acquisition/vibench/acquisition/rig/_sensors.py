@@ -1,4 +1,4 @@
-"""Sensors as data sheets and certificates describe them, and the channels that they show."""
+"""Sensors as described by data sheets and certificates, and the roles of channels."""
 
 import re
 from abc import abstractmethod
@@ -14,7 +14,7 @@ from ..host.toml_file import FrozenModel
 
 _VOLTS = {"V": 1.0, "mV": 1e-3, "uV": 1e-6}
 _STANDARD_GRAVITY, _POUND_KG = 9.80665, 0.45359237
-"""By definition (NIST SP 811)."""
+"""Exact values by definition (NIST SP 811)."""
 _UNITS = {
     "m s-2": {
         **dict.fromkeys(("m/s2", "m s-2", "ms-2"), 1.0),
@@ -41,7 +41,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest number of a sensitivity; anything below it, or above its inverse, is a slip of the pen."""
+"""Smallest number of a sensitivity; a smaller one, or one above the inverse, is a typing error."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
