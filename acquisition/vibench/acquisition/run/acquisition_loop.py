@@ -22,7 +22,7 @@ class AcquisitionLoop:
         self._digitizer = digitizer
         self._sink = sink
         self.segment: Segment | None = None
-        """The open named range."""
+        """Segment that is being recorded."""
         self.samples = 0
         """Samples recorded so far."""
         self.lost_samples = 0
@@ -48,7 +48,7 @@ class AcquisitionLoop:
             yield self._next(min(longest, goal - self.samples))
 
     def time_s(self) -> float:
-        """Return the time by which everything so far was to be read or has passed [s]."""
+        """Return the planned end of everything so far, delays included [s]."""
         return self._due_s
 
     @property
@@ -69,7 +69,7 @@ class AcquisitionLoop:
     def pass_time(self, duration_s: float) -> Iterator[Block]:
         """Read for another ``duration_s`` as in `read_for`, but leave samples unread that waited before.
 
-        If more time has passed already, what follows is delayed accordingly.
+        If more time has passed already, everything after it is delayed accordingly.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s

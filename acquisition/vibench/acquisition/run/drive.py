@@ -15,8 +15,8 @@ from .stream_drive import StreamDrive
 class Drive(Protocol):
     """Plays phases in sequence while the run reads.
 
-    A drive never waits: it yields how long to read until its next action, because samples read are the only
-    clock. Coming phases are announced, because some drives write ahead.
+    A drive never waits: it yields the time to read until its next action, because samples read are the only
+    clock. Coming phases are announced to it, because some drives write samples in advance.
     """
 
     @property
@@ -59,7 +59,7 @@ class Drive(Protocol):
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
         """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`.
 
-        ``clock_s`` returns the time [s], which advances further than asked where reading is slow.
+        ``clock_s`` returns the time [s]; when reading is slow, it advances by more than was yielded.
         """
 
     def cut(self) -> None:

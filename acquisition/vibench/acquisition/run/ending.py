@@ -1,4 +1,4 @@
-"""End of a run: the first cause is reported; silence, stop and a finished recording always follow."""
+"""End of a run: report the first cause, silence the drive, stop sampling, finish the recording."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class Progress:
     """The named range of the recording that the block belongs to."""
     block: Block
     elapsed_s: float
-    """Recorded so far [s]."""
+    """Time recorded so far [s]."""
     total_s: float
-    """Planned, from the first sample to the last [s]."""
+    """Planned time from the first sample to the last [s]."""
     amplitude_vpp: float
     """Setting of the generator, peak to peak [V]; 0 while its output is off."""
     frequency_hz: float | None = None
@@ -59,11 +59,11 @@ class Ending:
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 
     def is_stopped(self, reason: str, cause: Cause) -> None:
-        """Note that it was stopped."""
+        """Note that the run was stopped."""
         self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
 
     def is_failed(self, error: Exception, reason: str) -> None:
-        """Note a failure after any earlier cause."""
+        """Note a failure; an earlier cause stays first."""
         if self._cause is None:
             self.reason, self._cause = reason, _cause_of(error)
         else:
@@ -71,11 +71,11 @@ class Ending:
         self.state = RunState.FAILED
 
     def outcome(self, path: Path) -> Outcome:
-        """Return how it ended."""
+        """Return how the run ended."""
         return Outcome(self.state, self.reason, path, self._cause)
 
     def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:
-        """Silence the drive, end sampling and finish the recording, each even if another fails."""
+        """Silence the drive, end sampling and finish the recording; each step runs even if another fails."""
         with ExitStack() as leaving:
             leaving.callback(self._finish, sink)
             leaving.callback(self._stop_listening, digitizer)

@@ -1,4 +1,4 @@
-"""A function generator as a drive: one command for each change, and a ramp as a staircase of amplitudes."""
+"""Function generator as a drive: one command per change; a ramp is a staircase of amplitudes."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -23,7 +23,7 @@ every firmware, and reading times vary by some milliseconds."""
 CHECK_MARGIN_S = 0.5
 """Extra length of a check's burst, for commands and the reading of samples [s]."""
 LITTLE = 0.98
-"""Least reduction of a level that is made before the frequency changes."""
+"""Ratio of levels below which the amplitude is lowered before the frequency changes."""
 MOST_CYCLES = 50_000
 _BLIND_S = 0.1
 """Duration of a ramp without counting samples [s]."""
@@ -112,10 +112,10 @@ class GeneratorDrive:
         self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Nothing to prepare."""
+        """Do nothing: a generator prepares nothing."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Yield the commands of a phase; between them, yield how long to read until the next one [s]."""
+        """Send the commands of a phase; after each, yield the time to read until the next one [s]."""
         match phase.state:
             case RunState.CHECKING | RunState.ARMED:
                 self._sound(phase.play)
@@ -134,7 +134,7 @@ class GeneratorDrive:
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
         """Ramp down from the current level in as many steps as time allows; yield the length of each [s].
 
-        Stairs whose time has passed already are left out, up to the largest of a slow generator.
+        Steps whose time has passed are skipped, but no step exceeds the largest of a slow generator.
         """
         top, count, began_s, stair = self._level, self._stairs_within(ramp_s), clock_s(), 0
         while stair < count:
@@ -182,7 +182,7 @@ class GeneratorDrive:
             self._begin_bursts(play)
 
     def _begin_bursts(self, play: Play | None, check_s: float = 0.0) -> None:
-        """Turn the output on, with a dead man's switch by its first burst."""
+        """Turn the output on; with a dead man's switch, trigger the first burst."""
         match play:
             case Tone(frequency_hz, _) if self._dead_man is not None:
                 self._dead_man.arm(frequency_hz, check_s)
@@ -215,7 +215,7 @@ class GeneratorDrive:
     def _change_tone(self, old: Tone, new: Tone) -> None:
         """Lower the amplitude before the frequency changes, or raise it after, to never exceed the level.
 
-        For small changes, as between steps of a sweep, the frequency changes first, in time.
+        For small changes, as between steps of a sweep, the frequency changes first, so that it is on time.
         """
         if new.level < LITTLE * old.level:
             self._generator.set_amplitude(self._due_vpp)
@@ -236,7 +236,7 @@ class GeneratorDrive:
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Before the command: if it fails half-way, the output counts as on.
+        # Set before the command, so that the output counts as on if the command fails half-way.
         self._is_on = True
         self._generator.start()
 
@@ -263,7 +263,7 @@ class GeneratorDrive:
 
     @property
     def _due_vpp(self) -> float:
-        """The setting that belongs to the level [V], for what is played."""
+        """Setting for the current level and signal [V]."""
         planned_vpp = self._full_vpp(self._play)
         quiet_vpp = min(planned_vpp, self._quiet_vpp())
         return quiet_vpp + self._level * (planned_vpp - quiet_vpp)

@@ -1,4 +1,4 @@
-"""The limit monitor of a measurement: every block, and positions integrated from it, against the limits."""
+"""Limit monitor of a measurement: checks every block, and displacements integrated from it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from ..plan import InRunLimits, OnChange, OnOverload
 from ..rig import Channel, Rig, Role, suspended_mass_kg
 
 HIGH_PASS_HZ = 2.0
-"""Corner of every high pass: a sine of 10 Hz comes out 0.2 % too small, one of 5 Hz 2.5 %."""
+"""Corner of every high pass: it makes a sine of 10 Hz 0.2 % too small, and a sine of 5 Hz 2.5 %."""
 
 
 class _Section:
@@ -53,7 +53,7 @@ class BaseMotion:
 
 
 class BaseTracker:
-    """Integrates the base acceleration, each time with a second-order high pass."""
+    """Integrates the base acceleration twice, each time with a second-order high pass."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._to_velocity = _integrator(sample_rate_hz)
@@ -80,7 +80,7 @@ class SpecimenTracker:
     def follow(self, mass: Samples, base: BaseMotion, is_blind: NDArray[np.bool_]) -> Samples:
         """Return the displacement of the mass relative to the base [m] for the next samples of its sensor.
 
-        Where the sensor is past its range (``is_blind``) it shows no motion, and none is assumed.
+        Where the sensor exceeds its range (``is_blind``), no motion is assumed.
         """
         moved = self._to_velocity.run(np.where(is_blind, 0.0, mass))
         if self._role is Role.M0_DISPLACEMENT:
@@ -113,7 +113,7 @@ class _MonitoredQuantity:
 
 
 class LimitMonitor:
-    """Decides when the run must end.
+    """Checks the limits, and raises an error when the run must end.
 
     It is part of the loop that reads the samples, independent of windows and other processes. Blocks must
     be consecutive; after a gap it restarts.

@@ -68,7 +68,7 @@ class GlideWatch:
     ) -> None:
         """Add the record of a tone of the glide.
 
-        ``course`` returns the cycles since its start, for tones on average only.
+        ``course`` returns the cycles since the start, if the frequency is constant only on average.
         """
         if not blocks:
             return
@@ -133,25 +133,25 @@ HOLD_LONGEST_S = HOLD_ROOM_S
 
 
 LATEST = 0.5
-"""Largest delay of a glide, in steps."""
+"""Largest delay of a command in a glide that is not noted, in steps."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of late steps in a row that counts as a fault [s]."""
 LEARNT = 0.05
 """Least share of a delay by which later commands are sent earlier; larger for the first ones."""
 LONGEST_LEAD = 0.25
-"""Longest lead of a step."""
+"""Longest lead of a command, as a share of its step."""
 TOLD_CYCLES = 0.1
-"""Delay at the end of a glide that is noted."""
+"""Deviation of the drive at the end of a glide above which an event is noted [cycles]."""
 MOST_MADE_UP = 3.0
-"""Largest frequency correction for lost cycles, over the step between two frequencies."""
+"""Largest frequency correction for lost cycles, relative to the step between two frequencies."""
 LEAST_LEFT = 0.2
 """Smallest share of a step in which cycles are corrected."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
 class _Pace(Enum):
-    """Time base of a phase and its pieces."""
+    """Start time of a phase and its pieces."""
 
     AFTER_THE_COMMAND = auto()
     """The end of its first command, for settling."""
@@ -160,7 +160,7 @@ class _Pace(Enum):
     OF_THE_PLAN = auto()
     """The plan, for glides."""
     OF_ITSELF = auto()
-    """None: no command is due, or none takes time."""
+    """No time base: no command is due, or commands take no time."""
 
 
 class Stopped(Exception):
@@ -294,9 +294,9 @@ class PhaseRunner:
             self.loop.log(EventKind.LATE, text)
 
     def _require_pace(self, phase: Phase) -> float:
-        """Learn how late commands are given; note what is beyond half of a step, raise DriveLate in a row.
+        """Return the delay of this command [s], and send later commands earlier accordingly.
 
-        Return the delay of this one [s].
+        Delays above half a step are noted; several in a row raise DriveLate.
 
         Samples are handed over some milliseconds after they are converted, so that a command that waits for
         them is late; over a sweep of 200 Hz that would be a cycle or two. The next ones are given earlier.
@@ -380,9 +380,8 @@ class PhaseRunner:
     def _held(self) -> Iterator[Progress]:
         """Hold the run, monitored and recorded, until it is resumed or stopped.
 
-        Signals that must be fed cannot be held, and the recording has space for `HOLD_LONGEST_S`; then it
-        is
-        ramped down.
+        Signals that must be fed cannot be held, and the recording has space for `HOLD_LONGEST_S`; after that
+        the run is ramped down.
         """
         if not self._drive.can_hold:
             source = self._drive.drive_source.value

@@ -44,13 +44,13 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""Least ratio of the step of a glide to the time of a setting, which varies."""
+"""Least ratio of the step of a glide to the time that a setting takes, since that time varies."""
 _MOST_COMMANDS = 2
 """Commands for one change of tone: amplitude and frequency."""
 
 
 def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:
-    """Refuse a glide with too short steps; return the additional time of a plan of settled tones [s].
+    """Refuse a glide with too short steps; return the time that commands add to settled tones [s].
 
     Raises ConfigurationError when a step is shorter than the generator takes for a setting, measured now.
     """
@@ -190,8 +190,8 @@ class Run(ClosedOnLeaving):
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted, before anything plays
-        self._silence: SilenceWatch  # made when the plan is admitted: the drive is recorded then
-        self._guard: DriveGuard  # likewise
+        self._silence: SilenceWatch  # made after the check that the drive is recorded
+        self._guard: DriveGuard  # made when the plan is admitted
         self._controller: Controller[None] | None = None
         self._until: UntilWatch | None = None
         self._known = ""
@@ -357,7 +357,7 @@ class Run(ClosedOnLeaving):
                 return 0.0
 
     def _begin(self, coming: Iterable[Phase]) -> None:
-        """Start sampling, and with it what plays by the digitizer's trigger."""
+        """Start sampling, and with it an output that shares the digitizer's trigger."""
         self._guard.begin()
         self._drive.arm(coming)
         self._bench.digitizer.start()

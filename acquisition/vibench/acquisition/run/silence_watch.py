@@ -1,6 +1,6 @@
-"""Measured silence of the drive, because commands may fail.
+"""Check of the drive before a run, and measurement of its silence after a stop.
 
-After a stall, samples read after the last command may be older than it.
+After a stall, samples read after the last command may have been taken before it.
 """
 
 from collections.abc import Callable
@@ -37,7 +37,7 @@ class LowLevelCheck(StrEnum):
 
     AT_LOW_LEVEL = "at low level"
     RECENTLY_PASSED = "recently passed"
-    """Left out: the bench was checked in the same session and not touched since."""
+    """No check: the bench was checked in the same session and not touched since."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def check_figures(
 
 
 def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-    """Amplitude of the sine at a known frequency: least squares beside a constant and a drift.
+    """Return the amplitude of a sine of known frequency, fitted with a constant and a linear drift.
 
     ``volts`` has shape (samples,), more than a period.
     """
@@ -158,13 +158,13 @@ def _require_base(figures: CheckFigures) -> None:
 SILENT_V = 5e-3
 """Half of peak to peak at the amplifier's input: noise, hum, and the lowest setting of a generator [V]."""
 HUM_FACTOR = 2.0
-"""Multiple of the hum if that is larger while nothing plays."""
+"""Silence may have this multiple of the hum measured before the run, if that exceeds `SILENT_V`."""
 LISTEN_S = 0.02
 """Period of the mains, the step of the search for silence [s]."""
 LONGEST_S = 12.0
 """Longest listening time [s], longer than the converter's buffer."""
 STILL_ON = 0.1
-"""Share of the drive before the stop that cannot be hum."""
+"""Share of the largest recorded drive above which the residue cannot be hum."""
 
 
 class SilenceWatch:
@@ -233,7 +233,7 @@ def _half_peak_to_peak(volts: Samples) -> float:
 STANDSTILL_BLOCKS = 50
 """Blocks without reading after which a drive is silenced, half of a converter's buffer."""
 STOPPED_BLOCKS = 15
-"""The same after a stop was requested."""
+"""Blocks without reading that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
 """Longest interval between two checks that counts [s]: in a longer one the whole process was suspended."""
 
@@ -272,7 +272,7 @@ class DriveGuard(ClosedOnLeaving):
         self._still_s, self._has_begun = 0.0, True
 
     def advance(self) -> None:
-        """Note a block that was read."""
+        """Note that a block was read."""
         self._blocks += 1
         DRIVES_ON.note_advance()
 

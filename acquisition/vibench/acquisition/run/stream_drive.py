@@ -1,4 +1,4 @@
-"""An analogue output as a drive: samples are written ahead, and reading is the clock."""
+"""Analogue output as a drive: samples are written in advance, and samples read are the clock."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -29,9 +29,7 @@ class _Stretch:
     end_level: float
 
     def levels(self, first: int, count: int) -> Samples:
-        """Level of ``count`` samples from number ``first`` of the sequence on; the first has
-        ``begin_level``.
-        """
+        """Return the levels of ``count`` samples from sample number ``first`` of the sequence on."""
         progress = (first - self.begin + np.arange(count)) / (self.end - self.begin)
         rise = self.end_level - self.begin_level
         return np.asarray(self.begin_level + rise * 0.5 * (1 - np.cos(np.pi * progress)))
@@ -42,8 +40,7 @@ class OutputSynthesizer:
 
     The level is an envelope: a half cosine over a ramp, otherwise constant. The phase of a tone is
     continuous when its frequency changes. Phase boundaries are at the samples nearest to the sums of all
-    durations, as in the recording. At the end, the signal fades
-    within `RELEASE_S`, and silence follows.
+    durations, as in the recording. At the end, the signal fades within `RELEASE_S`, and silence follows.
     """
 
     def __init__(self, sample_rate_hz: float) -> None:
@@ -135,7 +132,7 @@ class OutputSynthesizer:
 
 BLIND_FADE_S = 0.1
 """Fade for exits without sampling [s]."""
-# A duration of a whole number of blocks must not become one part more by rounding.
+# Rounding must not add a part to a duration of a whole number of blocks.
 _ROUNDING = 1e-9
 
 
@@ -208,8 +205,7 @@ class StreamDrive:
     def silence(self) -> None:
         """Fade as fast as possible, write until the fade has been played, then stop.
 
-        For exits without sampling. A device that accepts no more samples is
-        stopped at once.
+        For exits without sampling. A device that accepts no more samples is stopped at once.
         """
         try:
             with suppress(AcquisitionError):  # if this fails, stop() still follows

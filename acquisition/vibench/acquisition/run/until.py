@@ -26,7 +26,7 @@ from ..stopping.stop import StopSwitch
 PIECE_S = 0.5
 """Interval of checks whether to continue [s]; realisations of noise are always completed."""
 LONGEST_HINDRANCE = 120
-"""Characters: an event's text is short."""
+"""Largest length of the text of a hindrance [characters]."""
 _ENDING_S = 2.0
 _READY_S = 60.0
 """Longest start of the analysis [s]; the recording continues without it."""
@@ -113,7 +113,7 @@ class UntilWatch(ClosedOnLeaving):
         self._longest_s = phase.duration_s
         self._begin(min(self._until.shortest_s, phase.duration_s))
         left_s = phase.duration_s
-        while left_s > 1e-9 and not self._is_reached:  # 1e-9: rounding leaves no piece
+        while left_s > 1e-9 and not self._is_reached:  # 1e-9: ignore a remainder due to rounding
             piece_s = min(PIECE_S, left_s)
             yield Phase(phase.state, phase.play, piece_s, phase.segment)
             left_s -= piece_s
