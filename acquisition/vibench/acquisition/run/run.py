@@ -425,7 +425,7 @@ def run_measurement(
     is finished as failed.
     """
     run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
-    # Signals stay blocked until the run has ended, so that nothing interrupts the silencing.
+    # Signals are handled until the run has ended, so that none interrupts the silencing.
     with stop_on_signal(run.switch, path.stem), run:
         for progress in run:
             on_progress(progress)

@@ -231,7 +231,7 @@ def _half_peak_to_peak(volts: Samples) -> float:
 
 
 STANDSTILL_BLOCKS = 50
-"""Blocks without reading after which a drive is silenced, half of a converter's buffer."""
+"""Blocks without reading after which a drive is silenced: half of the default buffer of a converter."""
 STOPPED_BLOCKS = 15
 """Blocks without reading that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1

@@ -239,9 +239,8 @@ def programs_of_other_places() -> tuple[Program, ...]:
 
 def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]:
     try:
-        paths = sorted(
-            engines_folder().iterdir()
-        )  # glob would find nothing in a folder without read permission
+        # glob would find nothing in a folder without read permission.
+        paths = sorted(engines_folder().iterdir())
     except OSError as error:
         raise AcquisitionError(
             f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
@@ -251,12 +250,12 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
         if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait
             continue
         try:
-            yield path, model.model_validate_json(_read_stop(path))
+            yield path, model.model_validate_json(_read_announcement(path))
         except (ValueError, OSError):  # from another version, of another kind, or removed in between
             continue
 
 
-def _read_stop(path: Path) -> bytes:
+def _read_announcement(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except PermissionError:  # for example started as root; write access to the folder permits a stop
