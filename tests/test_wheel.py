@@ -87,6 +87,7 @@ def users_folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.thorough
 def test_the_wheel_holds_types_templates_and_the_files_that_are_shipped(wheel):
     names = set(ZipFile(wheel).namelist())
     for portion in PORTIONS:
@@ -103,6 +104,7 @@ def test_the_wheel_holds_types_templates_and_the_files_that_are_shipped(wheel):
         assert f"vibench/shipped/studies/paper/{path.name}" in names
 
 
+@pytest.mark.thorough
 def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_imported(wheel):
     names = {
         name

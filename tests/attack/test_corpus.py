@@ -43,6 +43,7 @@ def test_a_broken_imported_file_is_refused_by_name(runner, path):
     assert ("largest number" in ending.err) == (path.stem == "largest_number_of_all")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("suffix", imported_files.WRITERS)
 def test_the_unbroken_files_of_the_attack_can_be_imported(runner, suffix):
     ending = runner.run(

@@ -160,6 +160,7 @@ def committed(part):
         return 0
 
 
+@pytest.mark.thorough
 def test_a_bench_check_is_stored_and_can_be_shown_again(vibench_here, tmp_path):
     environment = {"VIBENCH_STATE_DIR": str(tmp_path / "state")}
     made = vibench_here("bench", "check", "--json", cwd=tmp_path, environment=environment)

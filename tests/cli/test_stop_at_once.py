@@ -86,6 +86,7 @@ def test_unusual_arguments_are_passed_to_the_complete_command(words, code):
         assert north.poll() is None
 
 
+@pytest.mark.thorough
 def test_the_fast_stop_gives_advice_about_a_killed_program():
     with driving("north") as north:
         north.kill()

@@ -156,6 +156,7 @@ def test_a_crate_marks_damaged_recordings(vibench_here, folder):
     assert "; complete: " in graph["one.h5"]["description"]
 
 
+@pytest.mark.thorough
 def test_a_crate_names_missing_recordings_of_its_campaign(vibench_here, folder):
     campaign = folder / "tiny.toml"
     campaign.write_text(TINY)

@@ -43,6 +43,7 @@ def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, held):
         assert each.base_m_per_s2 == pytest.approx(1e-6 / against * omega**2, rel=0.03)
 
 
+@pytest.mark.thorough
 def test_an_unstable_branch_is_recorded_and_flagged(rig, held):
     # Between the folds of a hardening spring: under this table's voltage the motion leaves quicker than that.
     hard = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}

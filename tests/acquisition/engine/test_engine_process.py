@@ -143,6 +143,7 @@ class TestTheJob:
             assert [mark.text for mark in marks] == ["the sphere was heard"]
             assert before <= marks[0].sample <= recording.samples
 
+    @pytest.mark.thorough
     def test_a_held_run_continues(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         client.stop(StopLevel.HOLD)

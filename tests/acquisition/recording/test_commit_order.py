@@ -177,6 +177,7 @@ def require_nothing_but_the_truth(recording, truth):
         assert (recording.reason, recording.samples) == ("done", BLOCKS * BLOCK)
 
 
+@pytest.mark.thorough
 def test_the_sample_count_never_exceeds_the_data_after_a_power_cut(traced):
     places, empty, trace, truth = traced
     chance = random.Random(3)

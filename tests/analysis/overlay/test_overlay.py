@@ -66,6 +66,7 @@ def test_disagreements_with_the_twin_are_stated_first(sweep_file):
     assert replace(overlay, ensemble=tuple(fine)).agreement[0].startswith("fine a")
 
 
+@pytest.mark.thorough
 def test_weak_noise_and_its_simulation_agree_on_every_line(noise_file):
     analysis, overlay = overlay_of(noise_file())
     assert isinstance(overlay, NoiseOverlay)

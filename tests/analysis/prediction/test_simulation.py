@@ -136,6 +136,7 @@ def test_a_stricter_accuracy_is_said_to_cost_more():
     assert MEASURED[Accuracy.REFERENCE].chaos < MEASURED[Accuracy.QUICK].chaos
 
 
+@pytest.mark.thorough
 def test_a_short_request_replaces_a_dropped_long_one():
     """The real process; the answer to the short request comes whole."""
     first, second, pool = [], [], Pool(1)

@@ -255,6 +255,7 @@ def test_a_part_is_bridged_like_the_whole(rig, tmp_path):
             assert isinstance(each, Dropout)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rate_hz", [1e-6, 0.4, 1e12])
 def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=1)
@@ -265,6 +266,7 @@ def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
         assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
 
 
+@pytest.mark.thorough
 def test_many_drop_outs_give_a_warning(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measured(rig, plan, tmp_path / "d.h5", 1.0)) as recording:

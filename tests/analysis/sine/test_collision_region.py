@@ -63,6 +63,7 @@ def test_the_region_reaches_from_the_first_impact_to_the_last(amplitude_m, start
     assert not last.reaches_stop
 
 
+@pytest.mark.thorough
 def test_without_impacts_there_is_no_collision_region():
     result, impacts_hz = found(2e-7, 225.0, 385.0)
     assert impacts_hz.size == 0
@@ -136,6 +137,7 @@ def test_collisions_in_a_fast_sweep_are_reported(tmp_path, duration_s):
     assert sum(each.high_hz - each.low_hz for each in result.analysis.collisions.regions) > 80
 
 
+@pytest.mark.thorough
 def test_without_a_specimen_ringing_and_weak_impacts_are_not_distinguished():
     """Orders 2 and 3 show the impacts of strong collisions, whatever is known of the specimen."""
     strong, _ = found(20e-6, 240.0, 300.0, known=None)

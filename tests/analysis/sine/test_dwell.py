@@ -89,6 +89,7 @@ def test_stated_noise_bias_and_spread_match_repeated_dwells():
     assert stated == pytest.approx(np.std([each.response_ii for each in found]), rel=0.4)
 
 
+@pytest.mark.thorough
 def test_twice_the_uncertainty_of_a0_covers_it_in_95_percent():
     """Ten tenths of a window tell their own scatter to a quarter only: twice it held A0 in 92."""
     rng, draws, held = np.random.default_rng(4), 1000, 0

@@ -71,6 +71,7 @@ def test_bounds_include_noise_that_appears_only_during_the_drive(tmp_path):
         assert covers(first, linear(404.1)), first.sentence
 
 
+@pytest.mark.thorough
 def test_bounds_include_noise_larger_than_the_drive(tmp_path):
     found = measured(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.02)
     first = budgets_of(found)[1]
@@ -112,12 +113,14 @@ def test_chaos_is_not_reported_as_noise(tmp_path):
     assert first.contributions[-2].source == "silence before the check"
 
 
+@pytest.mark.thorough
 def test_noise_also_present_in_silence_is_not_chaos(tmp_path):
     """Of eight seeds this one's points look like more than linear noise to the surrogates."""
     found = measured(tmp_path, dwell(180.0), seed=8, amplifier_noise_v=0.005)
     assert found.analysis.motion.verdict.kind is MotionKind.UNDECIDED
 
 
+@pytest.mark.thorough
 def test_without_a_silent_part_large_noise_is_not_determined(tmp_path):
     """The same recording once more, its check left out."""
     rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"amplifier_noise_v": 0.02})})

@@ -87,6 +87,7 @@ def test_multipliers_match_the_branch_with_contacts_shorter_than_a_sample():
     assert seen == pytest.approx(exact, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
     found = branch()
     unstable = np.flatnonzero(~found.is_stable)

@@ -108,6 +108,7 @@ def test_an_old_recording_is_reported_by_command_and_report(run, recording, tmp_
     assert len(json.dumps(json.loads(with_it.stdout))) > 100
 
 
+@pytest.mark.thorough
 def test_the_window_lists_every_other_test(run):
     code = (
         "from vibench.gui.pages.test.test_page import shipped_tests\n"

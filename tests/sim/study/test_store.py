@@ -154,6 +154,7 @@ def test_sessions_state_who_computed_which_point(small, tmp_path):
     np.testing.assert_array_equal(results.values(SESSION), np.where(was_done, 0.0, 1.0))
 
 
+@pytest.mark.thorough
 def test_resuming_computes_what_is_missing_and_nothing_else(study, tmp_path, require_equal):
     path = tmp_path / "a.h5"
     make_file(path, study)

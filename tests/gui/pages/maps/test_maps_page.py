@@ -54,6 +54,7 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, wait_for):
     assert not np.array_equal(page.map.image.image, before)
 
 
+@pytest.mark.thorough
 def test_the_visible_part_can_be_refined(page, wait_for):
     compute_map(page, wait_for)
     page.map.plot.setXRange(110.0, 120.0, padding=0.0)
