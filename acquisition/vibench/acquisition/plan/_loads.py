@@ -129,7 +129,7 @@ class _BroadPlay:
         if not self._touches:
             return self._through(self._model.transfer, quantity)
         stuck = self._through(self._model.stuck_transfer, quantity)
-        # A p at the gap, at any frequency of the band.
+        # Add the force of p at the gap, at any frequency of the band.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)

@@ -37,9 +37,9 @@ class MeasurementPreview:
     rms_v: float
     peak_v: float
     checks: tuple[LimitCheck, ...]
-    """The most used limit first."""
+    """Limit checks, the one nearest to its limit first."""
     duration_s: float
-    """From the first ramp to the last [s]."""
+    """Duration from the first ramp to the last [s]."""
     size_bytes: int
     """Size [bytes] of the recording while it is made."""
     least_growth_time_s: float | None

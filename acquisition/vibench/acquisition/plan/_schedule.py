@@ -20,8 +20,7 @@ from ..recording import SegmentLabel
 from ..rig import OutputUse, Rig, generator_driver
 from ._until import SHORTEST_S, Until
 
-# The plan of one measurement: excitation, ramps, limits during the run. A point: one recording of a campaign,
-# and its chain of points.
+# A measurement is a plan: excitation, ramps, limits during the run. A point is one recording of a campaign.
 
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 

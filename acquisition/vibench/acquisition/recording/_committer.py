@@ -35,7 +35,7 @@ class Batch:
     """Writes that belong together, with the counters that validate them."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
-    """(offset, data)."""
+    """Offset in the file and data of each write."""
     counters: Mapping[int, int] = field(default_factory=dict)
     """Value of each counter, by its offset, once the writes are safe."""
     reservations: tuple[tuple[int, int], ...] = ()
@@ -188,7 +188,7 @@ Cell = str | int | float
 
 
 class TableWriter:
-    """Row counter and positions of one table."""
+    """Writes the rows of one table, at the places reserved in the file."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places

@@ -39,7 +39,7 @@ _LEAST_HELD = 8
 _QUANTA = 4.0
 """Change from sample to sample, over the smallest of the channel, at both ends of equal samples."""
 _LEAST_OF_FLANK = 0.25
-"""Least share of it without other drop-outs."""
+"""Least share of a flank that has no other drop-outs."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
 """Length of motion after a sample needed to decide about it [s]."""
 _OUTSTANDING = 8.0
@@ -63,7 +63,7 @@ class Dropout(NamedTuple):
 
     first: int
     stop: int
-    """One past the last."""
+    """Sample after the last one."""
 
 
 def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:

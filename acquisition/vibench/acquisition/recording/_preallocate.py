@@ -63,7 +63,7 @@ class Places:
     reason: int
     tables: Mapping[str, TablePlaces]
     capacity: int
-    """Samples per channel that fit."""
+    """Most samples per channel that the file can take."""
     reserved: int
     """Samples per channel with reserved space."""
 

@@ -60,7 +60,7 @@ class Gap:
 
     first_sample: int
     last_sample: int
-    """Inclusive."""
+    """The last sample that was lost."""
 
 
 @dataclass(frozen=True)
