@@ -35,7 +35,7 @@ class Dwell(FixedSine):
     """Time at each tone of ``lead_in`` [s]."""
 
     def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
-        """Return a dwell after this one: the specimen first passes through this one, along its branch."""
+        """Return a dwell at another tone, with the tone of this one at the end of its lead-in."""
         changed = {
             "lead_in": (*self.lead_in, self._tone),
             "frequency_hz": frequency_hz,
@@ -44,7 +44,7 @@ class Dwell(FixedSine):
         return type(self).model_validate(self.model_dump() | changed)
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn]:
-        """Return this dwell with another lead-in, and its own tone for the next lead-in."""
+        """Return this dwell with the lead-in ``way``, and its tone for the lead-in of the next dwell."""
         return self.model_copy(update={"lead_in": way, "lead_s": lead_s}), self._tone
 
     @property

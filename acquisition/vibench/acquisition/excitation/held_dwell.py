@@ -28,7 +28,7 @@ class HeldDwell(FixedSine, AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The one level."""
+        """The level of the base to be held, as the only entry."""
         return (self.base_level,)
 
     @property
@@ -42,5 +42,5 @@ class HeldDwell(FixedSine, AbstractFeedback):
         return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
 
     def steps(self) -> Iterator[Step]:
-        """One step, without its wait, at the largest setting."""
+        """Yield one step, without its wait, at the largest setting."""
         yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)

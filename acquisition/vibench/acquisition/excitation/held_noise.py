@@ -89,7 +89,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """None: no sine is held."""
+        """Empty: feedback holds a spectrum, not the level of a sine."""
         return ()
 
     @property
@@ -104,5 +104,5 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording of all of them [s]."""
+        """Settling and recording of all realisations, including those that equalise [s]."""
         return self.stretches * (self.settle_s + self.periods / self.repetition_hz)

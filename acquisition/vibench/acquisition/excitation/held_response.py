@@ -43,7 +43,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """None: the base follows the response."""
+        """Empty: feedback holds the response, not a level of the base."""
         return ()
 
     @property
@@ -65,7 +65,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
         return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
 
     def steps(self) -> Iterator[Step]:
-        """One step for every frequency of the list, without its wait, at the largest setting."""
+        """Yield one step for every frequency of the list, without its wait, at the largest setting."""
         for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
                 yield Step(Tone(frequency_hz), 0.0, self.record_s, self.segment(frequency_hz, direction))

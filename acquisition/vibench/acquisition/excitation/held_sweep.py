@@ -28,7 +28,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The one level."""
+        """The level of the base to be held, as the only entry."""
         return (self.base_level,)
 
     @property
@@ -42,7 +42,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
         return self.segment_with(f"measured {self.base_level.quantity}")
 
     def steps(self) -> Iterator[Step]:
-        """One step for every ``step_s``, all of one segment, at the largest setting."""
+        """Yield one step for every ``step_s``, all of one segment, at the largest setting."""
         segment = self.segment
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz), 0.0, duration_s, segment)

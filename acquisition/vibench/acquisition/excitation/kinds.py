@@ -41,7 +41,7 @@ _Ours: TypeAlias = (
     | HeldResponse
 )
 _LACKING: dict[str, str] = {}
-"""Kinds of installed packages that cannot be used, and why."""
+"""Kinds of installed packages that cannot be loaded, each with the reason."""
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:

@@ -53,7 +53,7 @@ class BandNoise(AbstractExcitation):
 
 
 MOST_REALISATIONS = 1000
-"""Largest number of one measurement: all their waveforms are computed together, for equal levels."""
+"""Largest number in one measurement: all waveforms are computed together, to share one rms value."""
 
 
 class PeriodicNoise(BandNoise):

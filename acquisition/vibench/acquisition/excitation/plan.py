@@ -267,7 +267,7 @@ class AbstractExcitation(FrozenModel, ABC):
         return self.band_hz[1]
 
     def shown_steps(self) -> Iterator[Step]:
-        """Yield the steps for a preview: all, unless fewer show the same."""
+        """Yield the steps for a preview: all of them, or a part that represents the signal."""
         return self.steps()
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:

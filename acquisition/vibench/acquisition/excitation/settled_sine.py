@@ -48,7 +48,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The one level, or none."""
+        """The level of the base to be held, as the only entry; empty if the setting is constant."""
         return () if self.base_level is None else (self.base_level,)
 
     @property
@@ -61,7 +61,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
         return passes * (steps_s + glides * GLIDE_TONE_S + searches * self.search_s)
 
     def steps(self) -> Iterator[Step]:
-        """One step for every frequency of the list, without its wait, at the largest setting."""
+        """Yield one step for every frequency of the list, without its wait, at the largest setting."""
         for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
                 segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})

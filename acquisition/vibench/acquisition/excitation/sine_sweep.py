@@ -43,7 +43,7 @@ class SweptBy(StrEnum):
 
 
 MOST_SWEEP_STEPS = 1_000_000
-"""A day in the usual steps of a tenth of a second."""
+"""Largest number of steps in one sweep: 28 hours at the usual 0.1 s."""
 
 
 class MovingSine(AbstractExcitation):
@@ -102,7 +102,7 @@ class MovingSine(AbstractExcitation):
         return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN
 
     def turned(self, direction: Direction) -> Self | None:
-        """Return the sweep from the lower end to the upper one, or back; a sweep cannot turn."""
+        """Return the sweep upwards or downwards; None for directions with two passes."""
         low_hz, high_hz = self.band_hz
         match direction:
             case Direction.UP:
@@ -186,14 +186,14 @@ class SineSweep(MovingSine):
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """One step for every ``step_s``, all of one segment; or the whole sweep as one."""
+        """Return one step for every ``step_s``, all of one segment; or the whole sweep as one."""
         if self.swept_by is SweptBy.GENERATOR:
             segment = self.segment_with(self.hold.value)
             return iter((Step(self.course, self.settle_s, self.duration_s, segment),))
         return self.loudest_steps()
 
     def loudest_steps(self) -> Iterator[Step]:
-        """One step for every ``step_s``, also for the generator's own sweep."""
+        """Yield one step for every ``step_s``, also for the generator's own sweep."""
         segment = self.segment_with(self.hold.value)
         settle_s = self.settle_s
         for mean_hz, duration_s in self.mean_steps():

@@ -86,7 +86,7 @@ class SteppedLevel(FixedSine):
                 yield Step(tone, self.settle_s, self.record_s, Segment(SegmentLabel.STEP, numbers))
 
     def _steps(self) -> int:
-        # Counted before a list of them is made: a wrong step could give millions.
+        # Count without building the list: a mistyped step could give millions of levels.
         ways = sum(1 for _ in self.direction.ways(()))
         return ways * self._count()
 

@@ -33,7 +33,7 @@ class FrequencyGrid(FrozenModel):
             )
         steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
         if steps > 2 * MOST_STEPS:
-            # Before a list of them is made: a wrong step could give millions.
+            # Check before building the list: a mistyped step could give millions of values.
             raise ValueError(
                 f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: widen step_hz or "
                 "split the measurement"
@@ -129,7 +129,7 @@ class SteppedSine(FrequencySteps):
         return passes * len(self.rising_hz) * (self.settle_s + self.record_s)
 
     def steps(self) -> Iterator[Step]:
-        """One step for every frequency, in the order of time."""
+        """Yield one step for every frequency, in the order of time."""
         for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
                 # The direction separates the segments of the turning point of an up and down pass.

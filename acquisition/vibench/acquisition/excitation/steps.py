@@ -51,7 +51,7 @@ class SampleSource(Protocol):
 
     @property
     def crest_factor(self) -> float:
-        """Full range over rms."""
+        """Peak over rms."""
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
         """Make samples ``first`` to ``first + count - 1``, -1 to 1; the same at every call."""

@@ -17,7 +17,7 @@ CREST_FACTOR = 4.5
 seven times in a million; these few are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Random numbers drawn with one key: few enough to start anywhere, many enough to be fast."""
+"""Random numbers drawn with one key: few, to start at any sample cheaply, but enough to be fast."""
 TRANSITION_WIDTH = 0.5
 """Width of the filter's edges over the band's lower edge; the -6 dB points are the band's edges."""
 HAMMING_WIDTH = 3.3
@@ -30,7 +30,7 @@ PREVIEW_S = 10.0
 
 @dataclass(frozen=True)
 class GaussianBand:
-    """A stationary Gaussian signal between two frequencies that a seed determines sample by sample."""
+    """A stationary Gaussian signal in a band; the seed determines every sample."""
 
     band_start_hz: float
     band_stop_hz: float
@@ -38,7 +38,7 @@ class GaussianBand:
 
     @property
     def crest_factor(self) -> float:
-        """Full range over rms."""
+        """Peak over rms."""
         return CREST_FACTOR
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
@@ -105,6 +105,6 @@ class StreamedNoise(BandNoise):
         yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment(SegmentLabel.NOISE, band))
 
     def shown_steps(self) -> Iterator[Step]:
-        """Yield the first seconds of it."""
+        """Yield the first ``PREVIEW_S`` seconds of the noise."""
         for step in self.steps():
             yield Step(step.play, 0.0, min(self.duration_s, PREVIEW_S), step.segment)
