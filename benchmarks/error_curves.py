@@ -256,7 +256,7 @@ def section(curves, models, chaos):
         "![Similarity of continuous models with the stops over their cost](images/model_similarity.png)",
         "",
         f"The paper's own trade: Response I from {GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz,",
-        "30 s from rest, similarity as in the paper's eqs. 6 and 7. Up to 10 µm the stops take less time",
+        "30 s from rest, similarity as in the paper's eqs. 6 and 7. Up to 10 µm exact stops take less time",
         "than any continuous model, because flight between contacts is exact. At 50 µm the lowest orders",
         "take less, and are similar at few frequencies.",
         "",

@@ -110,7 +110,7 @@ def cubic_ii(r: Reading) -> Values:
     draws=_DRAWS,
 )
 def cubic_ii_lowest(r: Reading) -> Values:
-    """Read strictly: 68 % is the lowest of them."""
+    """Read strictly: 68 % is the lowest similarity."""
     found = rates(r, CUBIC, SECOND)
     return found[0], np.min(found[1:-1]), found[-1]
 

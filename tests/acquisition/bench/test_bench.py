@@ -148,7 +148,7 @@ class TestOpening:
 
 
 class TestLeaving:
-    def test_leaving_silences_and_releases_every_instrument(self, laboratory, virtual):
+    def test_closing_a_bench_silences_and_releases_every_instrument(self, laboratory, virtual):
         for _ in range(2):
             with laboratory_bench(laboratory):
                 assert output_of(virtual) == b"1\n"

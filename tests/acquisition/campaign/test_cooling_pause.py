@@ -35,7 +35,7 @@ def points(folder):
     return read_journal(journal_path(folder, "c"))
 
 
-def test_the_rig_is_silent_in_rig_time_between_recordings(rig, tmp_path):
+def test_the_rig_is_silent_between_recordings(rig, tmp_path):
     coarse = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"grid_rate_hz": 25_600.0})})
     with ReconnectingBench(coarse) as kept:
         world = kept._power._virtual.world

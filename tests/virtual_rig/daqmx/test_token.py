@@ -37,7 +37,7 @@ def test_loopback_needs_no_token_and_every_other_address_does():
     assert token_for("0.0.0.0:31763") != token_for("192.168.0.7:31763")
 
 
-def test_a_client_without_token_is_refused_by_converter_and_cable(served):
+def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served):
     _, address = served
     with (
         grpc.insecure_channel(address) as channel,

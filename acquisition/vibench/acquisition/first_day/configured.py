@@ -412,7 +412,7 @@ def first_day(
     when an instrument fails.
     """
     folder = config.absolute().parent
-    again = f"begin again with --from {in_a_command(config)} and the name of a new one"
+    again = f"begin again with --from {in_a_command(config)} and the name of a new configuration"
     pages = [*_head(bench, config, operator), *_wires(bench.rig, confirmed, again)]
     first = bench_report(bench, folder, switch, FIRST_VPP)
     pages += _chapter(f"Noise floor, and the first {1e3 * FIRST_VPP:g} mVpp", first)

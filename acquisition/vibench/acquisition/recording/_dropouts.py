@@ -41,7 +41,7 @@ _QUANTA = 4.0
 _LEAST_OF_FLANK = 0.25
 """Least share of a flank that has no other drop-outs."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
-"""Length of motion after a sample needed to decide about it [s]."""
+"""Motion needed after a sample to decide whether the sample is in a drop-out [s]."""
 _OUTSTANDING = 8.0
 """Least distance from the bridge relative to the residual of its fit to the flanks."""
 _JUMP = 4.0

@@ -386,8 +386,8 @@ def _sha256(raw: bytes) -> str:
     return hashlib.sha256(raw).hexdigest()
 
 
-# Seals listed in the journals of campaigns: they reveal another recording under the same name.
-# The check of a seal asks for them, so that every command identifies recordings by this one rule.
+# Seals that the journals of campaigns list: they show that a file is another recording under the same name.
+# Every check of a seal compares them, so that all commands identify recordings in the same way.
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 

@@ -190,7 +190,7 @@ class GeneratorConfig(FrozenModel):
     def _has_bursts(self) -> Self:
         if self.dead_man_s is not None and self.channel != 1:
             raise ValueError(
-                "dead_man_s needs bursts, which channel 1 alone has; use channel 1, or none of it"
+                "dead_man_s needs bursts, which only channel 1 has; use channel 1, or leave dead_man_s out"
             )
         return self
 

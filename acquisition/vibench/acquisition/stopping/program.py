@@ -218,7 +218,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
         is_here = announcement.computer in ("", platform.node())
         if announcement.place is not Place.HERE:
             continue
-        # A computer may be renamed while a program runs; number and start together are unique.
+        # The name of a computer may change while a program runs; process number and start time identify it.
         if announcement.is_alive and (is_here or announcement.process_start):
             found.append(announcement)
         elif is_here:

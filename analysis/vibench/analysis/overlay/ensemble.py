@@ -394,7 +394,7 @@ def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -
     stops = np.array([each.stop_s for each in runs if each.ended])
     if len(runs) == 1 or not stops.size or np.ptp([each.stop_s for each in runs]) < _ONE_EDGE_S:
         return None
-    # Before the first end, the motion may not have been able to end.
+    # Count from the first end of a run: before it, perhaps no run could end yet.
     from_s = float(stops.min())
     exposure_s = sum(max(each.stop_s - from_s, 0.0) for each in runs)
     if exposure_s <= 0.0:

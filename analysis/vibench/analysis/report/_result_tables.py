@@ -240,7 +240,7 @@ def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
             simulated = ABSENT if each.overlay is None else _simulated_band(each.overlay, band.towards_hz)
             rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
     return ReportTable(
-        "Dwells: lines and terminal bands of the displacement",
+        "Dwells: lines of the displacement, and its bands at the terminal resonances",
         ("dwell", "what", "frequency [Hz]", "displacement [µm]", "re drive line [dB]", "simulated [dB]"),
         tuple(rows),
         "Lines below two standard deviations are left out. Chaos fills bands, not lines: a band's figure is "

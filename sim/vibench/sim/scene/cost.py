@@ -70,7 +70,7 @@ class Expected:
     time_s: float
     """On one core of this machine."""
     factor: float
-    """Factor that contains 19 of 20 runs of this kind."""
+    """19 of 20 runs of this kind take between the time divided and multiplied by this factor."""
     runs: int
     """Number of runs behind the estimate; 0 without any."""
 
