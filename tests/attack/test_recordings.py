@@ -57,7 +57,7 @@ def test_a_bit_flip_is_detected_or_changes_no_result(count):
     assert tally.codes["noticed"] > count / 5
 
 
-@pytest.mark.parametrize("count", [pytest.param(30, marks=pytest.mark.attack)])
+@pytest.mark.parametrize("count", [pytest.param(12, marks=pytest.mark.attack)])
 @pytest.mark.timeout(1800)
 def test_a_broken_recording_gives_one_sentence(count):
     tally = recordings_mutants.attack(Shard(seed=3, count=count))
