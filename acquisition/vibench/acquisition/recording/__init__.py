@@ -1,10 +1,10 @@
 """HDF5 recordings: layout, writing, finishing, recovery and reading.
 
-During the run the file is ``NAME.h5.part``: one writer thread commits samples, syncs, then commits the
-counters, so that a kill or power cut costs at most the last second. The finished ``NAME.h5`` is compressed
-and checksummed; nothing is overwritten. Samples are the converter's int32 counts with scale factors to SI
-units; lost ones are marked. Format: docs/recording-format.md; reasons:
-docs/decisions/0003-recording-format.md and 0020.
+During the run the file is ``NAME.h5.part``. A writer thread writes samples, syncs the disk, then writes the
+counters of valid samples, so that a kill or power cut loses at most the last second. The finished
+``NAME.h5`` is compressed and has checksums; no existing file is overwritten. Samples are the converter's
+int32 counts, with scale factors to SI units; lost samples are marked. Format: docs/recording-format.md;
+reasons: docs/decisions/0003-recording-format.md and 0020.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

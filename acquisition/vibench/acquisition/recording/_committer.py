@@ -1,7 +1,7 @@
 """Writer thread that commits batches from a queue in a safe order.
 
-Order of a commit: samples and rows -> sync -> counters -> sync. If process or power end at any moment,
-counters never exceed the stored data.
+Order of a commit: samples and rows -> sync -> counters -> sync. If the process is
+killed or the power fails at any moment, the counters never exceed the stored data.
 """
 
 import threading
@@ -23,25 +23,25 @@ from ._layout import Column, encode, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
-"""Commit interval [s], half of the promised second; the other half is for a slow disk."""
+"""Commit interval [s]: half of the one second that a crash may lose; the other half is for a slow disk."""
 CLOSING_PATIENCE_S = 30.0
-"""Time limit of the last commit [s], since a lost network folder never returns."""
+"""Time limit of the last commit [s]; writes to a disconnected network folder never return."""
 QUEUE_PATIENCE_S = 2.0
 """Time to wait for a full queue before the disk counts as too slow [s]."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Writes that belong together, with the counters that validate them."""
+    """Writes that belong together, with the counters that then mark them as valid."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
     """Offset in the file and data of each write."""
     counters: Mapping[int, int] = field(default_factory=dict)
     """Value of each counter, by its offset, once the writes are safe."""
     reservations: tuple[tuple[int, int], ...] = ()
-    """(offset, size) to be allocated before the writes."""
+    """Offset and size of each range to reserve before the writes [bytes]."""
     samples: int = 0
-    """Samples per channel, for the length of the queue."""
+    """Samples per channel in this batch; they count towards the limit of the queue."""
 
 
 class Committer:
@@ -83,7 +83,7 @@ class Committer:
     def close(self) -> None:
         """Write and commit everything queued, and end the thread. Legal at any time.
 
-        ¶ Raises RecordingError when the disk does not respond; do not access it then.
+        Raises RecordingError when the disk does not respond; do not access it then.
         """
         with self._changed:
             self._is_closing = True
@@ -150,9 +150,9 @@ class Committer:
         return not is_last
 
     def _next(self) -> tuple[Batch | None, bool]:
-        """Return the next batch, or None when a commit is due or all is done; and whether all is done."""
+        """Return the next batch (None when a commit is due or all is done), and whether all is done."""
         with self._changed:
-            # Nothing to commit: wait for the next batch.
+            # With nothing to commit, wait for the next batch without a time limit.
             remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
             timeout_s = None if remaining_s is None else max(remaining_s, 0.0)
             self._changed.wait_for(lambda: self._queue or self._is_closing, timeout=timeout_s)
@@ -201,7 +201,7 @@ class TableWriter:
         return self._places.table.capacity - self.rows
 
     def append(self, cells: Sequence[Cell]) -> Batch:
-        """Return the writes of another row; raises RecordingError when the table is full."""
+        """Return the writes that append a row; raises RecordingError when the table is full."""
         if not self.free_rows:
             raise RecordingError(
                 f"The recording's table of {self._places.table.name} is full:"
@@ -228,12 +228,12 @@ def _raw(column: Column, cell: Cell) -> bytes:
 
 
 Number = int | float | str
-"""Numbers of a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
+"""Value stored with a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
 
 
 @dataclass(frozen=True)
 class OpenSegment:
-    """A segment that has started."""
+    """A segment that has started but not ended."""
 
     row: int
     label: str
@@ -246,7 +246,7 @@ class OpenSegment:
 
 
 class Journal:
-    """The four tables; each addition returns its writes."""
+    """The tables of events, segments, overloads and gaps; each method returns the writes to queue."""
 
     def __init__(self, places: Mapping[str, TablePlaces], roles: tuple[str, ...]) -> None:
         self._events = TableWriter(places[layout.EVENTS.name])
@@ -259,7 +259,7 @@ class Journal:
         self._dropped_events = 0
 
     def event(self, kind: str, text: str, sample: int) -> Batch:
-        """Add an event. A full table counts further ones in its last row."""
+        """Add an event. When the table is full, its last row counts the events that no longer fit."""
         if self._events.free_rows > 1:
             return self._events.append((sample, time.time(), kind, text))
         self._dropped_events += 1
@@ -294,14 +294,14 @@ class Journal:
         return batch
 
     def gap(self, first_sample: int, last_sample: int) -> Batch:
-        """Note that samples were lost."""
+        """Add a range of lost samples."""
         return self._gaps.append((first_sample, last_sample))
 
     def overload(self, overload: Overload) -> Batch:
         """Add an overload, or extend the channel's last one if it continues.
 
-        In a full table the channel's last range is extended to the new one, so that overloads are never
-        understated.
+        If the table is full, the channel's last range is extended to include the new one, so that no
+        overloaded sample is left out.
         """
         if overload.channel not in self._roles:
             raise RecordingError(
@@ -310,7 +310,7 @@ class Journal:
             )
         row, last = self._last_overload.get(overload.channel, (-1, overload))
         continues = row >= 0 and overload.first_sample <= last.last_sample + 1
-        # A row is reserved for every channel without an overload, so that there is always one to extend.
+        # One row is kept free for each channel without an overload, so that every channel has one to extend.
         untouched = len(self._roles) - len(self._last_overload)
         must_grow = row >= 0 and self._overloads.free_rows <= untouched
         if continues or must_grow:

@@ -1,4 +1,4 @@
-"""Models of a recording's attributes and texts, validated when it is opened."""
+"""Models that validate a recording's attributes and texts when it is opened."""
 
 import json
 import math
@@ -24,9 +24,9 @@ from ._layout import (
 )
 
 DEEPEST_JSON = 40
-"""Deepest nesting of JSON; a plan has about five levels."""
+"""Deepest nesting of JSON that is accepted; a plan has about five levels."""
 SAME_SCALE = 1e-9
-"""Tolerance of scale_factor and add_offset relative to the other attributes; they are exact copies."""
+"""Relative tolerance of scale_factor and add_offset against the values that other attributes give."""
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -62,7 +62,7 @@ Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
 
 
 class _AbstractFacts(BaseModel):
-    """Attributes of one object; those of other programs and of later versions are left alone."""
+    """Attributes of one HDF5 object; attributes of other programs and later versions are ignored."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
 
@@ -120,14 +120,14 @@ class ConfigurationFacts(_AbstractFacts):
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
-    """Read the attributes of the file; ``found`` replaces those that a growing one stores elsewhere."""
+    """Validate the file's attributes; ``found`` has those that a growing file stores in datasets instead."""
     return _read("the file", FileFacts, {**attributes, **found})
 
 
 def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
     """Read the attributes of a channel.
 
-    Raises RecordingError when one is missing, is of another type or range, or contradicts the others.
+    Raises RecordingError when an attribute is missing, has a wrong type or value, or contradicts others.
     """
     attributes = read_attributes(dataset)
     facts = _read(f"the channel {role!r}", ChannelFacts, attributes)

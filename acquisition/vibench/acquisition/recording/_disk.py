@@ -31,7 +31,7 @@ class Disk(Protocol):
 
 
 class PositionedFile(OpenFile):
-    """A file on a real disk, marked as being recorded for as long as it is open; others may read."""
+    """A file on a real disk, locked as being recorded while it is open; other programs may read it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -46,7 +46,7 @@ class PositionedFile(OpenFile):
 
 @contextmanager
 def sole_use(path: Path) -> Iterator[None]:
-    """Lock a file that is not being recorded, for a recovery.
+    """Lock a file for its recovery, until the ``with`` block ends.
 
     Raises RecordingError when another process is recording to it.
     """
@@ -85,13 +85,13 @@ class DiskTrouble:
         self._delay_s = 0.0
 
     def fill(self, refusals: float = inf) -> Heal:
-        """Refuse writes like a full disk, until healed or ``refusals`` times."""
+        """Refuse operations like a full disk, ``refusals`` times or until the returned function is called."""
         with self._changed:
             self._refusals, self._has_refused = refusals, False
         return self._make_room
 
     def slow_down(self, delay_s: float) -> Heal:
-        """Delay every write and every sync by this time [s]."""
+        """Delay every operation by this time [s], until the returned function is called."""
         with self._changed:
             self._delay_s = delay_s
         return self._speed_up
@@ -121,7 +121,7 @@ class DiskTrouble:
 
 
 class TroubledDisk:
-    """A disk with the simulated fault before every operation."""
+    """A disk with simulated faults: each operation except `close` first applies the fault."""
 
     def __init__(self, disk: Disk, trouble: DiskTrouble) -> None:
         self._disk = disk
@@ -148,7 +148,7 @@ class TroubledDisk:
 
 
 _installed: list[DiskTrouble] = []
-"""Active faults of virtual rigs in this process; all recordings share one disk."""
+"""Simulated faults that are active in this process; each affects all recordings."""
 
 
 @contextmanager
@@ -162,7 +162,7 @@ def troubled_disks(trouble: DiskTrouble) -> Iterator[None]:
 
 
 def open_disk(path: Path) -> Disk:
-    """Open an existing file to record to."""
+    """Open an existing file for recording, with the active simulated faults."""
     disk: Disk = PositionedFile(path)
     for trouble in _installed:
         disk = TroubledDisk(disk, trouble)
@@ -170,6 +170,6 @@ def open_disk(path: Path) -> Disk:
 
 
 def meet_trouble() -> None:
-    """Apply the current fault before a whole file is written."""
+    """Apply the active simulated faults before a whole file is written."""
     for trouble in tuple(_installed):
         trouble.meet()

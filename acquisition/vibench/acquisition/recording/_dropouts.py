@@ -1,8 +1,8 @@
-"""Drop-outs of the vibrometer, found in the velocity and bridged from both sides.
+"""Find drop-outs of the vibrometer in its velocity, and bridge them from both sides.
 
 Speckle interrupts the laser's signal for a fraction of a millisecond, and the decoder shows an arbitrary
-velocity. The signal departs within one sample and returns. Motion does not: an impact changes the velocity
-for good, and ringing oscillates.
+velocity. In a drop-out the velocity jumps away within one sample and later returns. Real motion does not: an
+impact changes the velocity for good, and ringing oscillates.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,44 +22,44 @@ Places = NDArray[np.int64]
 LONGEST_S = 4e-3
 """Longest drop-out that can be bridged [s]."""
 LOWEST_RATE_HZ = 20_000.0
-"""Lowest sample rate [Hz]; below it, an impact and its response may lie within a few samples."""
+"""Lowest sample rate [Hz]; below it, an impact may take only a few samples, like a drop-out."""
 _FAR = 60.0
-"""Fourth difference of a drop-out, relative to its usual size."""
+"""Least fourth difference at the edge of a drop-out, relative to the median."""
 _HEARD = 6.0
-"""Fourth difference of ringing of the converter's filter, relative to its usual size."""
+"""Least fourth difference of ringing of the converter's filter, relative to the median."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
-"""Least distance between runs of sharp corners of different edges."""
+"""Sharp corners closer together than this belong to one run [s]."""
 _MOST_RUNS = 12
-"""Number of close corners that indicate motion."""
+"""Largest number of runs of sharp corners close together; more indicate motion."""
 _FLANK_S = 1e-3
-"""Length of motion on each side to recognise a drop-out [s]."""
+"""Length of the motion on each side that a drop-out is compared with [s]."""
 _LEAST_HELD = 8
-"""Equal samples in a row, between two changes of `_QUANTA`, that indicate a drop-out."""
+"""Least number of equal samples that indicate a drop-out; a steep change (`_QUANTA`) is at both ends."""
 _QUANTA = 4.0
-"""Change from sample to sample, over the smallest of the channel, at both ends of equal samples."""
+"""Least change at both ends of equal samples, relative to the smallest change in the channel."""
 _LEAST_OF_FLANK = 0.25
-"""Least share of a flank that has no other drop-outs."""
+"""Least share of a flank that must be free of other drop-outs."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
-"""Motion needed after a sample to decide whether the sample is in a drop-out [s]."""
+"""Time that must follow a sample before it is known whether it belongs to a drop-out [s]."""
 _OUTSTANDING = 8.0
-"""Least distance from the bridge relative to the residual of its fit to the flanks."""
+"""Least distance of a drop-out from a smooth fit, relative to the rms residual of that fit in the flanks."""
 _JUMP = 4.0
-"""Change between samples at the edge of a drop-out, relative to the fastest of the flanks."""
+"""Least change between samples at the edge of a drop-out, relative to the largest in the flanks."""
 _STEEP = 0.2
-"""The same change relative to the largest distance from the bridge; clipped peaks change more slowly."""
+"""The same change, relative to the largest distance from the fit; clipped peaks change more slowly."""
 _MOST_PER_S = 400.0
-"""Largest rate of drop-outs; more indicate motion."""
+"""Largest number of drop-outs per second; more indicate motion."""
 _ORDER = 48
 _CONTEXT = 12 * _ORDER
 """Samples on each side for the linear prediction."""
 _TOGETHER = 4 * _CONTEXT
-"""Most samples solved at once."""
+"""Longest group of drop-outs that is bridged at once, in samples."""
 _BLOCK_S = 1.0
 
 
 class Dropout(NamedTuple):
-    """Samples of a drop-out, including ringing of the converter."""
+    """Samples of a drop-out, including the ringing of the converter's filter."""
 
     first: int
     stop: int
@@ -67,7 +67,7 @@ class Dropout(NamedTuple):
 
 
 def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
-    """Find drop-outs, which leave the motion and return to it.
+    """Find drop-outs: jumps away from the motion that return to it.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
 
 
 def _held(velocity: Samples, longest: float) -> list[Dropout]:
-    """Find drop-outs in which the decoder holds one value, whose edges noise may hide."""
+    """Find drop-outs in which the decoder holds one value; noise may hide the corners at their edges."""
     change = np.abs(np.diff(velocity))
     moves = np.flatnonzero(change != 0.0)
     first, last, equal = moves[:-1], moves[1:], np.diff(moves)
     steep = change > _QUANTA * np.min(change, where=change > 0.0, initial=np.inf)
-    # A clipped peak is held too, at the largest value.
+    # A clipped peak has equal samples too, but at the channel's largest value.
     is_inside = np.abs(velocity[last]) < np.fmax.reduce(np.abs(velocity))
     held = (equal >= _LEAST_HELD) & (equal <= longest) & steep[first] & steep[last] & is_inside
     ends = zip(first[held].tolist(), last[held].tolist(), strict=True)
@@ -128,12 +128,12 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Return the sample from which a drop-out may have started undetected; else the number of samples.
+    """Return the first sample of a drop-out that may have begun undetected, or the number of samples.
 
     Parameters
     ----------
     velocity
-        Velocity of a channel that continues, shape (samples,).
+        Velocity of a channel that is still being recorded, shape (samples,).
     sample_rate_hz
         Sample rate.
     dropouts
@@ -152,22 +152,22 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
 
 
 def _corners(velocity: Samples) -> tuple[Samples, float]:
-    """Return fourth differences, in which sharp corners stand out, and their median; infinite for zero."""
+    """Return fourth differences, which are large at sharp corners, and their median (infinite if zero)."""
     sharp = np.zeros(velocity.size)
     sharp[2:-2] = np.abs(np.diff(velocity, 4))
     return sharp, float(np.nanmedian(sharp)) or np.inf
 
 
 def _apart(places: Places, distance: float) -> list[Places]:
-    """Split numbers where neighbours are farther apart."""
+    """Split sorted sample numbers where neighbours are more than ``distance`` apart."""
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
 
 
 def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
-    """Explain all of these runs of sharp corners by drop-outs, or none of them.
+    """Return drop-outs that together explain all of these runs of sharp corners; empty if there are none.
 
-    The fewest drop-outs are chosen, then those with the smoothest motion around them: the constant level
-    between two drop-outs can also look like motion.
+    The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the edges
+    of one drop-out could pass for two, with its constant level as the motion between them.
     """
     ends = [0, *(each.stop for each in runs)]
     begins = [*(each.first for each in runs), velocity.size]
@@ -176,7 +176,7 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
         ways = []
         for first, so_far in enumerate(best):
             one = Dropout(begins[first], ends[last])
-            # The neighbouring samples are not motion to compare with.
+            # The flanks end at the neighbouring runs, whose samples are not motion.
             before, after = min(flank, one.first - ends[first]), min(flank, begins[last] - one.stop)
             is_alone = min(before, after) >= flank * _LEAST_OF_FLANK
             is_short = one.stop - one.first <= longest + flank  # with ringing on both sides
@@ -189,16 +189,16 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
 
 
 def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
-    """Return the length of the ringing of the converter's filter, until `_SILENT` quiet samples in a row."""
+    """Return how many samples the converter's filter rings; `_SILENT` quiet samples in a row end it."""
     heard = np.flatnonzero(rings[:longest])
     breaks = np.flatnonzero(np.diff(heard) > _SILENT)
     return int(heard[breaks[0]] if breaks.size else heard[-1])
 
 
 def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> float:
-    """Return the mean square residual of one smooth motion through both flanks; infinite for no drop-out.
+    """Return the mean square residual of a smooth fit to both flanks; infinite if it is no drop-out.
 
-    A drop-out jumps far from that motion. A clipped peak is far from it too, but changes more slowly.
+    A drop-out jumps far from that fit. A clipped peak is far from it too, but changes more slowly.
     """
     near = velocity[dropout.first - before : dropout.stop + after]
     if not np.all(np.isfinite(near)):
@@ -221,15 +221,15 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     """Return the velocity, shape (samples,), with drop-outs bridged by linear prediction.
 
-    Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330: the unknown samples with the smallest
-    prediction error, for a predictor from the samples about them.
+    The bridge is the one with the smallest prediction error, for a predictor fitted to the samples around it
+    (Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330).
 
     Parameters
     ----------
     velocity
-        Shape (samples,); it is left as it is.
+        Velocity, shape (samples,); it is not modified.
     dropouts
-        As `found_dropouts` gives them.
+        Drop-outs that `found_dropouts` returned.
     """
     mended, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:
@@ -257,7 +257,7 @@ def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int
 
 
 def _likeliest(near: Samples, known: NDArray[np.bool_]) -> Samples:
-    """Return the most likely unknown samples from a linear predictor, if enough others are known."""
+    """Return samples with the unknown ones filled by linear prediction; unchanged if too few are known."""
     mean = float(np.mean(near[known]))
     values = np.where(known, near - mean, 0.0)
     windows, whole = (np.lib.stride_tricks.sliding_window_view(each, _ORDER + 1) for each in (values, known))
@@ -280,9 +280,9 @@ _FOUND: WeakKeyDictionary[Recording, dict[tuple[str, int], tuple[Dropout, ...]]]
 
 @dataclass(frozen=True, eq=False)
 class BridgedChannel:
-    """The vibrometer's channel of a recording with bridged drop-outs.
+    """The vibrometer's channel of a recording, read with its drop-outs bridged.
 
-    They are found second by second from the first sample, so that results do not depend on the range read.
+    The search uses fixed blocks of one second, so that results do not depend on the range read.
     """
 
     recording: Recording
@@ -293,7 +293,7 @@ class BridgedChannel:
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
             return values
-        # With their neighbours, which cannot be used as context.
+        # Include neighbouring drop-outs, whose samples cannot serve as context.
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
@@ -307,7 +307,7 @@ class BridgedChannel:
         return values
 
     def between(self, start: int, stop: int) -> tuple[Dropout, ...]:
-        """Return the drop-outs that reach into these samples."""
+        """Return the drop-outs that overlap these samples."""
         rate = self.recording.sample_rate_hz
         if rate < LOWEST_RATE_HZ:
             return ()
@@ -325,6 +325,6 @@ class BridgedChannel:
         heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
         moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
         found = tuple(each for each in moved if first <= each.first < stop)
-        if end == stop + margin:  # a growing recording may contain more later
+        if end == stop + margin:  # otherwise a growing recording may still get samples here
             known[self.role, place] = found
         return found

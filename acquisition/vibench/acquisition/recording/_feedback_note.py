@@ -1,7 +1,7 @@
 """Notes of a feedback controller in a recording, one model for each kind.
 
-A note is an event: its kind is the event's, its text one JSON object of everything else. An event's text
-is short, so that notes of the first version name no version.
+A note is stored as an event: the event has the note's kind, and its text is a JSON object of all other
+values. An event's text is limited in length, so notes of version 1 omit their version.
 """
 
 import json
@@ -67,12 +67,12 @@ class LockResult(StrEnum):
 
 
 SixFigures = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
-"""A number stored to six digits, because the recording's table is narrow."""
+"""Number stored to six significant digits, because an event's text is limited in length."""
 Way = Literal["up", "down"]
 
 
 class AbstractNote(BaseModel):
-    """Numbers and words of one finding, in the order in which they are written."""
+    """Values of one result of a controller, in the order in which they are written."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
@@ -80,7 +80,7 @@ class AbstractNote(BaseModel):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return its values as JSON types."""
+        """Return the values that differ from their defaults, as JSON types."""
         return self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
 
     @property
@@ -108,7 +108,7 @@ class SettledNote(AbstractNote):
 
 
 class SegmentNote(AbstractNote):
-    """Base and motion over a recorded segment."""
+    """Base level and motion over a recorded segment."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.STEP, SegmentLabel.SEARCH, SegmentLabel.RESONANCE]
@@ -124,7 +124,7 @@ class SegmentNote(AbstractNote):
 
 
 class DwellNote(AbstractNote):
-    """Share of a dwell in which the level was off."""
+    """Number of level checks in a dwell, and how many were outside tolerance."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.DWELL]
@@ -133,7 +133,7 @@ class DwellNote(AbstractNote):
 
 
 class SweepNote(AbstractNote):
-    """Share of a sweep in which the level was off."""
+    """Number of steps in a sweep, and how many had a level outside tolerance."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.SWEEP]
@@ -143,7 +143,7 @@ class SweepNote(AbstractNote):
 
 
 class LevelNote(AbstractNote):
-    """Level over one check of a dwell."""
+    """Base level at one check during a dwell."""
 
     kind: Literal["level"] = "level"
     at_s: SixFigures
@@ -154,7 +154,7 @@ class LevelNote(AbstractNote):
 
 
 class ExcursionNote(AbstractNote):
-    """A stretch of a sweep in which the level was not held."""
+    """Part of a sweep in which the level was outside tolerance."""
 
     kind: Literal["level"] = "level"
     from_hz: SixFigures
@@ -257,7 +257,7 @@ class BranchEnd(StrEnum):
 
 
 class BranchPointNote(AbstractNote):
-    """One motion of a branch held by a fast loop; amplitudes are peaks of fundamentals."""
+    """One motion of a branch, held by a fast control loop; amplitudes are peak values of fundamentals."""
 
     kind: Literal["branch_point"] = "branch_point"
     point: int
@@ -286,7 +286,7 @@ class Stability(StrEnum):
     STABLE = "stable"
     UNSTABLE = "unstable"
     OPEN = "not determined"
-    """Undecided: the bounds include 1, or the motion changed."""
+    """The bounds of the multiplier include 1, or the motion changed."""
 
 
 class BranchStabilityNote(AbstractNote):
@@ -315,7 +315,7 @@ class BranchEndNote(AbstractNote):
 
 
 class UntilNote(AbstractNote):
-    """Bounds of results of a stretch that is recorded until they are met."""
+    """Error bounds of results, for a stretch that is recorded until the requested bounds are met."""
 
     kind: Literal["until"] = "until"
     stretch: int
@@ -392,7 +392,7 @@ _KINDS = frozenset((*_FOUND, *_FOLLOWED, "until"))
 def feedback_note(event: Event) -> FeedbackNote | None:
     """Read a note from an event; None for other or truncated events.
 
-    Raises RecordingError when it is a note of a version that this program does not know.
+    Raises RecordingError when the note is not valid, for example because a newer version wrote it.
     """
     if event.kind not in _KINDS:
         return None
