@@ -1,7 +1,7 @@
 """Writer thread that commits batches from a queue in a safe order.
 
-Order of a commit: samples and rows -> sync -> counters -> sync. If the process is
-killed or the power fails at any moment, the counters never exceed the stored data.
+Order of a commit: samples and rows -> sync -> counters -> sync. Even if the process is killed or the power
+fails, the counters never exceed the stored data.
 """
 
 import threading
@@ -241,7 +241,7 @@ class OpenSegment:
     numbers_json: str
 
     def cells(self, last_sample: int, is_complete: int) -> tuple[Cell, ...]:
-        """Make the segment's row in the file."""
+        """Return the segment's row in the file."""
         return (self.first_sample, last_sample, is_complete, self.label, self.numbers_json)
 
 

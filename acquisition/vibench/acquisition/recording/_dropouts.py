@@ -1,8 +1,8 @@
 """Find drop-outs of the vibrometer in its velocity, and bridge them from both sides.
 
 Speckle interrupts the laser's signal for a fraction of a millisecond, and the decoder shows an arbitrary
-velocity. In a drop-out the velocity jumps away within one sample and later returns. Real motion does not: an
-impact changes the velocity for good, and ringing oscillates.
+velocity. A drop-out jumps away from the motion within one sample and later returns to it. Real motion looks
+different: an impact changes the velocity for good, and ringing oscillates.
 """
 
 from collections.abc import Iterator, Sequence
@@ -164,7 +164,7 @@ def _apart(places: Places, distance: float) -> list[Places]:
 
 
 def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
-    """Return drop-outs that together explain all of these runs of sharp corners; empty if there are none.
+    """Return drop-outs that together explain all of these runs of sharp corners; empty if none can.
 
     The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the edges
     of one drop-out could pass for two, with its constant level as the motion between them.

@@ -1,7 +1,7 @@
 """Finish a recording: compress, seal, check and rename it to ``NAME.h5``, then delete ``NAME.h5.part``.
 
-HDF5's filters run on one core under a global lock. zlib releases Python's lock, so threads produce the same
-bytes here: shuffle (all first bytes, all second bytes, ...), then deflate.
+HDF5's own filters run on one core, under a global lock. Threads make the same bytes here with zlib, which
+releases Python's lock: shuffle (all first bytes, all second bytes, ...), then deflate.
 """
 
 import hashlib
@@ -40,9 +40,9 @@ from ._reader import open_recording
 from ._seal import SealDepth, SealKey, SealState, check_seal, seal_key, write_seal
 from ._tables import Columns
 
-# Labelled curves for other programs, one per channel, as NeXus plots.
-# Such programs do not scale counts, so the extremes of every bin are stored again in physical units; as a
-# line they form the envelope of the recording.
+# Labelled curves in NeXus format for other programs, one per channel.
+# Such programs do not scale counts, so the extremes of every bin are stored again in physical units. Drawn
+# as a line, they form the envelope of the recording.
 
 SIGNAL = "values"
 FIRST_CHOICE = "m0_"
@@ -50,7 +50,7 @@ FIRST_CHOICE = "m0_"
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
-    """Add a channel's labelled curve; the file's own attribute ``default`` leads to it."""
+    """Add a channel's labelled curve; attributes ``default`` select the curve that programs show first."""
     if overview.low.size == 0:
         return
     view = file.require_group(layout.VIEW)
@@ -61,11 +61,11 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
     name = str(channel["long_name"]) or role
     data = view.create_group(role)
     write_attributes(data, {"NX_class": "NXdata", "signal": SIGNAL, "axes": layout.TIME, "time_indices": 0})
-    # Low and high of each bin by turns; NaN where all of its samples are lost.
+    # Low and high of each bin alternate; both are NaN if all samples of the bin are lost.
     counts = np.column_stack((overview.low, overview.high)).ravel()
     values = counts * float(channel["scale_factor"]) + float(channel["add_offset"])
     physical = np.where(counts == layout.MISSING_COUNT, np.nan, values).astype(np.float32)
-    # silx has no label for the vertical axis, so the title contains the unit too.
+    # silx does not label the vertical axis, so the title contains the unit too.
     write_text_dataset(data, "title", f"{title}: {role.replace('_', ' ')} [{channel['units']}]")
     write_attributes(
         data.create_dataset(SIGNAL, data=physical, compression="gzip", shuffle=True),
@@ -85,11 +85,11 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
 
 
 IN_FLIGHT_PER_WORKER = 4
-"""Number of queued chunks, enough to keep workers and disk busy."""
+"""Queued chunks per worker, enough to keep workers and disk busy."""
 
 
 def create_counts(file: h5py.File, name: str, samples: int, chunk_samples: int) -> h5py.Dataset:
-    """Create a compressed one-dimensional dataset of counts; contiguous when it is to be empty."""
+    """Create a compressed one-dimensional dataset of counts; an empty one is contiguous."""
     if samples == 0:
         return file.create_dataset(name, shape=(0,), dtype=COUNT_DTYPE)
     return file.create_dataset(
@@ -135,7 +135,7 @@ def _submit(pool: ThreadPoolExecutor, piece: Counts, length: int) -> Future[byte
 
 
 def _chunk(counts: Counts, length: int) -> bytes:
-    """One chunk as HDF5's shuffle and deflate filters would make it; a short one is filled with zeros."""
+    """Return a chunk as HDF5's shuffle and deflate filters would make it, padded with zeros to ``length``."""
     full = np.zeros(length, dtype=COUNT_DTYPE)
     full[: len(counts)] = counts
     shuffled = np.ascontiguousarray(full.view(np.uint8).reshape(length, -1).T)
@@ -145,15 +145,15 @@ def _chunk(counts: Counts, length: int) -> bytes:
 INTERRUPTED_KIND = "interrupted"
 INTERRUPTED_REASON = "the recording program ended before it could say how the run ended"
 INT32_SAMPLES = 2**31
-"""Longer recordings (11 h at 51.2 kS/s) number their samples with 64 bits."""
+"""From this length (11 h at 51.2 kS/s), sample numbers are stored with 64 bits."""
 
 
 def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None = None) -> Path:
     """Create and seal ``NAME.h5`` from ``NAME.h5.part``, which :func:`discard` deletes later.
 
-    The caller has locked the file. ``written`` contains the checksum of each channel's samples; a recovery
-    does not know them. Raises RecordingError when ``NAME.h5`` exists, the disk
-    refuses (it may be full), or what was written does not read back the same. ``NAME.h5.part`` is untouched.
+    The caller must have locked the ``.part``, which is not changed. ``written`` has the checksum of each
+    channel's samples as recorded (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, writing
+    fails (the disk may be full), or the copy does not read back as it was written.
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
@@ -164,9 +164,9 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
         _copy(part, tmp, key, written)
         sync_file(tmp)
         rename(tmp, final)
-    # HDF5 reports a full disk as one or the other.
+    # HDF5 reports a full disk as OSError or as RuntimeError.
     except (OSError, RuntimeError, KeyboardInterrupt) as error:
-        # An incomplete file of this call, whose content is in the .part.
+        # The copy is incomplete and not needed: all its content is in the .part.
         with suppress(OSError):
             tmp.unlink()
         if isinstance(error, (RecordingError, KeyboardInterrupt)):
@@ -181,7 +181,7 @@ def whereabouts(part: Path, error: Exception) -> str:
         is_there = part.exists()
     except OSError:  # the folder does not respond
         is_there = False
-    # Another file may have the name of one that was removed.
+    # After FileNotFoundError the recording was removed; a file of this name is another one.
     if is_there and not isinstance(error, FileNotFoundError):
         return f"All committed samples are safe in {part}; make room, then recover that file."
     return (
@@ -191,7 +191,7 @@ def whereabouts(part: Path, error: Exception) -> str:
 
 
 def discard(part: Path) -> None:
-    """Delete ``NAME.h5.part`` once ``NAME.h5`` would survive a power cut; a remaining one is harmless."""
+    """Delete ``NAME.h5.part`` once ``NAME.h5`` would survive a power cut; a .part left over is harmless."""
     try:
         sync_folder(part.parent)
         part.unlink()
@@ -237,7 +237,7 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
 def _write_time(
     copy: h5py.File, samples: int, sample_rate_hz: float, digests: dict[str, str]
 ) -> h5py.Dataset:
-    """Write the time axis as sample numbers with the sample interval as scale, which compresses well."""
+    """Write the time axis as sample numbers, which compress well, with the sample interval as scale."""
     dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
     settings = {"chunks": (min(layout.CHUNK_SAMPLES, samples),), "compression": "gzip", "shuffle": True}
     dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **(settings if samples else {}))
@@ -323,11 +323,11 @@ def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype
 def recover(path: Path | str) -> Path:
     """Finish an interrupted recording; return the path of ``NAME.h5``.
 
-    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. The state after the crash is detected: uncompressed
-    samples, an incomplete compressed copy, or a complete
-    one whose ``.part`` was not yet deleted.
+    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. A crash may have left the ``.part`` alone, or with an
+    incomplete or complete compressed copy. All three cases are recovered.
 
-    Raises RecordingError when there is nothing to recover, the file is still being recorded, or is not ours.
+    Raises RecordingError when there is nothing to recover, the file is still being recorded, or is not a
+    recording of vibench.
     """
     path = Path(path)
     final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path
@@ -356,13 +356,13 @@ def _finish(part: Path, final: Path, key: SealKey | None) -> None:
                 raise RecordingError(f"{part} is a finished recording; rename it to {final.name}")
             is_done = final.exists() and _holds(final, source.recording_id, part)
         if not is_done:
-            # Left by a crash during the copy; its content is in the .part.
+            # A crash during the copy may have left a .tmp; all its content is in the .part.
             layout.tmp_of(final).unlink(missing_ok=True)
             finalise(part, key)
 
 
 def _holds(final: Path, recording_id: str, part: Path) -> bool:
-    """Return whether the finished file is an intact copy of this recording."""
+    """Return True if the finished file is an undamaged copy of this recording; else raise RecordingError."""
     with open_recording(final) as copy:
         same, seal = copy.recording_id == recording_id, copy.check_seal(SealDepth.WHOLE)
     if not same:

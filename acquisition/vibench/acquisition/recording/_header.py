@@ -1,4 +1,4 @@
-"""Facts before the first sample: channels, rates, plan, bench, instruments, provenance."""
+"""Data written before the first sample: channels, rates, plan, bench, instruments, provenance."""
 
 import json
 import math
@@ -30,7 +30,7 @@ GIT_PATIENCE_S = 5.0
 
 @dataclass(frozen=True)
 class Provenance:
-    """Software and machine of a recording."""
+    """Software and computer that made a recording."""
 
     started_utc: str
     """ISO 8601, with microseconds, from the computer's clock."""
@@ -98,16 +98,16 @@ def _git(*arguments: str) -> str:
 ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")
 COUPLINGS = ("AC", "DC")
 _AC_CUT_HZ = 0.5
-"""-3 dB frequency of NI 9234, 4431 and their kind; first order."""
+"""-3 dB frequency of the AC coupling of NI 9234, 4431 and similar modules; first order."""
 OPTIONAL = ("sensitivity", "volts_per_count")
 """Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
 """``expected_samples`` in the file for a recording without a planned end."""
 
 FINE_STEP = 2.0**-30
-"""Step of a channel without a converter step, as a fraction of its range.
+"""Step of stored counts if the converter's step is unknown, as a fraction of the range.
 
-Twice the range still fits an int32, and 2^-30 lies 36 dB below a 24-bit converter's step.
+Twice the range still fits an int32, and 2^-30 lies 42 dB below a 24-bit converter's step.
 """
 
 
@@ -125,7 +125,7 @@ class ChannelHeader:
         "volts_at_zero_count": "V",
         "sensitivity": "{0.sensitivity_unit}",
     }
-    """Units of values without a unit in their name; ``{0.unit}`` is the channel's."""
+    """Units of the values whose names contain no unit; ``{0.unit}`` is the channel's unit."""
 
     role: str
     """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""
@@ -214,7 +214,7 @@ class ChannelHeader:
     def from_attributes(cls, role: str, attributes: Mapping[str, Attribute]) -> "ChannelHeader":
         """Read back what :meth:`attributes` wrote."""
         given = {each.name: attributes[each.name] for each in fields(cls) if each.name in attributes}
-        # NaN alone differs from itself.
+        # Only NaN differs from itself.
         absent = {name: None for name in OPTIONAL if given.get(name) != given.get(name)}
         return cls(**{**given, **absent, "role": role, "unit": attributes["units"]})  # type: ignore[arg-type]
 
@@ -290,7 +290,7 @@ class RecordingHeader:
 
 
 def require_different(channels: Iterable[ChannelHeader]) -> tuple[ChannelHeader, ...]:
-    """Refuse a recording without channels, or with two of one name; raises RecordingError."""
+    """Return the channels; raises RecordingError if there are none, or two have the same name."""
     given = tuple(channels)
     roles = [channel.role for channel in given]
     if not roles or len(set(roles)) != len(roles):
@@ -304,5 +304,5 @@ def _require_positive(name: str, value: float) -> None:
 
 
 def coupling_cut_hz(coupling: str) -> float:
-    """Return the -3 dB of a converter's ``coupling``, first order [Hz]; 0 for ``"DC"``."""
+    """Return the -3 dB frequency of a converter's ``coupling``, first order [Hz]; 0 for ``"DC"``."""
     return _AC_CUT_HZ if coupling == "AC" else 0.0

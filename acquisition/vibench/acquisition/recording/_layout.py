@@ -145,12 +145,12 @@ RESERVED_NAMES = frozenset(
 
 
 def part_of(path: Path) -> Path:
-    """``NAME.h5.part``: the file while it is being recorded."""
+    """Return ``NAME.h5.part``, the path of the file while it is being recorded."""
     return path.with_name(path.name + PART_SUFFIX)
 
 
 def tmp_of(path: Path) -> Path:
-    """``NAME.h5.tmp``: the incomplete compressed copy, or the incomplete ``.part``."""
+    """Return ``NAME.h5.tmp``, the path of a compressed copy or a ``.part`` that is not yet complete."""
     return path.with_name(path.name + TMP_SUFFIX)
 
 
@@ -167,14 +167,14 @@ def encode(text: str, width: int) -> bytes:
 
 
 def decode(raw: bytes) -> str:
-    """Text of a fixed-length field, without its padding."""
+    """Return the text of a fixed-length field, without its padding."""
     return bytes(raw).rstrip(b"\0").decode("utf-8", "replace")
 
 
 Attribute = str | int | float
 
 ATTRIBUTE_BYTES = 60_000
-"""Largest attribute, because HDF5's object header ends at 64 KiB."""
+"""Largest text of an attribute; HDF5 limits an object's header to 64 KiB."""
 
 
 def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> None:
@@ -187,7 +187,7 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
 
 
 READ_KINDS = "iufS"
-"""Allowed types: numbers and fixed-length text. HDF5 trusts the stated length of variable ones."""
+"""Types that are read: numbers and fixed-length text. HDF5 does not check the length of variable text."""
 
 
 def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:
@@ -203,7 +203,7 @@ def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:
 
 
 def write_text_dataset(group: h5py.Group, name: str, text: str) -> None:
-    """Store text of any length as a scalar dataset (an attribute ends at 64 KiB)."""
+    """Store text of any length as a scalar dataset (attributes are limited to 64 KiB)."""
     raw = encode(text, len(text.encode()))
     dtype = h5py.string_dtype("utf-8", max(len(raw), 1))
     group.create_dataset(name, data=np.array(raw, dtype=dtype), dtype=dtype)
@@ -229,10 +229,9 @@ def _write_text(target: h5py.HLObject, name: str, text: str) -> None:
 
 
 def json_text(what: str, values: Mapping[str, Any]) -> str:
-    """Write a mapping as JSON; numbers and arrays of numpy become plain ones.
+    """Return a mapping as JSON text; numpy's numbers and arrays become plain numbers and lists.
 
-    Raises RecordingError when a value is nothing that JSON can hold; ``what`` names the mapping in the
-    sentence.
+    Raises RecordingError when JSON cannot represent a value; ``what`` names the mapping in the message.
     """
     try:
         return json.dumps(dict(values), allow_nan=False, default=_plain)

@@ -1,7 +1,7 @@
-"""Overview: the smallest and largest count of every 128 samples, for pictures of whole recordings.
+"""Overview: the smallest and largest count of every 128 samples, for plots of whole recordings.
 
-It is computed when a recording is finished, and stored in the group ``overview``, so that a viewer opens
-hours as fast as seconds. Without it, a file is read completely once.
+It is computed when a recording is finished, and stored in the group ``overview``, so that a viewer opens a
+recording of hours as fast as one of seconds. Without an overview, the viewer reads the whole file once.
 """
 
 from collections.abc import Iterator
@@ -15,21 +15,21 @@ from . import _layout as layout
 from ._layout import read_attributes, write_attributes
 
 BIN_SAMPLES = 128
-"""A picture 1000 columns wide needs no more than 128 000 samples to be read: 10 ms for four channels."""
+"""Samples per bin. A finer plot of 1000 columns reads at most 128 000 samples: 10 ms for four channels."""
 LOW_SUFFIX, HIGH_SUFFIX = "_low", "_high"
 _LARGEST = np.int32(layout.LARGEST_COUNT)
 
 
 @dataclass(frozen=True, eq=False)
 class CountOverview:
-    """Extremes of one channel's counts; a bin whose samples are all lost has the missing count twice."""
+    """Extremes of a channel's counts by bin; both are the missing count if all samples of a bin are lost."""
 
     low: Counts
     high: Counts
 
 
 def extremes(counts: Counts) -> CountOverview:
-    """Reduce consecutive counts, the first of which begins a bin."""
+    """Return the extremes of each bin of consecutive counts; a bin must start at the first count."""
     if counts.size == 0:
         return CountOverview(counts, counts)
     starts = np.arange(0, counts.size, BIN_SAMPLES)
@@ -44,14 +44,14 @@ def extremes(counts: Counts) -> CountOverview:
 
 
 class OverviewSums:
-    """Overview of a channel that arrives in pieces of whole bins, except the last."""
+    """Overview of a channel whose counts arrive in pieces; all but the last must be whole bins."""
 
     def __init__(self) -> None:
         self._low: list[Counts] = []
         self._high: list[Counts] = []
 
     def summed(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
-        """Yield pieces unchanged while adding them."""
+        """Yield the pieces unchanged, and add each to the overview."""
         for piece in pieces:
             self.add(piece)
             yield piece

@@ -1,7 +1,7 @@
-"""Create the file before its first sample, with all known facts and reserved space.
+"""Create the file before its first sample, with all known data and reserved space.
 
-Afterwards, only bytes at known places are written until the recording ends. HDF5 has closed the file, so
-that no crash can leave it inconsistent.
+From then until the recording ends, only bytes at known offsets are written. HDF5 has already closed the
+file, so a crash cannot make its structure inconsistent.
 """
 
 import os
@@ -31,15 +31,15 @@ MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
 """Margin of the planned length: 5 % or 10 s, whichever is longer."""
 HOLD_ROOM_S = 600.0
-"""Additional length for a hold; reserved on the disk only as samples arrive."""
+"""Additional length for the holds of a run [s]; disk space is reserved only as samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
-"""Declared length without a planned end; space is reserved only as samples arrive."""
+"""Declared length without a planned end [s]; disk space is reserved only as samples arrive."""
 RESERVE_AHEAD_S = 60.0
-"""Space to reserve at once when a recording outgrows its reserve."""
+"""Length of each further reservation when a recording outgrows its reserved space [s]."""
 
 ROOM_FACTOR = 2
-"""Factor of disk space, because a compressed copy is made at the end."""
+"""Ratio of the disk space needed to the size of the samples: a compressed copy is made at the end."""
 
 ITEM_BYTES = 4
 
@@ -71,9 +71,9 @@ class Places:
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     """Create ``part`` for the recording ``path`` and reserve its space.
 
-    It is created under another name first, so that a ``.part`` can always be opened; a kill here leaves a
-    ``.tmp`` without samples. Raises RecordingError when a file of that
-    name exists, the folder does not, or the disk is too full.
+    The file is written as ``.tmp`` and then renamed, so that a ``.part`` can always be opened; if the process
+    is killed here, a ``.tmp`` without samples remains. Raises RecordingError when the file exists already,
+    its folder does not exist, or the disk is too full.
     """
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))
@@ -85,7 +85,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
         _claim(made, places)
         rename(made, part)
         sync_folder(part.parent)
-    # HDF5 reports a failing disk by either error.
+    # HDF5 reports a failing disk as OSError or as RuntimeError.
     except (OSError, RuntimeError, KeyboardInterrupt) as error:
         for each in () if isinstance(error, FileExistsError) else (made, part):
             with suppress(OSError):
@@ -167,7 +167,7 @@ def _fill(group: h5py.Group, name: str, dtype: str, raw: bytes) -> int:
 
 
 def _contiguous(group: h5py.Group, name: str, dtype: str, length: int) -> h5py.Dataset:
-    """Create a dataset at its final place, without filling it with zeros."""
+    """Create a dataset at its final offset, without filling it with zeros."""
     settings = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     settings.set_layout(h5py.h5d.CONTIGUOUS)
     settings.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
@@ -185,7 +185,7 @@ def _contiguous(group: h5py.Group, name: str, dtype: str, length: int) -> h5py.D
 
 
 def _claim(part: Path, places: Places) -> None:
-    """Reserve space for the head of the file and for the first samples of each channel."""
+    """Reserve disk space for the file's header and for ``places.reserved`` samples of each channel."""
     disk = PositionedFile(part)
     try:
         disk.reserve(0, min(places.channels))
@@ -205,7 +205,7 @@ _one_at_a_time = threading.Lock()
 
 
 def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> Answer:
-    """Apply ``change`` to a copy of the file, and swap the two.
+    """Apply ``change`` to a copy, then replace the file by the copy; return the result of ``change``.
 
     A crash leaves the old file unchanged (and perhaps a ``.tmp``). If another program changes the file
     meanwhile, the change is repeated. Raises RecordingError when writing fails; the file is then unchanged.
@@ -225,11 +225,11 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
                     sync_file(tmp)
                     if _fingerprint(path) == before:
                         rename(tmp, path)
-                        with suppress(OSError):  # after a power cut, one of the files exists and is complete
+                        with suppress(OSError):  # after a power cut, the old or the new file is complete
                             sync_folder(path.parent)
                         return answer
                 finally:
-                    with suppress(OSError):  # a rename has taken it
+                    with suppress(OSError):  # absent after the rename
                         tmp.unlink()
     except RecordingError:
         raise

@@ -41,16 +41,16 @@ from ._seal import (
 from ._tables import Event, EventKind, Gap, Segment
 
 LONGEST = 300
-"""Most letters of a faulty name or text in a message."""
+"""Largest number of characters that a message quotes of a faulty name or text."""
 
 _LOCKED_OTHERWISE = "file locking flag values don't match"
-"""HDF5's message for a file that this process has open already with locks."""
+"""HDF5's message if this process has already opened the file with locks."""
 
 
 def open_hdf5(path: Path) -> h5py.File:
     """Open a recording for reading; it may still be growing.
 
-    Raises RecordingError: one sentence for each way in which it is not a readable recording.
+    Raises RecordingError, with the reason, when the file is not a readable recording.
     """
     _require_file(path)
     try:
@@ -137,7 +137,7 @@ class OpenRecording:
         """Content at the time of opening, except samples."""
 
     def reopen(self) -> None:
-        """Read its current content."""
+        """Open the file again, to read its current content."""
         self.file.close()
         self.file = open_hdf5(self.path)
 
@@ -156,7 +156,7 @@ class RecordedBlock:
 
 
 class Growth(Enum):
-    """Whether samples may still come."""
+    """Whether more samples may follow."""
 
     FINISHED = auto()
     GROWING = auto()
@@ -176,13 +176,13 @@ class RecordingDescription:
     started_utc: str
     recording_id: str
     samples_id: str
-    """SHA-256 of all channels' checksums: equal in copies. Empty while it grows and without samples."""
+    """SHA-256 of all channels' checksums, equal in copies; empty while the file grows or without samples."""
     bench: Mapping[str, Any]
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
     bench_check: Mapping[str, Any]
-    """The last check of the bench before it: ``checked``, ``verdict``, ``findings``, ...; may be empty."""
+    """Last bench check before the recording: ``checked``, ``verdict``, ``findings``, ...; may be empty."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -195,7 +195,7 @@ class Recording(RecordingDescription):
     channels: tuple[ChannelHeader, ...]
     plan: Mapping[str, Any]
     seal: str
-    """SHA-256 of the manifest stated in the file; empty without one. See `check_seal`."""
+    """SHA-256 of the manifest, as stated in the file; empty without one. See `check_seal`."""
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]
@@ -204,12 +204,12 @@ class Recording(RecordingDescription):
 
     @property
     def is_growing(self) -> bool:
-        """Whether it is a ``.part``: being recorded or interrupted."""
+        """Whether the file is a ``.part``: being recorded or interrupted."""
         return layout.N_VALID in self._open.file
 
     @property
     def duration_s(self) -> float:
-        """Length of what was recorded [s]."""
+        """Duration of the recording [s]."""
         return self.samples / self.sample_rate_hz
 
     @property
@@ -258,7 +258,7 @@ class Recording(RecordingDescription):
         return values
 
     def read_counts(self, role: str, start: int = 0, stop: int | None = None) -> Counts:
-        """Return the converter's own counts, int32."""
+        """Return the converter's counts without scaling, int32."""
         self.channel(role)
         begin, end = self._range(start, stop)
         try:
@@ -293,15 +293,15 @@ class Recording(RecordingDescription):
         Parameters
         ----------
         depth
-            ``"quick"`` reads all attributes, texts and tables, ``"whole"`` every sample too.
+            ``"quick"`` reads all attributes, texts and tables; ``"whole"`` also reads all samples.
         key
-            As `seal_key` reads it, to see whether it was signed with it; by default the one that the variable
+            Key to check the signature with, from `seal_key`; by default the key in the file that the variable
             VIBENCH_SEAL_KEY names.
 
         Returns
         -------
         SealCheck
-            Its state, a few words on it, and the seal.
+            State of the seal, its explanation, and the seal.
         """
         found = self._check_own_seal(SealDepth(depth), key)
         if found.state in (SealState.UNFINISHED, SealState.DAMAGED):
@@ -329,7 +329,7 @@ class Recording(RecordingDescription):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process has checked the whole file; later reads are compared with that."""
+        """Whether this process has checked the whole file; later reads are compared with that check."""
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
@@ -362,11 +362,11 @@ class Recording(RecordingDescription):
     ) -> str:
         """Save a result with its settings; return its name.
 
-        Nothing is overwritten: a name that exists gets ``-2``, ``-3``, ... The file is copied and
-        swapped, so that a crash cannot harm the samples. ``roles`` are the channels that were used
-        (all by default): their checksums are kept with the result.
+        Nothing is overwritten: a name that exists gets ``-2``, ``-3``, ... The result is added
+        to a copy, which then replaces the file, so that a crash cannot harm the samples. ``roles`` are the
+        channels that were used (all by default); their checksums are stored with the result.
 
-        Raises RecordingError when the recording is not finished, an axis does not fit, or the disk refuses.
+        Raises RecordingError when the recording is not finished, an axis does not fit, or writing fails.
         """
         if self.path.suffix == layout.PART_SUFFIX:
             raise RecordingError(
@@ -426,7 +426,7 @@ def open_recording(path: Path | str) -> Recording:
 
 
 def _require_as_checked(handle: OpenRecording, seal: str) -> None:
-    """Raise RecordingError for a changed file whose seal was checked in this process."""
+    """Raise RecordingError if the file was changed after this process had checked its seal."""
     if was_checked(seal) and check_seal(handle.file, SealDepth.QUICK, seal_key()).state is SealState.DAMAGED:
         raise RecordingError("it is no longer what it was when its seal was checked")
 
@@ -476,7 +476,7 @@ def _read(handle: OpenRecording) -> Recording:
 
 
 def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -> None:
-    """Raise RecordingError for a channel without the stated samples."""
+    """Raise RecordingError unless the channel has the stated number of samples."""
     dataset = file.get(role)
     if (
         not isinstance(dataset, h5py.Dataset)
@@ -491,7 +491,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return the state of a ``.part``, which stays "recording" if its program died."""
+    """Return samples, state and reason of a ``.part``; it is interrupted if its program has died."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

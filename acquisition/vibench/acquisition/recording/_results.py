@@ -1,4 +1,4 @@
-"""Results of an analysis, kept beside the samples they came from: ``/results/NAME/``."""
+"""Results of an analysis, stored with their samples in the recording: ``/results/NAME/``."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -19,30 +19,30 @@ from ._seal import SealKey, SealState, check_result, require_reachable, seal_res
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"
 COMPLEX_PART = "complex_part"
-"""Attribute of the two halves of a complex array; only h5py reads complex numbers directly."""
+"""Attribute that marks the real or imaginary part of a complex array; only h5py reads complex numbers."""
 SETTINGS_JSON = "settings_json"
 AXES = "axes_json"
 """Attribute of an array: the names of the arrays along its dimensions."""
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
-"""Anything JSON can hold: numbers, text, truth values, lists and objects of them."""
+"""Any value of JSON: numbers, text, booleans, lists and objects of them."""
 
 
 @dataclass(frozen=True)
 class ResultArray:
-    """One array of a result, with its unit and the arrays that are its axes."""
+    """One array of a result, with its unit and the names of its axes."""
 
     values: NDArray[Any]
     """Real or complex numbers, any shape."""
     unit: str = "1"
     axes: tuple[str, ...] = ()
-    """For each dimension the name of the array along it (``("frequency",)``); empty for an axis itself."""
+    """Name of the axis array of each dimension (``("frequency",)``); empty if this array is an axis."""
 
 
 @dataclass(frozen=True)
 class SavedResult:
-    """A result as it is read from a recording."""
+    """A result read from a recording."""
 
     name: str
     arrays: Mapping[str, ResultArray]
@@ -86,7 +86,7 @@ def write_result(
 
 
 def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
-    """Return the group of every result, by name; raises RecordingError if it is something else."""
+    """Return the group of every result, by name; raises RecordingError if an entry is not a group."""
     try:
         results = file.get(layout.RESULTS)
         found = {} if results is None else dict(results.items())
@@ -153,7 +153,7 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, ResultArray]) -> None:
 
 
 def _real_parts(key: str, values: NDArray[Any]) -> list[tuple[str, NDArray[Any], dict[str, str]]]:
-    """Split a complex array into real ones that any reader understands; truth values become integers."""
+    """Split a complex array into real ones that any reader understands; booleans become integers."""
     if np.iscomplexobj(values):
         return [
             (key + REAL_SUFFIX, values.real, {COMPLEX_PART: "real"}),
@@ -199,7 +199,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
 
 
 def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of an array's axes; without them (earlier versions), scales of the right lengths."""
+    """Return the names of an array's axes; in files of earlier versions, scales are matched by length."""
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):

@@ -1,8 +1,8 @@
-"""The seal of a recording: a checksum of its whole content, which shows any change.
+"""The seal of a recording: a checksum of its content, which shows any change.
 
 A manifest lists every group and dataset with two checksums: of its attributes, type and shape, and of its
-data. The SHA-256 of the manifest is the seal. With a key it is signed too (HMAC, RFC 2104). A seal alone
-shows damage: anyone who can change the file can also make a new seal, but no signature without the key.
+data. The SHA-256 of the manifest is the seal. With a key it is signed too (HMAC, RFC 2104). A seal
+without a signature shows only accidental changes: anyone can make a new seal, but no signature without a key.
 ``docs/recording-format.md`` shows how to check it without this package; reasons: decision 0031.
 """
 
@@ -35,23 +35,23 @@ if TYPE_CHECKING:
 MANIFEST = "manifest_json"
 SHA256, HMAC, KEY_ID = "sha256", "hmac_sha256", "key_id"
 RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
-"""Attributes of a result's group, which its own seal leaves out."""
+"""Attributes of a result's group that contain its seal, and are therefore not sealed themselves."""
 LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
-"""HDF5's attributes for axes, which contain addresses inside the file and no data."""
+"""HDF5 attributes that link axes; they contain addresses inside the file, not data."""
 PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 LARGEST_TABLE_BYTES = 500_000_000
-"""Largest array with several axes, read at once (results)."""
+"""Largest array of several dimensions [bytes]; such arrays (of results) are read at once."""
 QUICK_BYTES = 65_536
-"""Largest dataset of a quick check: all texts and tables, but no samples of a long recording."""
+"""Largest dataset that a quick check reads: texts and tables, but not the samples of a long recording."""
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
-"""Names the file with the key, for every command and program."""
+"""Environment variable with the path of the key's file, for every command and program."""
 SHORTEST_KEY = 16
 AS_SEALED = "as it was sealed"
 
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
-"""Checksum states by dataset path: before each piece, and at the end."""
+"""SHA-256 states by dataset path: one before each piece, and one at the end."""
 
 
 class SealDepth(StrEnum):
@@ -69,7 +69,7 @@ class SealState(StrEnum):
     DAMAGED = "damaged"
     """Something was changed after sealing."""
     UNSEALED = "unsealed"
-    """From before recordings had seals; changes of scales, tables and plan do not show."""
+    """Written before recordings had seals; changes of scales, tables and plan cannot be detected."""
     SEAL_GONE = "seal_gone"
     """Written by a version that seals every recording, but the seal is missing."""
     UNFINISHED = "unfinished"
@@ -80,7 +80,7 @@ class SealState(StrEnum):
 
 @dataclass(frozen=True)
 class SealCheck:
-    """Result of the check of a seal, with its sentence."""
+    """Result of the check of a seal, with an explanation."""
 
     state: SealState
     sentence: str
@@ -89,7 +89,7 @@ class SealCheck:
 
 
 class SealKey:
-    """A user's secret, which signs seals and checks signatures."""
+    """Secret key of a user, for signing seals and checking signatures."""
 
     def __init__(self, secret: bytes) -> None:
         self._secret = secret
@@ -105,9 +105,9 @@ class SealKey:
 
 
 def seal_key(path: Path | None = None) -> SealKey | None:
-    """Read the key from a file, by default from VIBENCH_SEAL_KEY; None if none is given.
+    """Read the key from a file, by default the one that VIBENCH_SEAL_KEY names; None without a file.
 
-    Raises RecordingError when the file cannot be read, or is too short to be a secret.
+    Raises RecordingError when the file cannot be read, or the key is too short.
     """
     named = os.environ.get(KEY_VARIABLE, "") if path is None else str(path)
     if not named:
@@ -128,7 +128,7 @@ def seal_key(path: Path | None = None) -> SealKey | None:
 
 
 def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -> None:
-    """Seal a finished recording; ``known`` has the checksums of data that was hashed while it was written."""
+    """Seal a finished recording; ``known`` has checksums of datasets, computed while they were written."""
     manifest = {
         path: {
             "attributes": _checksum_of_header(item),
@@ -145,7 +145,7 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
 def check_seal(
     file: h5py.File, depth: SealDepth, key: SealKey | None, states: ChannelStates | None = None
 ) -> SealCheck:
-    """Check a finished recording against its seal; fills ``states`` for datasets of numbers.
+    """Check a finished recording against its seal; adds the checksum states of its datasets to ``states``.
 
     Without a seal the samples are checked against the checksum of their channel.
     """
@@ -170,7 +170,7 @@ def check_seal(
 
 
 def require_reachable(file: h5py.File | str, error: Exception) -> None:
-    """Raise RecordingUnreachable where an error comes from the system: it says nothing about the file."""
+    """Raise RecordingUnreachable if the operating system caused the error: the file may be intact."""
     if isinstance(error, RecordingUnreachable):
         raise error
     if reason := system_error(error):
@@ -186,13 +186,13 @@ def seal_of(file: h5py.File) -> str:
 
 
 def samples_id(file: h5py.File, roles: Sequence[str]) -> str:
-    """Return the SHA-256 of the channels' checksums as stated; empty where one is missing."""
+    """Return the SHA-256 of the channels' checksums that the file states; empty if one is missing."""
     stated = [str(read_attributes(file[role]).get("sha256", "")) for role in roles]
     return _sha256(" ".join(stated).encode()) if all(stated) else ""
 
 
 class Identified(Protocol):
-    """What shows that two files are one recording."""
+    """Identifiers by which two files are recognised as the same recording."""
 
     @property
     def recording_id(self) -> str: ...
@@ -201,7 +201,7 @@ class Identified(Protocol):
 
 
 def first_copies(recordings: Sequence[Identified]) -> list[int]:
-    """Return for each recording the place of the first one that has its samples or its identity."""
+    """Return for each recording the index of the first one with the same samples or recording_id."""
     seen: dict[str, int] = {}
     firsts = []
     for place, each in enumerate(recordings):
@@ -213,14 +213,14 @@ def first_copies(recordings: Sequence[Identified]) -> list[int]:
 
 
 def copy_sentence(kept: Identified, name: str, copy: Identified) -> str:
-    """Say of ``copy`` that it is the recording ``name`` once more, or states that it is."""
+    """Return the text that explains why ``copy`` counts as a duplicate of the recording ``name``."""
     if copy.samples_id and copy.samples_id == kept.samples_id:
         return f"has the same samples as {name}"
     return f"states that it is the recording {name}: one of the two was altered, or is not finished"
 
 
 def seal_result(group: h5py.Group, key: SealKey | None) -> None:
-    """Seal a result that has just been added, together with the seal of its recording."""
+    """Seal a new result; its seal also covers the seal of its recording."""
     write_attributes(group, _marks(_result_text(group), key, RESULT_MARKS))
 
 
@@ -245,7 +245,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
     """Yield a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
-        if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand to this
+        if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand to more
             raise RecordingError(f"{dataset.name} holds {dataset.nbytes:.2g} bytes, which no result has")
         yield np.asarray(dataset[()])
         return
@@ -280,7 +280,7 @@ def _differing(
 
 
 def _checksum_of_header(item: h5py.HLObject) -> str:
-    """Checksum of an object's attributes, type and shape."""
+    """Return the checksum of an object's attributes, type and shape."""
     described: dict[str, Any] = {}
     attributes = item.attrs
     for name in attributes:
@@ -311,7 +311,7 @@ def _data_sha256(item: h5py.HLObject, states: list["Hash"] | None = None) -> str
 
 
 def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
-    """Return a checksum, or another text if data cannot be read."""
+    """Return the checksum of the data, or "unreadable" if they cannot be read."""
     try:
         return _data_sha256(item, states)
     except OSError as error:
@@ -386,8 +386,8 @@ def _sha256(raw: bytes) -> str:
     return hashlib.sha256(raw).hexdigest()
 
 
-# Seals that the journals of campaigns list: they show that a file is another recording under the same name.
-# Every check of a seal compares them, so that all commands identify recordings in the same way.
+# Campaign journals list the seals of recordings, which reveals a different recording under the same name.
+# Every check of a seal compares it with them, so that all commands follow this rule.
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 
@@ -400,19 +400,19 @@ UNION ALL SELECT file, name, seal, seal FROM last WHERE file NOT IN (SELECT file
 
 @dataclass(frozen=True)
 class NotedSeal:
-    """Seal of one file in a journal, from both tables that have it."""
+    """Seals of one file in the two tables of a journal."""
 
     point: str
     seal: str
-    """In the table of points; that of the attempt for a file that was not the point's last one."""
+    """Seal in the table of points; for the file of an earlier attempt, the seal of that attempt."""
     attempt_seal: str
-    """In the file's last attempt; empty without one, and for one from before seals."""
+    """Seal in the file's last attempt; empty without an attempt, or if it was made before seals existed."""
 
 
 def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
-    """Return the seals that the journals of a folder have noted, by file name.
+    """Return the seals in the journals of a folder, by file name.
 
-    A journal that cannot be read notes nothing: `vibench verify` reports it.
+    A journal that cannot be read is skipped here; `vibench verify` reports it.
     """
     noted: dict[str, list[NotedSeal]] = {}
     for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
@@ -423,9 +423,9 @@ def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
 
 
 def journal_objection(path: Path, seal: str) -> str:
-    """Return why a journal in its folder contradicts a recording with this seal; empty if none does.
+    """Return why a journal in the recording's folder contradicts its seal; empty if none does.
 
-    No program notes two seals for one file: where the tables differ, neither confirms it.
+    Both tables of a journal must have the same seal. If they differ, neither confirms the recording.
     """
     noted = noted_seals(path.parent).get(path.name, [])
     stated = {each for one in noted for each in (one.seal, one.attempt_seal) if each}
@@ -439,7 +439,7 @@ def journal_objection(path: Path, seal: str) -> str:
 
 
 def opened(uri: str) -> sqlite3.Connection:
-    """Open the database at a SQLite ``uri``; its transactions are started and ended by hand."""
+    """Open the database at a SQLite ``uri``; transactions must be started and ended explicitly."""
     connection = sqlite3.connect(uri, uri=True, isolation_level=None)
     connection.row_factory = sqlite3.Row
     return connection
@@ -447,9 +447,9 @@ def opened(uri: str) -> sqlite3.Connection:
 
 @contextmanager
 def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
-    """Close a new connection if its first use fails: Windows lets nobody move or delete an open file.
+    """Close a new connection if its first use fails; Windows cannot move or delete an open file.
 
-    Raises sqlite3.Error: whatever the first use raised, after closing.
+    Raises sqlite3.Error, or any other error of the first use, after closing.
 
     Parameters
     ----------
@@ -476,17 +476,16 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
         return opened(f"{address}?mode=ro")
 
 
-# Counts are compared with the checked seal: each piece is hashed again when it is read.
-# A check reads a recording from end to end, and an analysis reads it again. The process keeps the state of
-# each channel's checksum before every piece, by seal. Later reads of a file with this seal are compared with
-# these states, so that an analysis reads what was checked.
+# An analysis must read the same samples that were checked, although it reads the file again.
+# The check therefore keeps the state of each channel's checksum before every piece, by seal. When a piece is
+# read later from a file with this seal, it is hashed again and compared with these states.
 
 _KNOWN: dict[str, ChannelStates] = {}
-"""States by seal; about 20 kB for a recording of a minute."""
+"""Checksum states by seal; about 20 kB for a recording of a minute."""
 
 
 def remember(seal: str, states: ChannelStates) -> None:
-    """Compare files with this seal to these states from now on."""
+    """Keep these states, so that later reads of files with this seal are compared with them."""
     _KNOWN[seal] = states
 
 
@@ -496,12 +495,12 @@ def forget_checks() -> None:
 
 
 def was_checked(seal: str) -> bool:
-    """Whether a file with this seal was found intact as a whole by this process."""
+    """Whether this process has checked a whole file with this seal and found no change."""
     return seal in _KNOWN
 
 
 class CheckedCounts:
-    """Reads the channels of one open file, and keeps the last piece of each."""
+    """Reader of the channels of one open file; keeps the last piece of each in memory."""
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[int, Counts]] = {}

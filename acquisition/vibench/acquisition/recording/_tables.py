@@ -28,19 +28,19 @@ class EventKind(StrEnum):
     STATE = "state"
     MARK = "mark"
     LIMIT = "limit"
-    """Numbers of a limit that was passed, as a JSON object."""
+    """A limit was exceeded; the text has its numbers as a JSON object."""
     SPECIMEN = "specimen"
     """Change of the specimen found by the live twin."""
     LATE = "late"
-    """The drive fell behind its plan for a moment: by how much, and where."""
+    """The drive deviated from its planned time or phase; the text says by how much."""
     END = "end"
     OFF = "off"
-    """The output was switched off after an early end, before the samples that show its silence were read."""
+    """The output was switched off after an early end; samples that show silence are read afterwards."""
     SILENCE = "silence"
 
 
 REJECTED = "average rejected"
-"""Text of a mark: the last realisation of noise that began before it is not used for results."""
+"""Text of a mark: results do not use the last noise realisation that began before the mark."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,9 @@ class Segment:
 
 
 def read_columns(file: h5py.File, table: Table) -> Columns:
-    """Columns of a table, as many rows as are valid.
+    """Return the valid rows of a table, by column.
 
-    Raises RecordingError when one is missing, of another type or width, or longer than a table can be.
+    Raises RecordingError when a column is missing, has a wrong type or width, or has too many rows.
     """
     group = file.get(table.name)
     if not isinstance(group, h5py.Group):
@@ -113,7 +113,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
         or dataset.ndim != 1
         or dataset.dtype.kind != wanted.kind
         or dataset.dtype.itemsize > wanted.itemsize
-        or len(dataset) > table.capacity + 1  # a recovery adds its own event
+        or len(dataset) > table.capacity + 1  # a recovery adds one event
     ):
         raise RecordingError(
             f"the column {column.name} of the table {table.name} is not one of {column.dtype} of at most "
@@ -131,7 +131,7 @@ def first_number(group: h5py.Group, name: str) -> int:
 
 
 def ending(file: h5py.File) -> tuple[RecordingState, str]:
-    """Return how and why a ``.part`` ended; "recording" if its program died before."""
+    """Return state and reason of a ``.part``; the state stays "recording" if its program died."""
     state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
     is_whole = state in tuple(RecordingState)
     return RecordingState(state) if is_whole else RecordingState.RECORDING, reason
@@ -145,7 +145,7 @@ def _text(file: h5py.File, name: str) -> str:
 
 
 def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence[str]) -> None:
-    """Raise RecordingError for rows with missing samples or channels."""
+    """Raise RecordingError for rows that refer to samples or channels outside the recording."""
     if table is layout.EVENTS:
         is_right = (columns["sample"] >= 0) & np.isfinite(columns["unix_time_s"])
     else:
@@ -163,7 +163,7 @@ def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence
 
 
 def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
-    """Return the rows without samples past the last valid one.
+    """Return the rows, limited to the valid samples.
 
     Rows are written before the counters, so after a crash they may refer to missing samples. A segment that
     is still open, or loses its end here, becomes incomplete.
@@ -181,7 +181,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
 def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
     first = np.minimum(columns["first_sample"], n_valid)
     last = columns["last_sample"]
-    # After a power cut it may be marked complete without its end; only an empty one ends at -1.
+    # A power cut may leave a complete segment without its end. Only an empty one at sample 0 ends at -1.
     is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
     is_cut = is_open | (last >= n_valid)
     return {
@@ -243,24 +243,24 @@ def gaps(columns: Columns) -> tuple[Gap, ...]:
 
 
 class SegmentLabel(StrEnum):
-    """Label of a segment by its excitation."""
+    """Labels of segments, by what is played or measured in them."""
 
     REALISATION = "realisation"
     NOISE = "noise"
     SWEEP = "sweep"
     DWELL = "dwell"
     STEP = "step"
-    """Frequency of the plan's list, or level."""
+    """A frequency of the plan's list, or a level."""
     SEARCH = "search"
     """A frequency that was added to localise a jump."""
     RESONANCE = "resonance"
     BRANCH = "branch"
-    """A point of a branch that a fast loop holds."""
+    """A point of a branch, held by a fast control loop."""
     PERTURBED = "perturbed"
-    """Such a point with small perturbations of the drive, to find its stability."""
+    """A branch point with small perturbations of the drive, to determine its stability."""
     CHECK = "check"
     """The small sine before the first ramp."""
     LEAD_IN = "lead_in"
-    """Tones on the way to a dwell."""
+    """Tones played before a dwell, so that the specimen reaches the intended branch."""
     RAMP_UP = "ramp_up"
     RAMP_DOWN = "ramp_down"

@@ -32,7 +32,7 @@ from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallo
 from ._seal import SealKey, seal_key
 
 COUNT_TOLERANCE = 0.01
-"""Largest distance of volts from a whole count; rounding of float64 is 1e-8 of a count at 24 bits."""
+"""Largest distance of volts from a whole count, in counts; rounding of float64 is 1e-8 at 24 bits."""
 
 
 class CountScale:
@@ -76,11 +76,11 @@ class CountScale:
 
 
 RESERVED = 8
-"""File descriptors for the recording, its copy, the folder and checks of the disk, then for the journal."""
+"""Number of file descriptors for the recording, its copy, the folder and disk checks, then the journal."""
 
 
 class DescriptorReserve:
-    """Reserve of open file descriptors, released to finish a recording."""
+    """File descriptors that are kept open, and released so that the recording can be finished."""
 
     def __init__(self) -> None:
         self._held: list[int] = []
@@ -101,17 +101,17 @@ class DescriptorReserve:
 
 
 QUEUE_S = 10.0
-"""Longest time of samples that wait for the disk [s]; the slowest measured sync took 0.12 s."""
+"""Length of the queue of samples that wait for the disk [s]; the slowest measured sync took 0.12 s."""
 GAP_PIECE_SAMPLES = 51_200
 
 ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILED)
 
 
 def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWriter":
-    """Start a recording; ``NAME.h5.part`` exists with all known facts when this returns.
+    """Start a recording: create ``NAME.h5.part`` with all known data.
 
-    Raises RecordingError when the name is not ``NAME.h5``, a file of that name exists in any of its three
-    forms, or the disk has no room for the planned samples.
+    Raises RecordingError when the name is not ``NAME.h5``, the file, its ``.part`` or ``.tmp`` exists, or
+    the disk has no room for the planned samples.
     """
     path = Path(path)
     if path.suffix != layout.SUFFIX:
@@ -134,7 +134,7 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
 
 
 class RecordingWriter:
-    """Writer of a recording, used by one thread; the disk has its own.
+    """Writer of a recording, for use by one thread; a second thread writes to the disk.
 
     Leaving the ``with`` block finishes a recording that is not finished yet: as complete, as
     stopped (keyboard) or as failed (any other exception).
@@ -176,8 +176,8 @@ class RecordingWriter:
 
         Samples missing between this block and the last are marked as a gap and read as NaN.
 
-        Raises RecordingError when the block does not fit (shape, order, volts that are not counts, end of the
-        room), or the disk has failed. What was committed is kept.
+        Raises RecordingError when the block does not fit (wrong shape or order, volts that are not whole
+        counts, full recording), or the disk has failed. Committed samples are kept.
         """
         self._check(block)
         # A converter's own counts are recorded as they are.
@@ -218,8 +218,8 @@ class RecordingWriter:
     def finish(self, state: RecordingState, reason: str = "") -> Path:
         """End the recording and turn it into ``NAME.h5``; calling again changes nothing.
 
-        Raises RecordingError when the disk failed on the way. The samples committed before are kept, in
-        ``NAME.h5`` or in ``NAME.h5.part``; the text says which.
+        Raises RecordingError when the disk has failed. Samples committed before are kept in ``NAME.h5`` or
+        ``NAME.h5.part``; the message says which.
         """
         if state not in ENDINGS:
             raise RecordingError(
@@ -296,10 +296,10 @@ class RecordingWriter:
             )
 
     def _reserve_up_to(self, end: int) -> None:
-        """Reserve space ahead of the samples if the plan has no end or runs far over."""
+        """Reserve disk space ahead if the recording has no planned end, or is much longer than planned."""
         rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
         ahead = round(RESERVE_AHEAD_S * rate_hz)
-        # A recording of planned length never needs more space.
+        # Half the margin: a recording that keeps to its planned length reserves no further space.
         lead = ahead // 2 if planned is None else round(MARGIN_S / 2 * rate_hz)
         if end + lead <= self._reserved or self._reserved == self._places.capacity:
             return
@@ -329,7 +329,7 @@ class RecordingWriter:
         )
 
     def _write_ending(self, state: RecordingState, reason: str) -> None:
-        """Write the state last, so that it always has a reason."""
+        """Write the reason before the state, so that a state never lacks its reason."""
         why = encode(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
         try:
             self._disk.write(self._places.reason, why)
