@@ -128,7 +128,7 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Return the first sample of a drop-out that may have begun undetected, or the number of samples.
+    """Return the first sample of a drop-out that may have started undetected, or the number of samples.
 
     Parameters
     ----------
