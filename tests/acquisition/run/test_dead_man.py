@@ -171,5 +171,5 @@ def test_an_analogue_output_has_no_dead_man(tmp_path):
 
 def test_a_dead_man_needs_a_channel_with_bursts(rig):
     content = rig.generator.model_dump() | {"dead_man_s": 1.0, "channel": 2}
-    with pytest.raises(ValueError, match="channel 1 alone"):
+    with pytest.raises(ValueError, match="only channel 1 has"):
         type(rig.generator).model_validate(content)
