@@ -1,10 +1,10 @@
-"""What to measure: excitations, measurements, campaigns, sweeps, and what they will do to the rig.
+"""Plans (excitations, measurements, sweeps, campaigns) and their predicted effect on the rig.
 
-A `Measurement` is one excitation with its ramps and limits while running; a `Campaign` an ordered list of
-them and of nested sweeps, read from TOML. Before anything moves, a plan is checked against the limits of the
-rig by its model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time
-(`duration_s`). All are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V.
-Plans open no instrument and know no bench and no run. Chains of points:
+A `Measurement` is one excitation with its ramps and the limits during its run. A `Campaign` is an ordered
+list of measurements and nested sweeps, read from TOML. Before anything moves, a model of the rig predicts the
+loads of a plan (`predicted_loads`), and they are compared with the rig's limits (`MeasurementPreview`). Plans
+are frozen and validated. Frequencies are in Hz, times in s, amplitudes peak to peak in V. This package opens
+no instrument and does not depend on bench or run. Chains of points:
 docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 
 >>> from vibench.acquisition.plan import Measurement, SineSweep, duration_s

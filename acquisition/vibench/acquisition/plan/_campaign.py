@@ -1,7 +1,4 @@
-"""Measurements and nested sweeps in order, and the TOML file that contains them.
-
-Also which failures are tried again, and how often.
-"""
+"""Campaigns: measurements and nested sweeps in order, their TOML file, and the rules for retries."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -24,9 +21,9 @@ class Retryable(StrEnum):
     DATA_LOST = "data_lost"
     """Samples were overwritten before they were read."""
     INSTRUMENT_LOST = "instrument_lost"
-    """Cable, power or server gone: the bench is closed and opened again first."""
+    """Cable, power or server failed: the bench is closed and opened again before the next attempt."""
     INSTRUMENT_FAULT = "instrument_fault"
-    """An instrument refused a command, or is held by another program; the bench is opened again first."""
+    """An instrument refused a command or is in use elsewhere; the bench is reopened before a new attempt."""
     CHECK_FAILED = "check_failed"
     """The check at low level before the recording failed."""
     LIMIT = "limit"
@@ -117,12 +114,12 @@ class Campaign(FrozenModel):
         return _recorded_s(points) + self.rest_s * (len(points) - 1)
 
     def size_bytes(self, sample_rate_hz: float, channels: int) -> int:
-        """Disk space of all growing recordings [bytes]; finished ones need less."""
+        """Return the disk space of all recordings while they are made [bytes]; finished ones need less."""
         return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
 
 
 def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    """Return the first of all points with the same drive: its limit checks hold for the others."""
+    """Return one point for each different drive; its limit checks hold for all points with that drive."""
     first: dict[str, Point] = {}
     for point in points:
         first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats"}), point)
@@ -134,7 +131,7 @@ def _recorded_s(points: tuple[Point, ...]) -> float:
 
 
 def load_campaign(path: Path | str) -> Campaign:
-    """Read a campaign: a TOML file, or a shipped one by its name (``"quick"``).
+    """Read a campaign from a TOML file, or a shipped campaign by its name (``"quick"``).
 
     Raises ConfigurationError with file, key, what was given and what is allowed.
     """

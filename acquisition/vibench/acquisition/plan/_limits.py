@@ -50,9 +50,9 @@ _PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
 
 
 def require_own_plan(measurement: Measurement, rig: Rig) -> None:
-    """Refuse to replay a recording with another plan than its own, whose result it would seem to be.
+    """Refuse to replay a recording with a plan other than the one that it was made with.
 
-    Raises ConfigurationError. Imported recordings, and plans of another version, cannot be compared.
+    Raises ConfigurationError. Imported recordings, and plans of another version, are not checked.
     """
     path = rig.daq.options.get("recording")
     if not rig.plays_back or not isinstance(path, str):
@@ -88,7 +88,7 @@ class Consequence(StrEnum):
     REFUSED = "refused"
     """The plan is not played."""
     TOLD = "told"
-    """It is reported beforehand, and marked in the recording if it occurs."""
+    """The plan is played; the excess is reported beforehand, and marked in the recording if it occurs."""
 
 
 _DIGITS = 6
@@ -110,11 +110,11 @@ class LimitCheck:
     side: LimitSide = LimitSide.AT_MOST
     consequence: Consequence = Consequence.REFUSED
     load: BaseQuantity | None = None
-    """Quantity whose peak the value is; None for any other value."""
+    """Quantity of rig or specimen if `value` is its predicted peak; otherwise None."""
 
     @property
     def use(self) -> float:
-        """Share of the limit that is used; above 1 is too much."""
+        """Used share of the limit; above 1 the limit is exceeded."""
         match self.side:
             case LimitSide.AT_MOST:
                 return self.value / self.limit if self.limit else math.inf
@@ -128,7 +128,7 @@ class LimitCheck:
 
     @property
     def is_kept(self) -> bool:
-        """Whether the value is allowed; a value on the limit is allowed, except for rounding."""
+        """Whether the value is within the limit, or beyond it only by rounding."""
         return self.use <= 1 + 1e-9
 
     def complaint(self) -> str:
@@ -140,7 +140,7 @@ class LimitCheck:
 
 
 def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
-    """Return every predicted load of ``measurement`` with its limit on ``rig``."""
+    """Compare every setting and predicted load of ``measurement`` with its limit on ``rig``."""
     loads = predicted_loads(measurement.excitation, rig)
     return (
         *_settings(measurement, rig),
@@ -155,9 +155,9 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
     Raises
     ------
     LimitExceeded
-        Naming every violation with value, limit, source and remedy. Nothing was moved.
+        Names every violation with value, limit, source and remedy. Nothing was played.
     ConfigurationError
-        When a recording is played back that was made with another plan.
+        When the rig plays back a recording that was made with another plan.
     """
     require_own_plan(measurement, rig)
     checks = limit_checks(measurement, rig)
@@ -263,7 +263,7 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
 
 
 def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
-    """Check that the settings for held levels, by the rig's model, are within the plan's largest."""
+    """Compare the predicted setting that holds the base's level with the plan's largest, `amplitude_vpp`."""
     needed = [
         (needed_vpp(rig, acceleration, frequency_hz), frequency_hz)
         for frequency_hz, acceleration in measurement.excitation.held_accelerations()
@@ -357,7 +357,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
 
 
 def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck]:
-    """Check that the converter can show the predicted values."""
+    """Compare the predicted signals with the ranges of the converter's inputs and of the sensors."""
     peaks = {
         Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
         Role.AMPLIFIER_VOLTAGE: loads[BaseQuantity.AMPLIFIER_VOLTAGE].peak,
@@ -378,9 +378,9 @@ def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck
 
 
 TOUCH_SHARE = 0.25
-"""Share of the gap that p may reach in a check: a sine started at once overshoots, and impacts last."""
+"""Share of the gap that p may reach in a check: a sine without ramp overshoots, and impacts may persist."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""Resonances are known to some per cent, and near one the base moves by decibels (decision 0072)."""
+"""Check frequency within 3 %: a resonance known to some per cent shifts the base by decibels (0072)."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
@@ -389,9 +389,9 @@ def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
     Parameters
     ----------
     wanted_vpp
-        Setting that would do without stops; never exceeded [V].
+        Setting that would be used without stops; never exceeded [V].
     rig
-        Says what specimen stands on the table.
+        Rig whose model includes the specimen on the table.
     """
     model = RigModel(rig)
     per_vpp = 0.5 * rig.generator.terminal_factor()
@@ -400,7 +400,7 @@ def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
 
 
 def run_check_vpp(planned_vpp: float, rig: Rig) -> float:
-    """Return the amplitude of a run's own check for a plan at ``planned_vpp``, never above it [V]."""
+    """Return the amplitude of the check before a run at ``planned_vpp``; never above that setting [V]."""
     return min(planned_vpp, check_amplitude_vpp(max(CHECK_FRACTION * planned_vpp, CHECK_LOWEST_VPP), rig))
 
 
@@ -422,10 +422,10 @@ def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phas
 def expected_under_check(
     rig: Rig, terminal_v: float, quantity: BaseQuantity = BaseQuantity.ACCELERATION
 ) -> ComplexArray:
-    """Return the expected values of a quantity in a check, as phasors over the voltage's phase; shape (n,).
+    """Return the expected phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
 
-    One for each of several specimens whose resonances are up to 3 % higher or lower; if p still comes near a
-    stop, also with m1 bound to m2.
+    Each phasor belongs to a specimen with resonances up to 3 % higher or lower. If p may come near a stop,
+    the phasors with m1 bound to m2 are added.
 
     Parameters
     ----------
@@ -443,7 +443,7 @@ def expected_under_check(
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
-    """Return the expected amplitude that is nearest to a measured one [m/s2].
+    """Return the measured amplitude, limited to the range of the expected ones [m/s2].
 
     Parameters
     ----------

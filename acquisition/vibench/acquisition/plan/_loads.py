@@ -1,8 +1,8 @@
 """Predicted peaks of a plan on the rig, from the rig's model.
 
-Exact while p stays inside the gap; otherwise the fundamental of a motion whose p is limited to the gap.
-Impacts add to it; tests/acquisition/plan/test_specimen_loads.py has the amounts. The real motion is watched
-during the run.
+The prediction is exact while p stays inside the gap. Otherwise it is the fundamental of a motion with p
+limited to the gap; impacts add to it (amounts: tests/acquisition/plan/test_specimen_loads.py). The real
+motion is monitored during the run.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -28,12 +28,12 @@ from ..excitation.steps import (
 from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4
-"""A held waveform is computed to twice its playback rate: the images above are below 1/20 of the band, and
-the table's response to them decreases.
+"""A held waveform is computed up to twice its playback rate. Higher images are below 1/20 of the band's
+level, and the table responds to them less.
 """
 PASSED_LEVELS = np.arange(1, 17) / 16
-"""Shares of a tone's level that are computed: ramps pass them, and with stops a higher level may move
-less.
+"""Shares of a tone's level at which loads are computed: ramps pass through them, and with stops a lower level
+may cause the larger motion.
 """
 BAND_POINTS = 2000
 """Number of frequencies for the mean square of streamed noise."""
@@ -56,15 +56,15 @@ class Load:
 
 
 Loads: TypeAlias = Mapping[BaseQuantity, Load]
-"""Every quantity of rig and specimen."""
+"""Load of every quantity of rig and specimen."""
 
 
 def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     """Return peak and rms of every quantity of rig and specimen while ``excitation`` plays, steady state.
 
-    By frequency for sines, by Fourier lines summed in time for periodic waveforms (including the images of
-    the generator's hold). Streamed noise is Gaussian: its peak is its own crest factor times the rms value.
-    Ramps stay below by their half-cosine shape.
+    Sines are computed by frequency; periodic waveforms as a sum of Fourier lines, with the images of the
+    generator's hold. Streamed noise is Gaussian: its peak is its crest factor times its rms value. Ramps
+    stay below the steady state because of their half-cosine shape.
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
@@ -129,7 +129,7 @@ class _BroadPlay:
         if not self._touches:
             return self._through(self._model.transfer, quantity)
         stuck = self._through(self._model.stuck_transfer, quantity)
-        # Add the force of p at the gap, at any frequency of the band.
+        # Add the mean effect, over the band, of a p with the amplitude of the gap.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
@@ -152,7 +152,7 @@ def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
     lines = held_lines(waveform.values, HELD_SPANS)
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(waveform.repetition_hz)
     answer = lines * transfer(frequency_hz)
-    # Twice the points that the highest line needs, so that no peak is missed between two of them.
+    # Twice the samples that the highest line needs, so that no peak is missed between samples.
     points = 4 * len(lines)
     one_sided = np.zeros(points // 2 + 1, dtype=np.complex128)
     one_sided[: len(lines)] = answer * (points / 2)
@@ -170,7 +170,7 @@ def _of_source(source: SampleSource, transfer: Transfer) -> Load:
 def needed_vpp(
     rig: Rig, acceleration: float, frequency_hz: float, on_table: OnTable = OnTable.SPECIMEN
 ) -> float:
-    """Return the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
+    """Return the setting, peak to peak [V], at which the base reaches ``acceleration``.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def needed_vpp(
     frequency_hz
         Frequency of the sine.
     on_table
-        Feedback uses the bare table, smooth over frequency, and measures the effect of the specimen.
+        Feedback uses the bare table, whose response is smooth, and measures the effect of the specimen.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()
@@ -197,9 +197,9 @@ class BaseMotion:
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
-    """Predict the base's motion, shape of ``frequency_hz``; a level held by feedback is exact.
+    """Predict the base's amplitude at each of ``frequency_hz``; a level held by feedback is exact.
 
-    A setting uses the rig's model, including the specimen; noise is represented by a sine of its rms.
+    For other plans it follows from the rig's model with specimen; noise counts as a sine of the same rms.
     """
     levels = [excitation.level_at(float(each)) for each in frequency_hz]
     model, terminal_v = RigModel(rig), terminal_volts(excitation, rig)

@@ -1,4 +1,4 @@
-"""How fast a bench's feedback acts, which decides what unstable motions it can hold (decision 0065)."""
+"""Delay of a bench's feedback, which limits the unstable motions that it can hold (decision 0065)."""
 
 from ..rig import Rig
 
@@ -6,7 +6,7 @@ LOOK_S = 0.2
 """Averaging time of one measurement of the feedback [s]; ten periods at least."""
 LOOK_PERIODS = 10
 _COMMANDS = 2
-"""Commands of one change of the drive: amplitude and frequency."""
+"""Number of commands that change the drive: amplitude and frequency."""
 
 
 def look_s(frequency_hz: float) -> float:
@@ -15,5 +15,5 @@ def look_s(frequency_hz: float) -> float:
 
 
 def loop_time_s(rig: Rig, frequency_hz: float) -> float:
-    """Return the delay from a motion to the resulting drive: a look, and the generator's commands [s]."""
+    """Return the delay from a motion to the changed drive: averaging time and generator commands [s]."""
     return look_s(frequency_hz) + _COMMANDS * rig.generator.settle_s

@@ -28,10 +28,10 @@ class MeasurementPreview:
 
     measurement: Measurement
     volts: Samples
-    """According to the generator's panel, shape (samples,) [V]."""
+    """Signal as set at the generator's panel, shape (samples,) [V]."""
     sample_rate_hz: float
     spectrum_hz: Samples
-    """At most `SPECTRUM_POINTS`, each the highest line of its interval [Hz]."""
+    """Frequency of the highest line in each interval, at most `SPECTRUM_POINTS` of them [Hz]."""
     spectrum_v: Samples
     """Peak amplitude of the sine at each frequency [V]."""
     rms_v: float
@@ -43,7 +43,7 @@ class MeasurementPreview:
     size_bytes: int
     """Size [bytes] of the recording while it is made."""
     least_growth_time_s: float | None
-    """Shortest growth time (factor e) that feedback on this rig can hold; None without feedback [s]."""
+    """Shortest growth time (factor e) of a motion that the computer's feedback can hold [s], or None."""
 
     @property
     def is_allowed(self) -> bool:
@@ -85,7 +85,7 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
     if not EXCITATION_KINDS[excitation.kind].is_feedback:
         return None
     if drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
-        # The reach of a fast loop follows from its gains and the plant, see `require_holdable`.
+        # What a real-time loop can hold depends on its gains and the plant; see `require_holdable`.
         return None
     return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
 

@@ -145,7 +145,7 @@ class Point:
     """Name of its recording, without ``.h5``; different from every other point's."""
     measurement: Measurement
     chain: str = ""
-    """Points of one chain follow each other on one branch; empty for a single point."""
+    """Name of its chain, a series of points on one branch; empty for a single point."""
 
 
 class RunState(StrEnum):
@@ -178,11 +178,11 @@ class RunState(StrEnum):
 
 
 CHECK_FREQUENCY_HZ = 160.0
-"""The bench check's sine: where accelerometers are calibrated (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
+"""Sine of the bench check, near the calibration of accelerometers (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
 CHECK_FRACTION = 0.02
-"""Level of the bench check over the planned amplitude."""
+"""Amplitude of the bench check divided by the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""Lowest level of a check, as far as the plan allows, because of hum [V]."""
+"""Lowest setting of a check, so that it exceeds hum; a plan with a lower setting limits it [V]."""
 CHECK_QUIET_S = 0.1
 """Duration of silence in the check before anything plays [s]."""
 CHECK_SETTLE_S = 0.2
@@ -206,16 +206,15 @@ class Phase:
 
     @property
     def end_level(self) -> float:
-        """Level at its end, from 0 (silent) to 1 (as planned); only ramps change it."""
+        """Level at the end of the phase, from 0 (silent) to 1 (as planned); only ramps change it."""
         return 0.0 if self.play is None or self.state is RunState.RAMPING_DOWN else 1.0
 
 
 def phases(measurement: Measurement) -> Iterator[Phase]:
-    """Yield the phases of ``measurement`` from the first ramp up to the last ramp down, without the bench
-    check.
+    """Yield the phases from the first ramp up to the last ramp down, without the bench check.
 
     A change of waveform happens in silence, between a ramp down and a ramp up. A change of frequency keeps
-    the phase and the amplitude and needs neither.
+    phase and amplitude, and needs no ramp.
     """
     previous: Step | None = None
     for step in measurement.excitation.steps():
@@ -268,7 +267,7 @@ _RAMP_LABELS = {
 def duration_s(measurement: Measurement) -> float:
     """Time from the first ramp up to the end of the last ramp down, without the bench check [s].
 
-    With feedback it is the longest that it may take.
+    With feedback, this is the longest time that the measurement may take.
     """
     excitation = measurement.excitation
     hush_s = HUSH_S if isinstance(excitation, AbstractFeedback) else 0.0
@@ -278,7 +277,7 @@ def duration_s(measurement: Measurement) -> float:
 def lead_in_s(measurement: Measurement) -> float:
     """Return the time from the first sample to the measurement proper: bench check, ramp and settling [s].
 
-    With feedback it ends with the ramp: settling is then part of the measurement.
+    With feedback, this time ends with the ramp, because settling is part of the measurement.
     """
     if isinstance(measurement.excitation, AbstractFeedback):
         return CHECK_S + HUSH_S + measurement.ramp_s
@@ -301,7 +300,7 @@ def stairs(measurement: Measurement) -> int:
 
 
 def half_cosine(progress: float) -> float:
-    """Return the level of a ramp from 0 to 1, with no kink at either end.
+    """Return the level of a ramp from 0 to 1, with zero slope at both ends.
 
     Parameters
     ----------
@@ -325,7 +324,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source of a measurement on a rig; for a stream the output, also if the rig has none."""
+    """Return the source that plays a measurement; for a stream the output, even if the rig has none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
@@ -333,7 +332,7 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source of a measurement on a rig; raises ConfigurationError if the rig has none."""
+    """Return the source that plays a measurement; raises ConfigurationError if the rig lacks it."""
     source = drive_source_of(measurement, rig)
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:
@@ -351,7 +350,7 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 LEAST_SHARE = 1e-4
-"""Smallest setting of an analogue output over its largest: some tens of counts."""
+"""Smallest setting of an analogue output divided by its largest; the smallest is some tens of counts."""
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:

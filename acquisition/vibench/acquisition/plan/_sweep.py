@@ -56,7 +56,7 @@ class Range(FrozenModel):
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The values, rising."""
+        """Values in rising order."""
         count = self._count()
         match self.spacing:
             case RangeSpacing.LINEAR:
@@ -69,7 +69,7 @@ class Range(FrozenModel):
     def _count(self) -> int:
         if self.step is None:
             return self.count or 0
-        # 1e-9: a stop that the steps reach except for rounding is included.
+        # 1e-9 includes a stop that the steps miss only by rounding.
         return floor((self.stop - self.start) / self.step + 1e-9) + 1
 
 
@@ -78,7 +78,7 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 
 
 def values_of(given: Values) -> tuple[float, ...]:
-    """Return the values of an axis: a range's rising, a list's in their order."""
+    """Return the values of an axis: of a range in rising order, of a list as given."""
     return given.values if isinstance(given, Range) else given
 
 
@@ -120,7 +120,7 @@ class _Place:
         return "-".join([sweep, *self.words.values()])
 
     def with_words(self, **words: str) -> "_Place":
-        """Replace the words of some values."""
+        """Return the place with other words for some of its values."""
         return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
@@ -242,7 +242,7 @@ class Sweep(FrozenModel):
             yield Point(name, measurement)
 
     def _led(self) -> Iterator[Point]:
-        """Follow each chain; the earlier points are the lead-in of the next."""
+        """Yield the points of each chain; the earlier points are the lead-in of the later ones."""
         axes = self._axes()
         along = SweepAxis(str(self.continue_from_previous))
         rising = sorted(axes.pop(along))
@@ -286,7 +286,7 @@ class Sweep(FrozenModel):
 
 
 def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
-    """Yield a chain's values, once or up and down; each with the word for its direction."""
+    """Yield a chain's values in the order of ``way``, each with the word for its direction."""
     up = [("" if way is None else "up", value) for value in rising]
     down = [("down", value) for value in reversed(rising)]
     match way:

@@ -1,4 +1,4 @@
-"""Recording until a result is known well enough: targets, and times of the analyses."""
+"""Recording until results reach a required accuracy: targets, and times of the analyses."""
 
 from typing import Annotated
 
@@ -11,9 +11,9 @@ from ..host.toml_file import FrozenModel
 FEWEST_REALISATIONS = 4
 """Number of realisations before the first analysis: fewer have too little scatter for a bound."""
 SHORTEST_S = 2.0
-"""Usual time before the first analysis [s]; a plan may be shorter, and is then analysed at its end."""
+"""Default time before the first analysis [s]; a shorter plan is analysed at its end."""
 LOOK_FACTOR = 2.0**0.5
-"""Ratio of recorded times between one analysis and the next."""
+"""Ratio of the recorded times at two successive analyses."""
 
 
 Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
