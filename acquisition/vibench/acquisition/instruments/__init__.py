@@ -1,8 +1,8 @@
 """Protocols of a bench's instruments, their values, and the plug-ins that provide them.
 
-An instrument is a class that implements one of the protocols here, and an entry point of an installed package
-that names it: ``vibench.generators``, ``vibench.digitizers``, ``vibench.outputs``, ``vibench.controllers``,
-``vibench.sensors``. A hardware configuration uses that name. Our own instruments are rows of the same kind.
+An instrument is a class that implements one of these protocols. Its package registers it as an entry point of
+the group ``vibench.generators``, ``vibench.digitizers``, ``vibench.outputs``, ``vibench.controllers`` or
+``vibench.sensors``, and a hardware configuration uses the entry point's name.
 docs/instruments.md explains how to write one; `vibench.acquisition.contract` tests it.
 
 >>> from vibench.acquisition.instruments import PlugInKind, plug_in

@@ -1,6 +1,6 @@
-"""Guard for plug-ins: an exception or value that violates the protocol becomes one sentence.
+"""Guard for plug-ins: an exception or value that violates the protocol becomes a short error.
 
-Our own drivers are not guarded: an unexpected exception is our error and needs its traceback.
+Vibench's own drivers are not guarded: an unexpected exception is a bug and needs its traceback.
 """
 
 import sys
@@ -27,20 +27,20 @@ class PlugInKind(StrEnum):
     CONTROLLER = "vibench.controllers"
     SENSOR = "vibench.sensors"
     EXCITATION = "vibench.excitations"
-    """The plan of a kind of measurement; its name, here and below, is the ``kind`` in a plan."""
+    """Plan of a kind of measurement. Here and below, the entry point's name is the ``kind`` in a plan."""
     FEEDBACK = "vibench.feedback"
     """The controller of a kind of measurement with feedback."""
     ANALYSIS = "vibench.analyses"
     DRAWING = "vibench.drawings"
     DRIVE = "vibench.drives"
-    """A source that plays instead of the generator, by its table in the hardware configuration."""
+    """Source that plays instead of the generator, named after its table in the hardware configuration."""
     VIRTUAL_INSTRUMENT = "vibench.virtual_instruments"
-    """The simulation of such a source, by the same table."""
+    """Simulation of such a source, named after the same table."""
 
 
 _DRIVERS = "vibench.acquisition.drivers"
 _SENSORS = "vibench.acquisition.rig"
-# Rows here instead of our own metadata: a checkout with other instruments needs no new installation
+# They are listed here, not in package metadata: a checkout with other drivers needs no new installation
 # (docs/decisions/0053-instruments-by-plug-in.md).
 OURS = tuple(
     EntryPoint(name, target, kind)
@@ -69,9 +69,9 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 
 
 def missing_package(name: str) -> str | None:
-    """Return the sentence that names our package for a name such as ``"branch_continuation"``.
+    """Return the advice which package to install for a name such as ``"branch_continuation"``.
 
-    Returns None if no package of ours provides that ``name``, a word of a plan or a hardware configuration.
+    Returns None if no extension of vibench provides ``name``, a word of a plan or hardware configuration.
     """
     folder = FOUND_IN.get(name)
     if folder is None:
@@ -127,13 +127,13 @@ def _rows(kind: PlugInKind) -> tuple[EntryPoint, ...]:
 
 @lru_cache(maxsize=1)
 def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[EntryPoint, ...]]:
-    """Read the entry points of installed packages, once for each path, because it takes 6 ms."""
+    """Read the entry points of installed packages; cached for each ``sys.path``, as it takes 6 ms."""
     offered = entry_points()
     return {kind: tuple(offered.select(group=kind.value)) for kind in PlugInKind}
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
-    """Load a driver, with a guard if it is not ours; raises ConfigurationError as `plug_in` does.
+    """Load a driver, with a guard unless it is vibench's own; raises ConfigurationError as `plug_in` does.
 
     ``kind`` is the group of entry points, ``name`` the name in the hardware configuration and ``promise`` the
     protocol of the entry point's object.
@@ -151,10 +151,10 @@ _ADVICE = (
 
 
 class Guarded:
-    """Wraps an instrument or a driver, and returns only values that its protocol allows."""
+    """Wrapper of an instrument or driver that returns only values that its protocol allows."""
 
     def __init__(self, held: Any, promise: type, name: str) -> None:
-        """``name`` for errors: ``"'plain_scpi' of vibench.generators"``."""
+        """Wrap ``held``; errors contain ``name``: ``"'plain_scpi' of vibench.generators"``."""
         self._held = held
         self._promise = promise
         self._name = name
@@ -206,7 +206,7 @@ class Guarded:
 
 
 def _taken(hint: Any, value: Any) -> Any:
-    """Convert a value to its type, a data class of ours field by field; raises TypeError or ValueError."""
+    """Convert a value to the type ``hint``, data classes field by field; raises TypeError or ValueError."""
     name = getattr(hint, "__name__", str(hint))
     if not is_dataclass(hint):
         return _taken_part(name, hint, value)
@@ -248,5 +248,5 @@ def _adapter(hint: Any) -> TypeAdapter[Any]:
 
 
 def _bare(given: Any) -> Any:
-    """Return an instrument without its guard, for its own package."""
+    """Remove the guard of an instrument that is passed to a plug-in."""
     return given.bare() if isinstance(given, Guarded) else given

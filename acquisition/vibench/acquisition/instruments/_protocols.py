@@ -29,7 +29,7 @@ class Identity:
     reply: str
     """The whole reply, unchanged."""
     origin: str = ""
-    """``"simulated"`` or ``"imported"`` if the instrument knows that its numbers are; otherwise empty."""
+    """``"simulated"`` or ``"imported"`` if the instrument reports such samples; otherwise empty."""
 
 
 class Knob(FrozenModel):
@@ -45,12 +45,12 @@ class FoundDevice:
     """A converter found by a search."""
 
     name: str
-    """For ``daq.device``."""
+    """Value for ``daq.device`` in the hardware configuration."""
     product: str
-    """For ``daq.product``."""
+    """Value for ``daq.product``."""
     serial: str
     inputs: tuple[str, ...]
-    """For ``daq.channels.physical``, the part after the slash."""
+    """Values for ``daq.channels.physical``: the part after the slash."""
     outputs: tuple[str, ...]
 
 
@@ -75,7 +75,7 @@ class Block:
     """Shape (channels, samples) [V] at the converter's input."""
     overloads: tuple[Overload, ...] = ()
     counts: Counts | None = None
-    """The converter's integers, if volts are these times `Digitizer.volts_per_count`: recorded unchanged.
+    """The converter's integers, recorded unchanged; times `Digitizer.volts_per_count` they are the volts.
     None if the converter gives only volts."""
 
 
@@ -99,7 +99,7 @@ class SensorFacts:
     name: str
     serial: str = ""
     delay_s: Annotated[float, Field(ge=0)] = 0.0
-    """Delay of its volts after the quantity [s]."""
+    """Delay of the output voltage behind the quantity [s]."""
     calibrated: date | None = None
 
 
@@ -117,7 +117,7 @@ class Spacing(StrEnum):
 
 @dataclass(frozen=True)
 class Sweep:
-    """A generator's own sweep, or the ideal sweep for the computer's steps."""
+    """A generator's own sweep, or the sweep that the computer approximates by frequency steps."""
 
     start_hz: float
     stop_hz: float
@@ -125,7 +125,7 @@ class Sweep:
     spacing: Spacing = Spacing.LINEAR
 
     def cycles(self, time_s: Time) -> Time:
-        """Return the cycles since its start, in closed form, at one or several times."""
+        """Return the number of cycles since the sweep began, at one or several times."""
         match self.spacing:
             case Spacing.LINEAR:
                 rate = (self.stop_hz - self.start_hz) / self.duration_s
@@ -138,10 +138,10 @@ class Sweep:
 
 @dataclass(frozen=True)
 class GeneratorDescription:
-    """Abilities of a model of generator, known before it is opened: plans are checked with them."""
+    """Capabilities of a generator model, known before it is opened; plans are checked against them."""
 
     name: str
-    """For sentences: ``"AFG1022"``."""
+    """Name in messages: ``"AFG1022"``."""
     amplitude_range_vpp: tuple[float, float]
     """Smallest and largest setting at the configured load, peak to peak [V]."""
     highest_sine_hz: float
@@ -200,7 +200,7 @@ class FunctionGenerator(Protocol):
         """Play continuously, without triggers."""
 
     def measured_latency_s(self) -> float:
-        """Return how long one verified change of amplitude takes: the shortest step, ramp and stop [s]."""
+        """Return the time of one verified change of amplitude [s]; no step, ramp or stop is shorter."""
 
     def start(self) -> None:
         """Turn the output on."""
@@ -243,9 +243,7 @@ class Digitizer(Protocol):
 
     @property
     def waiting_samples(self) -> int:
-        """Return the number of converted samples of every channel that are not read yet, which can be read at
-        once.
-        """
+        """Number of converted samples of every channel that can be read without waiting."""
 
     def stop(self) -> None:
         """End sampling. Legal at any time."""
@@ -262,7 +260,7 @@ class IdleOutput(StrEnum):
 
 
 class AnalogOutput(Protocol):
-    """An output that streams samples written ahead of their time, from the digitizer's start on."""
+    """An output that plays samples written in advance, beginning with the digitizer's start."""
 
     @property
     def identity(self) -> Identity:
@@ -274,14 +272,14 @@ class AnalogOutput(Protocol):
 
     @property
     def idle(self) -> IdleOutput:
-        """State of the output when it runs empty, or its program dies."""
+        """Voltage of the output when it has no more samples or the program has ended."""
 
     @property
     def ahead_samples(self) -> int:
-        """Largest number of samples ahead of the one being played."""
+        """Largest number of samples that can be written ahead of the one being played."""
 
     def write(self, volts: Samples) -> None:
-        """Add samples behind those still to be played; wait for room if there is none.
+        """Queue samples to be played; wait while the buffer is full.
 
         Raises
         ------
@@ -292,7 +290,7 @@ class AnalogOutput(Protocol):
         """
 
     def arm(self) -> None:
-        """Wait, with the first stretch written, for the digitizer's start: both then begin with sample 0."""
+        """Prepare to start with the digitizer, once the first samples are written; both begin at sample 0."""
 
     def stop(self) -> None:
         """Go to zero volts at once. Legal at any time; the next `write` begins a new stream."""
@@ -313,7 +311,7 @@ class RealTimeController(Protocol):
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:
-    """Read a block, and refuse an empty one: a caller that waits for more samples would wait for ever.
+    """Read a block; refuse an empty one, because a caller that waits for samples would wait forever.
 
     Raises InstrumentError when the block is empty, has other channels, flags an unknown one, or contains
     volts that are not finite; or the errors of `Digitizer.read`.
