@@ -11,9 +11,9 @@ from ..stopping.stop import MEMORY_RESERVE
 
 
 class Beside:
-    """Runs jobs in order in one thread, which is started before any drive.
+    """Thread that runs jobs in order; it is started before anything is driven.
 
-    CPython waits forever for a new thread that runs out of memory while it starts.
+    If memory runs out while a thread starts, CPython waits forever for that thread.
     """
 
     def __init__(self, name: str) -> None:
@@ -21,7 +21,7 @@ class Beside:
         self.is_busy = self._is_closing = False
         """Whether a job is running or queued."""
         self._changed = Condition()
-        with suppress(RuntimeError):  # the system gives no more threads: jobs are not done
+        with suppress(RuntimeError):  # without a free thread, jobs are not done
             Thread(target=self._run, name=name, daemon=True).start()
 
     def do(self, job: Callable[[], None]) -> None:
@@ -37,7 +37,7 @@ class Beside:
             self._changed.wait_for(lambda: not self.is_busy, longest_s)
 
     def close(self, longest_s: float) -> None:
-        """End the thread after the last queued job; wait for that at most ``longest_s``."""
+        """End the thread after the last queued job; wait at most ``longest_s``."""
         with self._changed:
             self._is_closing = True
             self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""Functions that expect a member of an enum also accept its value."""
+"""Conversion of a value to its enum member, so that functions accept either."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -28,6 +28,6 @@ def chosen(kind: type[Choice], given: Choice | str) -> Choice:
 
 @dataclass(frozen=True)
 class ChosenFrom:
-    """Mark a text field of a model, in its ``Annotated`` type, as one usually chosen from a list."""
+    """Mark for the ``Annotated`` type of a text field whose value is usually chosen from a list."""
 
     texts: Callable[[], Iterable[str]]

@@ -18,10 +18,10 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
 def need_extra(extra: str) -> None:
     """Require that the libraries of an extra can be imported; import none of them.
 
-    Raises MissingLibrary when one is not installed. ``extra`` is its word in `pyproject.toml`.
+    Raises MissingLibrary when one is not installed. ``extra`` is its name in `pyproject.toml`.
     """
     for library in EXTRAS[extra]:
-        # The parent first: finding a submodule of a missing module raises.
+        # The parent first, because find_spec of a submodule raises if the parent is missing.
         if find_spec(library.partition(".")[0]) is None or find_spec(library) is None:
             raise _missing(library, extra)
 
@@ -47,8 +47,8 @@ def need_space(megabytes: int, advice: str = "") -> None:
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
     """Wrap the ``__getattr__`` of a public API whose names need an extra: the error names the extra.
 
-    ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the word in `pyproject.toml`. What is
-    returned raises MissingLibrary when a library of the extra is not installed.
+    ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the name in `pyproject.toml`.
+    The wrapper raises MissingLibrary when a library of the extra is not installed.
     """
 
     def attribute(name: str) -> object:

@@ -3,11 +3,11 @@
 from unicodedata import category
 
 LONGEST_CLAUSE = 400
-"""Letters; a value in an error may be as long as its file."""
+"""Largest number of letters of a value in an error; without it, the error could be as long as a file."""
 
 
 def printable(text: str) -> str:
-    r"""Return one line in which characters that move the cursor, reorder text or are invisible are escaped.
+    r"""Escape characters that move the cursor, reorder text or are invisible; the result is one line.
 
     >>> print(printable("a\x1b[2J\nb"))
     a\x1b[2J\nb
@@ -31,7 +31,7 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
     >>> shortened("0123456789", 7)
     '01...89'
 
-    ``text`` has any length; ``longest`` is the number of letters that are kept, three dots among them.
+    ``longest`` is the largest number of letters of the result, with the dots.
     """
     if len(text) <= longest:
         return text

@@ -1,7 +1,7 @@
 """JSON Schemas of the TOML files that people write, for editors that complete keys.
 
-Draft 4, because taplo, the language server of most editors for TOML, supports no later one. A schema allows
-more than its model where defaults or a named specimen may supply values; never less.
+Draft 4, because taplo, the language server of most editors for TOML, supports no later one. A schema never
+allows less than its model. It allows more where defaults or a named specimen may supply values.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,7 +17,7 @@ from ..errors import ConfigurationError
 VERSION = 1
 """Version of all schemas; it changes when old files become invalid."""
 FORMAT = "format_version"
-"""Key for the version of a file; if absent, the present version."""
+"""Key of a file's version; a file without this key has the present version."""
 DRAFT = "http://json-schema.org/draft-04/schema#"
 _SPECIMEN = {"type": "string", "description": "Name or path of the specimen that this one starts from."}
 _RANGE = {
@@ -74,7 +74,7 @@ def _starts_from_another(part: Json) -> None:
 
 
 def _with_ranges(schema: Json) -> None:
-    """Allow ranges, numbers, and lists of both for frequencies, and a former key for the specimen."""
+    """Allow ranges and lists of numbers and ranges for frequencies, and a former key for the specimen."""
     _with_a_base(schema)
     several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
     schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}
@@ -100,7 +100,7 @@ SCHEMAS: Mapping[str, _Kind] = {
     "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
     "specimen": _Kind("vibench.sim", "SpecimenDescription", _starts_from_another),
 }
-"""Kinds of files by word. Models are loaded by name, because they are in higher packages."""
+"""Schemas by kind of file. Models are imported when needed, because they are in higher packages."""
 
 
 def json_schema(kind: str) -> Json:
@@ -166,6 +166,6 @@ def _older(part: Json) -> Json:
         part["anyOf"] = kept
         if part.get("default", ...) is None:
             del part["default"]
-    if "$ref" in part and len(part) > 1:  # draft 4 ignores other keys beside it
+    if "$ref" in part and len(part) > 1:  # draft 4 ignores other keys beside $ref
         part["allOf"] = [{"$ref": part.pop("$ref")}]
     return part

@@ -46,7 +46,7 @@ def all_shipped(folder: str) -> tuple[Path, ...]:
 def named(given: Path | str, folder: str) -> Path:
     """Return the path of a user's file, or of the shipped file with a bare name like ``"quick"``.
 
-    Raises ConfigurationError when a bare name is neither; it lists the existing names.
+    Raises ConfigurationError, with the names of the shipped files, when a bare name is neither.
 
     Parameters
     ----------

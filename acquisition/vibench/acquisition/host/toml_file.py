@@ -1,6 +1,4 @@
-"""TOML files: read and validated, or refused with file, key and allowed values; written so that they read
-back.
-"""
+"""Reading, validation and writing of TOML files; errors name file, key and allowed values."""
 
 import json
 import reprlib
@@ -50,11 +48,11 @@ def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
 
 
 MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""By name of a model and version of a file: the conversion of its content to the next version."""
+"""Conversion of a file's content to the next version, by name of the model and version of the file."""
 
 
 def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
-    """Convert the content of a file with a version to the present one.
+    """Convert the content of a file to the present version.
 
     Raises ConfigurationError when a later vibench wrote it, or the value is not a version.
     """
@@ -95,14 +93,14 @@ Place = tuple[str | int, ...]
 
 
 def complaints(error: ValidationError, content: object, within: Place = ()) -> str:
-    """Return a clause for each fault that a model found; keys with the same fault share one.
+    """Return one clause for each fault; all missing keys share one, and all unknown keys.
 
     Parameters
     ----------
     error
         Error of the model.
     content
-        Content of the file, which distinguishes its keys from pydantic's names of types.
+        Content of the file, needed to distinguish its keys from pydantic's names of types.
     within
         Path to report; faults elsewhere are left out.
     """
@@ -121,10 +119,10 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
 
 
 def _faults(error: ValidationError, content: object) -> list[Any]:
-    """Return each fault once: for a key of several types, only those of the most probable type.
+    """Return each fault once; if a key allows several types, only the faults of the most probable type.
 
-    A value derived from a key with a fault is not reported, nor is a list that is too short without an item
-    with a fault.
+    Consequences of another fault are left out: a value derived from a faulty key, and a list that is too
+    short only because an item is faulty.
     """
     errors = error.errors()
     meant: dict[Place, dict[Place, list[Any]]] = {}
@@ -142,7 +140,7 @@ def _faults(error: ValidationError, content: object) -> list[Any]:
 
 
 def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
-    """Return the faults of the type whose keys are nearest to the file's."""
+    """Return the faults of the type that fits the file's value best."""
     if len(kinds) == 1:
         return (each for each, _ in kinds[0])
     return (by_keys for _, by_keys in max(kinds, key=_nearness))
@@ -151,8 +149,8 @@ def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
 def _of_the_file(fault: Any, content: object) -> list[bool]:
     """Return which parts of a fault's path are keys of the file; the others are types.
 
-    pydantic adds a type after a key with several: ``frequency_hz``, ``Range``, ``step``. A user's key may
-    have the same name.
+    pydantic adds the type after a key of several types: ``frequency_hz``, ``Range``, ``step``. A key of the
+    file may have the name of a type.
     """
     place, found = fault["loc"], []
     for number, part in enumerate(place):
@@ -169,9 +167,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Return how near a value is to a type: a fault inside it, or in its size, is nearer than a wrong
-    type.
-    """
+    """Rate how well a value fits a type: faults inside it, or in its size, are better than a wrong type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 
@@ -206,7 +202,7 @@ def _complaint(detail: Any) -> str:
 
 def _shown(value: object) -> str:
     longest = 60
-    # Written as a whole, a list of a million numbers would take too long.
+    # The whole text of a list of a million numbers would take too long.
     match value:
         case list() | tuple() | dict():
             text = reprlib.repr(value)
@@ -280,7 +276,7 @@ def _is_nested(value: Value) -> bool:
 def _value(value: Value) -> str:
     match value:
         case str():
-            # JSON's escapes are TOML's, except for DEL, which only TOML requires to be escaped.
+            # JSON's escapes are valid in TOML, which also requires DEL to be escaped.
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case bool():
             return "true" if value else "false"
