@@ -1,4 +1,4 @@
-"""A configuration from a template and answers, with proposals from the connected instruments."""
+"""A configuration from a template and answers to questions, and the first tests of the bench."""
 
 import errno
 import json
@@ -46,7 +46,7 @@ class Question:
     """One value of the configuration."""
 
     key: str
-    """``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
+    """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
     text: str
     found: Found | None = None
 
@@ -91,11 +91,11 @@ QUESTIONS = (
     Question("vibrometer.calibrated", "The date of its calibration (YYYY-MM-DD)?"),
     Question("specimen.gap_m", "Gap of the specimen [m], by feeler gauge?"),
 )
-"""In the order in which they are asked."""
+"""Questions in the order in which they are asked."""
 
 
 def questions_for(text: str) -> tuple[Question, ...]:
-    """Return the questions that have a place in a template, those of other sensors before the last."""
+    """Return the questions that apply to a template; those on further sensors come before the last."""
     roles = tomllib.loads(text).get("sensors", {})
     others = [
         Question(key, words.format(role.replace("_", " ")))
@@ -129,7 +129,7 @@ def value_in(text: str, key: str) -> str:
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
     """Replace a value of the template by an answer, with a note on its source.
 
-    Raises ConfigurationError when the answer has another type than the value (a word for a number, no date),
+    Raises ConfigurationError when the answer has another type than the value (text for a number or date),
     or the template has no such table.
     """
     found = _place(text, key)
@@ -154,7 +154,7 @@ def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
 
 
 def _guess_type(answer: str) -> str:
-    """Write an answer without a value in the template: as a number if possible, otherwise as text."""
+    """Write an answer as a TOML number if possible, otherwise as text."""
     try:
         return _as_toml(answer)
     except ValueError:
@@ -162,7 +162,7 @@ def _guess_type(answer: str) -> str:
 
 
 def _as_toml(number: str) -> str:
-    """Write a number in TOML, which allows no .5 and no 010; raises ValueError if it is not a number."""
+    """Write a number in TOML, which does not allow .5 and 010; raises ValueError if it is not a number."""
     value = float(number)
     try:
         tomllib.loads(f"number = {number}")
@@ -178,7 +178,7 @@ def _place(text: str, key: str) -> re.Match[str] | None:
 
 
 def _table(text: str, key: str) -> tuple[int, int, str]:
-    """Find the table of a key in the text, and the key's name there."""
+    """Return begin and end of a key's table in the text, and the key's name in that table."""
     if key.startswith(_CHANNEL):
         role, _, name = key.removeprefix(_CHANNEL).partition(".")
         begins = [found.start() for found in re.finditer(r"^\[\[daq\.channels\]\]$", text, re.MULTILINE)]
@@ -236,7 +236,7 @@ Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer: nobody can be asked again."""
+    """Raise the error of an answer, because nobody can be asked again."""
     raise error
 
 
@@ -268,7 +268,7 @@ def configure(
 
     Without ``questions``, those that have a place in the template are asked. Comments of ``template`` say
     CONFIRM for unchecked values. ``note``, with name and time, is added to each answer. ``refuse`` receives
-    the error of an answer, or of all together; when it returns, they are asked again.
+    the error of one answer or of all together; if it returns, the questions are asked again.
 
     Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
     """
@@ -278,7 +278,7 @@ def configure(
         raise ConfigurationError(
             f"{target.absolute().parent} is not a folder; make it, or give another place"
         )
-    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is the template's
+    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is relative to the template
     questions = questions_for(text) if questions is None else questions
     for question in questions:
         if len(choices := found_choices(question, seen)) == 1:
@@ -299,7 +299,7 @@ def configure(
 def _valid_answer(
     text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
 ) -> str:
-    """Ask until the answer has its type and is within its bounds; answers are compared at the end."""
+    """Ask until the answer has the right type and is within its bounds; all are checked together later."""
     while answer := ask(question, choices, _default_answer(text, question.key)):
         try:
             _require_text(answer, question.key)
@@ -375,7 +375,7 @@ def _driver_of(resource: str) -> str | None:
     ids = int(found.group(1), 0), int(found.group(2), 0)
     for name in plug_in_names(PlugInKind.GENERATOR):
         config = GeneratorConfig(driver=name, resource=resource, connected_ohm=1e6, amplitude_limit_vpp=1.0)
-        with suppress(AcquisitionError):  # a broken package gives no driver
+        with suppress(AcquisitionError):  # skip drivers of broken packages
             if ids in generator_driver(config).describe(config).usb_ids:
                 return name
     return None
@@ -388,7 +388,7 @@ _FROM = {
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, beside the shaker",
 }
 Confirmed = Callable[[str], str]
-"""Asks for the wiring of two ends; the answer is written on the page, and an empty one ends the procedure."""
+"""Asks whether a wire connects two ends. The page shows the answer; an empty one ends the procedure."""
 
 
 @dataclass(frozen=True)
@@ -398,18 +398,18 @@ class DayPage:
     text: str
     """Markdown."""
     verdict: Verdict
-    """The worst verdict."""
+    """Worst verdict of the checks."""
 
 
 def first_day(
     bench: Bench, config: Path, operator: str, confirmed: Confirmed, switch: StopSwitch | None = None
 ) -> DayPage:
-    """Go through wires, noise floor, a first 5 mV and the bench check, which is kept as any other.
+    """Confirm wires, measure the noise floor, play a first 5 mV, and make and store a bench check.
 
-    The check at its usual level plays only when nothing at 5 mV forbids it. The end is silence.
+    The check at its usual level is played only without a FAIL at 5 mV. At the end the bench is silent.
 
-    Raises CheckFailed when a pair of wires is not confirmed; nothing has played then, and InstrumentError
-    when an instrument fails.
+    Raises CheckFailed when a wire is not confirmed; nothing has been played then. Raises InstrumentError when
+    an instrument fails.
     """
     folder = config.absolute().parent
     again = f"begin again with --from {in_a_command(config)} and the name of a new configuration"
