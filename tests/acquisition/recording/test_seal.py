@@ -70,6 +70,20 @@ def test_a_recording_is_sealed_at_its_end(recorded):
         assert len(recording.seal) == 64
 
 
+@pytest.mark.parametrize("events", [1, 400])
+@pytest.mark.parametrize("column", ["text", "sample", "unix_time_s"])
+def test_the_quick_check_finds_a_change_in_a_table_of_any_length(tmp_path, make_header, events, column):
+    path = tmp_path / "a.h5"
+    with create_recording(path, make_header()) as writer:
+        for number in range(events):
+            writer.log("mark", f"{number}: {'knocked ' * 25}")
+    with h5py.File(path, "r+") as file:
+        values = file["events"][column][()]
+        values[-1] = b"nobody knocked" if column == "text" else values[-1] + 1
+        file["events"][column][...] = values
+    assert state_of(path, "quick") is state_of(path) is SealState.DAMAGED
+
+
 def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
     path = recorded()
     with open_recording(path) as recording:

@@ -42,7 +42,7 @@ PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 LARGEST_TABLE_BYTES = 500_000_000
 """Largest array of several dimensions [bytes]; such arrays (of results) are read at once."""
 QUICK_BYTES = 65_536
-"""Largest dataset that a quick check reads: texts and tables, but not the samples of a long recording."""
+"""Most samples of a channel that a quick check reads [bytes]; it reads all texts and tables."""
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Environment variable with the path of the key's file, for every command and program."""
 SHORTEST_KEY = 16
@@ -58,7 +58,7 @@ class SealDepth(StrEnum):
     """How much of a recording is checked against its seal."""
 
     QUICK = "quick"
-    """All attributes, texts and tables; no samples."""
+    """All attributes, texts and tables; no samples, except of very short recordings."""
     WHOLE = "whole"
 
 
@@ -271,12 +271,17 @@ def _differing(
             yield f"{path} is missing"
         elif checksums["attributes"] != _checksum_of_header(item):
             yield f"attributes, type or length of {path}"
-        elif isinstance(item, h5py.Group) or (depth is SealDepth.QUICK and item.nbytes > QUICK_BYTES):
+        elif isinstance(item, h5py.Group) or (depth is SealDepth.QUICK and _is_long_signal(path, item)):
             continue
         elif checksums["data"] != _data_or_nothing(
             item, [] if states is None else states.setdefault(path, [])
         ):
             yield f"data of {path}"
+
+
+def _is_long_signal(path: str, item: h5py.Dataset) -> bool:
+    """Return whether a dataset holds many samples, or their overview; all tables are in other groups."""
+    return path.split("/")[1:-1] in ([], [layout.OVERVIEW]) and item.nbytes > QUICK_BYTES
 
 
 def _checksum_of_header(item: h5py.HLObject) -> str:
