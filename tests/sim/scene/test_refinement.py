@@ -74,6 +74,17 @@ def test_a_mean_over_starts_reaches_one_percent():
     assert again.response_ii == found.response_ii
 
 
+def test_the_error_of_a_mean_over_starts_contains_that_of_the_runs():
+    """The motion hardly depends on the start: its starts scatter by less than the tolerance of a run."""
+    specimen = gong2025(8.1e-6, 5.965e-6, "power:3")
+    drive = Harmonic(125.89780847473365, 2.120822403280049e-05)
+    found = solve_scene(Scene(specimen, drive, target=Target(error=1e-4, time_s=10.0)))
+    assert found.memory is StartMemory.LOST
+    duration = FixedDuration(found.duration_s, found.window_s)
+    truth = solve_scene(Scene(specimen, drive, accuracy=Accuracy.REFERENCE, duration=duration, budget_s=0.0))
+    assert np.all(off(found, truth) <= 1.0)
+
+
 def test_answers_improve_until_the_time_is_over():
     answers = list(refine_scene(asked(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
     reports = [each.target for each in answers]

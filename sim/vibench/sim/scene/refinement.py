@@ -45,7 +45,7 @@ from .scene import PAPER_DURATION_S, Observable, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
 from .shares import student_quantile
 from .solve import Question, in_closed_form
-from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, with_errors
+from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
 LONGEST_S = 60.0
 """Default time limit of refinement [s]."""
@@ -172,6 +172,8 @@ class _Refinement:
         self._orbits: list[_Orbit] = []
         """All periodic motions found."""
         self._size_m = self._spent_s = 0.0
+        self._run_error = math.nan
+        """Relative error of each start's responses by the tolerance of its run; NaN until it is measured."""
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
@@ -491,7 +493,10 @@ class _Refinement:
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)
         ends_s = begins_s + windows * window_s
-        found = self._prediction(mean, error_of(starts), ends_s, window_s, starts[0].impacts)
+        if math.isnan(self._run_error):
+            self._run_error = SAFETY * float(np.nan_to_num(error_per_period(starts[0].run, Accuracy.QUICK)))
+        errors = error_of(starts) + self._run_error
+        found = self._prediction(mean, errors, ends_s, window_s, starts[0].impacts)
         first = starts[0].repeats if others_of(starts) == 0 else None
         is_periodic = first is not None and first.distance < self._pace.sharpness.tolerance
         each_observed = f"observed from {begins_s:.4g} to {ends_s:.4g} s"
