@@ -28,7 +28,7 @@ def examples(
     elif copy is None:
         for folder, paths in found.items():
             console.print(f"{folder}: {', '.join(names_of(paths))}")
-        console.print("vibench measure quick --out DIR takes a name; --copy DIR gives files to change")
+        console.print("Use one by name: vibench measure quick --out DIR. Copy it to change it: --copy DIR")
     else:
         console.print(f"copied {sum(map(len, found.values()))} files to {copy}")
 

@@ -422,10 +422,8 @@ def modal_fit(
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
         top_hz = np.array([natural_hz])
-        for reach_hz in (
-            2 * half_hz,
-            4 * half_hz / _FINE_POINTS,
-        ):  # then between the neighbours of the highest
+        # The second time only between the neighbours of the highest point.
+        for reach_hz in (2 * half_hz, 4 * half_hz / _FINE_POINTS):
             fine_hz = np.clip(np.linspace(top_hz[0] - reach_hz, top_hz[0] + reach_hz, _FINE_POINTS), *ends_hz)
             top_hz = fine_hz[[int(np.argmax(np.abs(curve(fine_hz, poles) @ found)))]]
         value = curve(top_hz, poles) @ found

@@ -187,7 +187,7 @@ class EnsembleCurve(Labelled):
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = left * self._sd**2
-            # Sum of squares without the draw itself; a part below 1e-9 is rounding error.
+            # Sum of squares without this draw; less than 1e-9 of the whole is rounding error.
             others = np.maximum(squares - away**2 * self.count / left, 1e-9 * squares)
             found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
         return np.where(left >= FEWEST_DRAWS, found, np.nan)
