@@ -93,7 +93,7 @@ def test_folds_hold_the_statistics_checks_and_settings(page, campaign):
         "impacts per second", "median difference", "independent averages", "Estimator",
         "coherence", "Where the masses collide in a sweep", "Dwells: responses over the last seconds",
         "noise bias of I",
-        "Dwells: lines and terminal bands", "Channels", "sensitivity", "Versions that made the recordings",
+        "Dwells: lines of the displacement", "Channels", "sensitivity", "Versions that made the recordings",
         "half cosine", "samples/s", "crest factor", "of its range", "Phase portraits", "Orders of a sweep",
     )  # fmt: skip
     assert [each for each in facts if each not in page.text] == []

@@ -31,7 +31,7 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
     >>> shortened("0123456789", 7)
     '01...89'
 
-    ``longest`` is the largest number of letters of the result, with the dots.
+    ``text`` has any length; ``longest`` is the most letters of the result, the dots included.
     """
     if len(text) <= longest:
         return text

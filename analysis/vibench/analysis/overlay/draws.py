@@ -298,7 +298,7 @@ def drawn(
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
             if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
-                # Whoever requests more draws than the default wants narrower bands, so all are made.
+                # More draws than the default were requested for narrower bands, so all are made.
                 len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
             ):
                 break
