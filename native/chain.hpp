@@ -47,7 +47,7 @@ struct CellMotion {
   double at[2 * NUMBERS];         // P, AT_X, AT_Z, and their rates
   Contact<double> contact;
   double power_step, size;
-  double moments[WINDOW_MOMENTS];        // M_k of the force so far; its `end` is that of `cross`
+  double moments[WINDOW_MOMENTS];        // M_k of the force so far; they end where `cross` ends
 };
 
 // Pointers to a run's arrays in the caller's memory, which is zeroed first.

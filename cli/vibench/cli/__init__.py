@@ -1,4 +1,4 @@
-"""The `vibench` command: one short module per command, without calculations of its own.
+"""The `vibench` command: one short module per command, which calculates nothing itself.
 
 A table in `__main__` names each command's module and function. A command is imported when it is called, so
 the list of commands loads neither numpy nor Qt. The number of BLAS threads is set before numpy is loaded.

@@ -68,7 +68,7 @@ class FeedbackChannels:
     ) -> complex:
         """Return the displacement of m0 over that of the base; zero if the base does not move.
 
-        For another ``harmonic`` of m0 (also 1/2 or 1/3), the amplitude is that of the harmonic over that of
+        For another ``harmonic`` of m0 (also 1/2 or 1/3), its amplitude is divided by the amplitude of
         the base's fundamental, and ``harmonic`` times the base's phase is subtracted from its phase.
         """
         if not np.any(base):

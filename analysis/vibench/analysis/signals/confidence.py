@@ -36,7 +36,7 @@ def standard_uncertainty(values: Reals | Complexes) -> float:
     """Return the standard uncertainty of the mean of a few values; twice that covers 95 % of cases.
 
     It is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008, G.3.2). For
-    complex values it is that of the real or of the imaginary part.
+    complex values it holds for the real and for the imaginary part, each alone.
     """
     count, parts = values.size, 2 if np.iscomplexobj(values) else 1
     error = float(np.std(values, ddof=1)) / np.sqrt(parts * count)

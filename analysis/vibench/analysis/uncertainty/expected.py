@@ -337,7 +337,7 @@ def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
 def _densities(rig: Rig, frequency_hz: Reals) -> tuple[Reals, float] | None:
     """Noise of m0's velocity [(m/s)^2/Hz] and of the base's acceleration [(m/s2)^2/Hz], one-sided.
 
-    None if not stated. The noise of an integrated acceleration is that of its sensor over omega.
+    None if not stated. An accelerometer on m0 has the noise of its sensor divided by omega.
     """
     response = rig.response or Role.M0_VELOCITY
     of_m0, of_base = _density(rig, response), _density(rig, Role.BASE_ACCELERATION)
