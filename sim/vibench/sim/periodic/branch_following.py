@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -25,23 +25,6 @@ from .branch import (
 from .continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
 
 
-class DrivePath(Protocol):
-    """A curve in the plane of drive frequency and amplitude."""
-
-    @property
-    def parameter(self) -> Parameter:
-        """Parameter along the path."""
-        ...
-
-    def drive(self, value: float) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [m] at a value of the parameter."""
-        ...
-
-    def slopes(self, value: float) -> tuple[float, float]:
-        """Return the derivatives of both by the parameter."""
-        ...
-
-
 @dataclass(frozen=True)
 class FrequencyPath:
     """Path along frequency, with a constant amplitude or a recorded level."""
@@ -50,6 +33,7 @@ class FrequencyPath:
     """One amplitude for every frequency, or a single constant one."""
     frequencies_hz: tuple[float, ...] = ()
     """Ascending; the amplitude is a monotone cubic between and constant outside."""
+    parameter: ClassVar = Parameter.FREQUENCY
 
     def __post_init__(self) -> None:
         given = max(1, len(self.frequencies_hz))
@@ -61,11 +45,6 @@ class FrequencyPath:
             )
         for amplitude in self.amplitudes_m:
             _refuse_unless_positive("amplitude", amplitude, "m")
-
-    @property
-    def parameter(self) -> Parameter:
-        """Parameter of the path: the frequency."""
-        return Parameter.FREQUENCY
 
     def drive(self, value: float) -> tuple[float, float]:
         """Frequency [Hz] and amplitude [m]."""
@@ -92,14 +71,10 @@ class AmplitudePath:
     """Path along the amplitude, at one frequency."""
 
     frequency_hz: float
+    parameter: ClassVar = Parameter.AMPLITUDE
 
     def __post_init__(self) -> None:
         _refuse_unless_positive("frequency", self.frequency_hz, "Hz")
-
-    @property
-    def parameter(self) -> Parameter:
-        """Parameter of the path: the amplitude."""
-        return Parameter.AMPLITUDE
 
     def drive(self, value: float) -> tuple[float, float]:
         """Frequency [Hz] and amplitude [m]."""
@@ -110,11 +85,8 @@ class AmplitudePath:
         return 0.0, 1.0
 
 
-def path_from(parameter: Parameter, frequency_hz: float, amplitude_m: float) -> DrivePath:
-    """Return the path along one parameter with the other constant."""
-    if parameter is Parameter.FREQUENCY:
-        return FrequencyPath((amplitude_m,))
-    return AmplitudePath(frequency_hz)
+DrivePath = FrequencyPath | AmplitudePath
+"""A curve in the plane of drive frequency and amplitude."""
 
 
 def _refuse_unless_positive(name: str, value: float, unit: str) -> None:
@@ -175,16 +147,6 @@ class _Gathered:
 
 RANGE_LENGTH = 10.0
 """Length of the parameter's range; the gap or the spring's length scale has length 1."""
-
-
-def branch_range(
-    parameter: Parameter, frequency_hz: float, amplitude_m: float, stop: float
-) -> tuple[float, float]:
-    """Return the parameter at the start of a branch to ``stop``, and the unit of length [Hz, m]."""
-    value = {Parameter.FREQUENCY: frequency_hz, Parameter.AMPLITUDE: amplitude_m}[parameter]
-    if not 0.0 < stop < math.inf or stop == value:
-        raise ValueError(f"A branch from {value} to {stop} is not allowed: positive, and two different ends.")
-    return value, abs(stop - value) / RANGE_LENGTH
 
 
 def parameter_value(path: DrivePath, drive: Harmonic) -> float:

@@ -8,8 +8,8 @@ where the tangent's last component changes sign. Unknowns and parameter should b
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
@@ -72,7 +72,7 @@ class ArcPoint:
     """Length of the curve from its start."""
     is_fold: bool = False
     """The parameter turns here; added between two steps."""
-    end: ArcEnd | None = field(default=None)
+    end: ArcEnd | None = None
     """Reason why this point is the last; None on all others."""
 
 
@@ -160,7 +160,7 @@ def trace(
     step, slow, leapt_at = steps.first, 0, -math.inf
     for _ in range(steps.most_points):
         if time.monotonic() > steps.until_s:
-            yield _arc_end(here, ArcEnd.OUT_OF_TIME)
+            yield replace(here, end=ArcEnd.OUT_OF_TIME)
             return
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
@@ -170,10 +170,10 @@ def trace(
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap(curve, here, steps)
             if ahead is None:
-                yield _arc_end(here, ArcEnd.STEP_TOO_SHORT)
+                yield replace(here, end=ArcEnd.STEP_TOO_SHORT)
                 return
             if ahead.tangent[-1] * here.tangent[-1] < 0.0:
-                yield ArcPoint(here.point, here.tangent, here.arc, is_fold=True)
+                yield replace(here, is_fold=True)
             step = steps.first
             yield ahead
             here = ahead
@@ -187,11 +187,11 @@ def trace(
             return
         if _passes(curve, first, here, ahead, steps):
             arc = here.arc + float(np.linalg.norm(first.point - here.point))
-            yield ArcPoint(first.point, first.tangent, arc, end=ArcEnd.CLOSED)
+            yield replace(first, arc=arc, end=ArcEnd.CLOSED)
             return
         yield ahead
         here = ahead
-    yield _arc_end(here, ArcEnd.TOO_MANY_POINTS)
+    yield replace(here, end=ArcEnd.TOO_MANY_POINTS)
 
 
 def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
@@ -260,20 +260,12 @@ def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSte
     """Locate a change of sign of the tangent's parameter component, as `locate` does."""
     if before.tangent[-1] * after.tangent[-1] >= 0.0:
         return None
-
-    def parameter_slope(point: ArcPoint) -> float:
-        return float(point.tangent[-1])
-
-    found = locate(curve, before, after, parameter_slope, steps.tolerance)
-    return None if found is None else ArcPoint(found.point, found.tangent, found.arc, is_fold=True)
+    found = locate(curve, before, after, lambda point: float(point.tangent[-1]), steps.tolerance)
+    return None if found is None else replace(found, is_fold=True)
 
 
-class Measure(Protocol):
-    """A test function that changes sign at an event."""
-
-    def __call__(self, point: ArcPoint, /) -> float:
-        """Evaluate at a point on the curve."""
-        ...
+Measure = Callable[[ArcPoint], float]
+"""A test function of a point on the curve, which changes sign at an event."""
 
 
 def locate(
@@ -334,10 +326,6 @@ def _at_bound(
     across[-1] = 1.0
     point, iterations = correct(curve, guess, across, steps.tolerance)
     if iterations == 0:
-        return _arc_end(before, ArcEnd.STEP_TOO_SHORT)
+        return replace(before, end=ArcEnd.STEP_TOO_SHORT)
     arc = before.arc + float(np.linalg.norm(point - before.point))
     return ArcPoint(point, tangent_at(curve, point, before.tangent), arc, end=ArcEnd.REACHED_BOUND)
-
-
-def _arc_end(here: ArcPoint, why: ArcEnd) -> ArcPoint:
-    return ArcPoint(here.point, here.tangent, here.arc, here.is_fold, why)

@@ -11,14 +11,15 @@ from ..specimen.state import Table, Vector
 from ..specimen.stops import chosen
 from .branch import Branch, Parameter, ParameterWord
 from .branch_following import (
+    RANGE_LENGTH,
+    AmplitudePath,
     DrivePath,
     Family,
+    FrequencyPath,
     OrbitReport,
-    branch_range,
     follow,
     follow_both_ways,
     parameter_value,
-    path_from,
     range_scale,
 )
 from .continuation import ArcSteps
@@ -110,12 +111,16 @@ def periodic_branch(
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.
     """
     parameter = chosen(Parameter, parameter)
-    path = path_from(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m)
-    value, scale = branch_range(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m, stop)
+    drive = orbit.drive
+    is_frequency = parameter is Parameter.FREQUENCY
+    path = FrequencyPath((drive.amplitude_m,)) if is_frequency else AmplitudePath(drive.frequency_hz)
+    value = parameter_value(path, drive)
+    if not 0.0 < stop < math.inf or stop == value:
+        raise ValueError(f"A branch from {value} to {stop} is not allowed: positive, and two different ends.")
+    scale = abs(stop - value) / RANGE_LENGTH
     family, start = _family_at(orbit, path, value, scale)
     here, there = value / scale, stop / scale
-    bounds = (min(here, there), max(here, there))
-    return follow(family, start, there - here, bounds, steps)
+    return follow(family, start, there - here, (min(here, there), max(here, there)), steps)
 
 
 def periodic_branch_within(
