@@ -23,6 +23,7 @@ from .periodic.branch import (
     BifurcationKind as BifurcationKind,
     Branch as Branch,
     BranchEvent as BranchEvent,
+    OrbitShape as OrbitShape,
     Parameter as Parameter,
 )
 from .periodic.branch_following import (
@@ -52,7 +53,6 @@ from .periodic.restoring_force import (
     spring_of as spring_of,
 )
 from .periodic.shooting import (
-    OrbitShape as OrbitShape,
     PeriodicOrbit as PeriodicOrbit,
     PhaseReference as PhaseReference,
     ShootingEnd as ShootingEnd,

@@ -18,7 +18,8 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
-from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
+from vibench.sim.periodic.branch import OrbitShape
+from vibench.sim.periodic.shooting import PeriodMap
 from vibench.sim.specimen.specimen import state_scales
 
 pytestmark = pytest.mark.timeout(300)

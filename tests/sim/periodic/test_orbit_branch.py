@@ -11,10 +11,9 @@ from vibench.sim import (
     periodic_branch,
     periodic_orbit,
 )
-from vibench.sim.periodic.branch import BifurcationKind, Parameter
+from vibench.sim.periodic.branch import BifurcationKind, OrbitShape, Parameter
 from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic.orbit_branch import periodic_branch_within
-from vibench.sim.periodic.shooting import OrbitShape
 from vibench.sim.specimen.specimen import state_scales
 
 SPECIMEN = gong2025(damping_time_s=3e-5)

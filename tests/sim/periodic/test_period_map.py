@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, base_transmissibility, gong2025, integrate
-from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
+from vibench.sim.periodic.branch import OrbitShape
+from vibench.sim.periodic.shooting import PeriodMap
 from vibench.sim.specimen.specimen import state_scales
 
 DRIVE = Harmonic(130.0, 20e-6)

@@ -6,7 +6,8 @@ import pytest
 from benchmarks.stroboscopic_section import stroboscopic_section
 from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate, periodic_orbit
 from vibench.sim.motion.poincare import smallest_period
-from vibench.sim.periodic.shooting import OrbitShape, PeriodMap, ShootingEnd
+from vibench.sim.periodic.branch import OrbitShape
+from vibench.sim.periodic.shooting import PeriodMap, ShootingEnd
 from vibench.sim.specimen.specimen import state_scales
 
 SPECIMEN = gong2025(damping_time_s=3e-5)

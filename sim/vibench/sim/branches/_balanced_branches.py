@@ -12,11 +12,11 @@ from ..periodic.balance_branch import (
     first_order_guesses,
     orbit_guess,
 )
+from ..periodic.branch import OrbitShape
 from ..periodic.branch_following import DrivePath
 from ..periodic.continuation import ArcSteps
 from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet, structure_of
 from ..periodic.restoring_force import PowerSpring, spring_of
-from ..periodic.shooting import OrbitShape
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Specimen
 from ._motion_search import MotionSearch, periodic_motions

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..motion.integrate import integrate
 from ..motion.poincare import smallest_period
-from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
+from ..periodic.branch import OrbitShape
+from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.modes import base_transmissibility

@@ -10,11 +10,11 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent
+from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent, OrbitShape
 from ..periodic.branch_following import DrivePath, parameter_value
 from ..periodic.continuation import ArcEnd, ArcSteps
 from ..periodic.orbit_branch import periodic_branch_within
-from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
+from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats, Vector

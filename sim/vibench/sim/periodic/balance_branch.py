@@ -8,7 +8,7 @@ import numpy as np
 from ..specimen.drive import Harmonic
 from ..specimen.state import Complex, Table, Vector, Y, Z
 from ..specimen.stops import chosen
-from .branch import Branch, OrbitSigns, Symmetry
+from .branch import Branch, OrbitShape, OrbitSigns
 from .branch_following import DrivePath, OrbitReport, follow_both_ways, parameter_value, range_scale
 from .continuation import ArcSteps
 from .first_order_balance import first_order_states
@@ -231,8 +231,8 @@ def orbit_signs(
     contacts = len(crossings(spring, motion, 2.0 * math.pi)) // 2
     if kept is HarmonicSet.ODD:
         half = -transition(structure, spring, motion, math.pi)
-        return OrbitSigns(multipliers(half), contacts, Symmetry.MIRRORED)
-    return OrbitSigns(multipliers(transition(structure, spring, motion)), contacts, Symmetry.NONE)
+        return OrbitSigns(multipliers(half), contacts, OrbitShape.MIRRORED)
+    return OrbitSigns(multipliers(transition(structure, spring, motion)), contacts, OrbitShape.REPEATED)
 
 
 def balance_branch_within(

@@ -126,11 +126,16 @@ COMPLEX_PART = 1e-6
 """A pair with a smaller imaginary part is a real pair of product one: no Neimark-Sacker point."""
 
 
-class Symmetry(StrEnum):
-    """Whether the multipliers are those of the half-period map of a self-mirrored motion."""
+class OrbitShape(StrEnum):
+    """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    NONE = "none"
+    """Mirrored after half an odd number of drive periods; needs equal stops."""
+    REPEATED = "repeated"
+    """Repeated after a whole number of drive periods."""
+
+
+OrbitShapeWord = Literal["mirrored", "repeated"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +146,7 @@ class OrbitSigns:
     """Multipliers of the half map if mirrored, else of the period; shape (2 n,)."""
     contacts: int
     """Crossings of the stops in a period."""
-    symmetry: Symmetry
+    shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
     """Distance from a simpler motion that the branch may join, shape (6,); empty for none."""
     joins: BifurcationKind | None = None
@@ -152,7 +157,7 @@ class OrbitSigns:
     @property
     def over_period(self) -> Complex:
         """Floquet multipliers over the whole period, largest first."""
-        return self.multipliers**2 if self.symmetry is Symmetry.MIRRORED else self.multipliers
+        return self.multipliers**2 if self.shape is OrbitShape.MIRRORED else self.multipliers
 
     @property
     def flip(self) -> float:
@@ -181,7 +186,7 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
     if before.contacts != after.contacts:
         found.append(BifurcationKind.GRAZING)
     if before.flip * after.flip < 0.0:
-        is_mirrored = before.symmetry is Symmetry.MIRRORED
+        is_mirrored = before.shape is OrbitShape.MIRRORED
         found.append(BifurcationKind.SYMMETRY_BREAKING if is_mirrored else BifurcationKind.PERIOD_DOUBLING)
     if before.torus * after.torus < 0.0 and (before.has_pair_on_circle or after.has_pair_on_circle):
         found.append(BifurcationKind.NEIMARK_SACKER)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,25 +31,41 @@ ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, m
 
 
 @dataclass(frozen=True, eq=False)
-class OrbitFamily:
-    """Fixed points of the period map; the last component is the parameter over its scale."""
+class ExactFamily:
+    """Fixed points of the period map."""
 
     mapping: PeriodMap
-    path: DrivePath
     reference: Harmonic
     """Drive from which the scales of states follow."""
-    scale: float
-    """Parameter per unit of length [Hz, or m]."""
-
-    @property
-    def tolerance(self) -> float:
-        """No limit: the flow is exact."""
-        return math.inf
+    tolerance: ClassVar = math.inf
+    """No limit: the flow is exact."""
 
     @property
     def scales(self) -> Vector:
         """Scales of a state, shape (6,)."""
         return state_scales(self.mapping.specimen, self.reference)
+
+    def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
+        """Return the closure error over a period, its derivative by the state, and a ratio of scales.
+
+        The map scales velocities by the drive, a family by its reference: multiply slopes by the ratio.
+        """
+        ratio = state_scales(self.mapping.specimen, drive) / self.scales
+        derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
+        return (self.mapping.image(state, drive) - state) / self.scales, derivative - np.eye(6), ratio
+
+    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
+        """Return None: there is no finer resolution."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitFamily(ExactFamily):
+    """Fixed points along a path; the last component of a point is the parameter over its scale."""
+
+    path: DrivePath
+    scale: float
+    """Parameter per unit of length [Hz, or m]."""
 
     def drive_at(self, point: Vector) -> Harmonic:
         """Return the drive at a point."""
@@ -62,13 +79,10 @@ class OrbitFamily:
         """Return the closure error over a period, and its derivatives by state and parameter."""
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
-        drive, state, own = self.drive_at(point), self.state_at(point), self.scales
-        # The map scales velocities by the drive at the point, this family by its reference drive.
-        ratio = state_scales(self.mapping.specimen, drive) / own
-        gone = (self.mapping.image(state, drive) - state) / own
-        derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
+        drive, state = self.drive_at(point), self.state_at(point)
+        gone, by_state, ratio = self.closure(state, drive)
         along = ratio * self._slope(state, drive, float(point[-1]) * self.scale) * self.scale
-        return gone, np.column_stack([derivative - np.eye(6), along])
+        return gone, np.column_stack([by_state, along])
 
     def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
         """Return d image / d parameter, over the scales of the drive [1/Hz or 1/m]."""
@@ -94,10 +108,6 @@ class OrbitFamily:
             signs=orbit.signs,
             left_out=orbit.error,
         )
-
-    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
-        """Return None: there is no finer resolution."""
-        return None
 
 
 def periodic_branch(
@@ -153,5 +163,5 @@ def _family_at(
 ) -> tuple[OrbitFamily, Vector]:
     if orbit.outcome is not ShootingEnd.CONVERGED:
         raise ValueError(f"A branch cannot start at {orbit.drive}: {orbit.outcome}.")
-    family = OrbitFamily(orbit.period_map, path, orbit.drive, scale)
+    family = OrbitFamily(orbit.period_map, orbit.drive, path, scale)
     return family, np.append(orbit.state / family.scales, value / scale)

@@ -15,15 +15,15 @@ import scipy
 
 from ..specimen.drive import Harmonic
 from ..specimen.modes import base_transmissibility
-from ..specimen.specimen import Specimen, state_scales
+from ..specimen.specimen import Specimen
 from ..specimen.state import Table, Vector
 from ..specimen.stops import chosen
-from .branch import Branch
-from .branch_following import AmplitudePath, DrivePath, Family, OrbitReport, follow
+from .branch import Branch, OrbitShape
+from .branch_following import AmplitudePath, DrivePath, OrbitReport, follow
 from .continuation import ArcSteps, correct
 from .harmonic_balance import phasors_of
-from .orbit_branch import OrbitFamily
-from .shooting import OrbitShape, PeriodMap, PhaseReference, PhaseReferenceWord
+from .orbit_branch import ExactFamily, OrbitFamily
+from .shooting import PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
@@ -42,12 +42,12 @@ SCAN_POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class PhaseResonanceFamily:
-    """Motions with a given phase; the last two components are the logarithms of frequency and amplitude."""
+class PhaseResonanceFamily(ExactFamily):
+    """Motions with a given phase; the last two components are the logarithms of frequency and amplitude.
 
-    mapping: PeriodMap
-    reference: Harmonic
-    """Drive from which the scales of states, frequencies and amplitudes follow."""
+    They refer to the drive from which the scales of states follow.
+    """
+
     phase_rad: float
     of: PhaseReference
 
@@ -55,16 +55,6 @@ class PhaseResonanceFamily:
     def path(self) -> DrivePath:
         """Path along amplitude; the frequency follows from the phase."""
         return AmplitudePath(self.reference.frequency_hz)
-
-    @property
-    def tolerance(self) -> float:
-        """No limit: the flow is exact."""
-        return math.inf
-
-    @property
-    def scales(self) -> Vector:
-        """Scales of a state, shape (6,)."""
-        return state_scales(self.mapping.specimen, self.reference)
 
     def amplitude_m(self, point: Vector) -> float:
         """Drive amplitude at a point [m]."""
@@ -79,12 +69,10 @@ class PhaseResonanceFamily:
         """Return the closure error over a period, the phase error, and their derivatives, shape (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
-        drive, state, own = self.drive_at(point), point[:6] * self.scales, self.scales
-        ratio = state_scales(self.mapping.specimen, drive) / own
-        gone = (self.mapping.image(state, drive) - state) / own
+        drive, state = self.drive_at(point), point[:6] * self.scales
+        gone, by_state, ratio = self.closure(state, drive)
         if not bool(np.all(np.isfinite(gone))):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
-        by_state = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :] - np.eye(6)
         by_frequency = FREQUENCY_SHARE * ratio * self.mapping.frequency_slope(state, drive)
         by_level = math.log(10.0) / LENGTH_PER_DECADE * ratio * self.mapping.amplitude_slope(state, drive)
         off, slopes = self._off(point), np.empty(8)
@@ -104,12 +92,8 @@ class PhaseResonanceFamily:
     def report(self, point: Vector) -> OrbitReport:
         """Responses, multipliers and contacts."""
         drive = self.drive_at(point)
-        family = OrbitFamily(self.mapping, AmplitudePath(drive.frequency_hz), drive, drive.amplitude_m)
+        family = OrbitFamily(self.mapping, drive, AmplitudePath(drive.frequency_hz), drive.amplitude_m)
         return family.report(np.append(point[:6] * self.scales / family.scales, 1.0))
-
-    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
-        """Return None: there is no finer resolution."""
-        return None
 
 
 def phase_resonance_branch(

@@ -5,6 +5,7 @@ periods (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, sectio
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal
@@ -24,7 +25,7 @@ from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Complex, Floats, Table, Vector, Y, Z
 from ..specimen.stops import chosen
-from .branch import NEUTRAL, BifurcationKind, OrbitSigns, Symmetry
+from .branch import NEUTRAL, BifurcationKind, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
 from .harmonic_balance import phasors_of, size_of
 
@@ -41,18 +42,6 @@ DIFFERENCE = 1e-5
 """Step of a difference, relative to the parameter."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Fourth-order central difference."""
-
-
-class OrbitShape(StrEnum):
-    """Symmetry of a periodic motion."""
-
-    MIRRORED = "mirrored"
-    """Mirrored after half an odd number of drive periods; needs equal stops."""
-    REPEATED = "repeated"
-    """Repeated after a whole number of drive periods."""
-
-
-OrbitShapeWord = Literal["mirrored", "repeated"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,21 +101,15 @@ class PeriodMap:
 
     def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
         """Return d image / d ln frequency, over the scales, shape (6,)."""
-        scales = state_scales(self.specimen, drive)
-        drives = [
-            replace(drive, frequency_hz=drive.frequency_hz * (1.0 + offset * DIFFERENCE))
-            for offset in OFFSETS
-        ]
-        images = [self.image(state, each) for each in drives]
-        return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
+        return self._slope(state, drive, lambda part: replace(drive, frequency_hz=part * drive.frequency_hz))
 
     def amplitude_slope(self, state: Vector, drive: Harmonic) -> Vector:
         """Return d image / d ln amplitude, over the scales, shape (6,)."""
-        scales = state_scales(self.specimen, drive)
-        factors = [1.0 + offset * DIFFERENCE for offset in OFFSETS]
-        drives = [replace(drive, amplitude_m=drive.amplitude_m * factor) for factor in factors]
-        images = [self.image(state, each) for each in drives]
-        return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
+        return self._slope(state, drive, lambda part: replace(drive, amplitude_m=part * drive.amplitude_m))
+
+    def _slope(self, state: Vector, drive: Harmonic, scaled: Callable[[float], Harmonic]) -> Vector:
+        images = [self.image(state, scaled(1.0 + offset * DIFFERENCE)) for offset in OFFSETS]
+        return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * state_scales(self.specimen, drive)))
 
     def _may_start(self, state: Vector) -> bool:
         """Return whether a start is possible; a diverging iteration may go beyond a rigid stop."""
@@ -328,7 +311,7 @@ def _signs(
     return OrbitSigns(
         multipliers(derivative),
         run.impacts.count,
-        Symmetry.MIRRORED if mapping.shape is OrbitShape.MIRRORED else Symmetry.NONE,
+        mapping.shape,
         apart,
         joins,
         _grazing_distance(mapping.specimen, drive, run),
