@@ -16,7 +16,7 @@ from vibench.sim.periodic.branch import BifurcationKind
 from vibench.sim.periodic.branch_following import AmplitudePath, FrequencyPath
 from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet, LinearStructure
-from vibench.sim.periodic.restoring_force import GapSpring, NoForce
+from vibench.sim.periodic.restoring_force import LINEAR, GapSpring
 
 ONE = np.array([[1.0]])
 ENOUGH, STEPS = BalanceOptions(), ArcSteps()
@@ -86,8 +86,8 @@ def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_
 
 def test_a_linear_branch_has_no_events_and_reaches_its_end():
     structure = structure_of(gong2025(contact="linear"))
-    start = balance(structure, NoForce(), 50.0, 1e-6, BalanceOptions(fewest=1))
-    branch = along_frequency(structure, NoForce(), start, 80.0, BalanceOptions(fewest=1))
+    start = balance(structure, LINEAR, 50.0, 1e-6, BalanceOptions(fewest=1))
+    branch = along_frequency(structure, LINEAR, start, 80.0, BalanceOptions(fewest=1))
     assert branch.end is ArcEnd.REACHED_BOUND
     assert branch.events == ()
     assert branch.frequencies_hz[[0, -1]] == pytest.approx([50.0, 80.0])
@@ -106,7 +106,7 @@ def test_raising_the_drive_finds_the_stops_at_the_amplitude_at_which_p_equals_th
     structure, spring = structure_of(specimen), spring_of(specimen)
     options, steps = BalanceOptions(fewest=15, most=15), ArcSteps(most_points=230)
     branch = raised(structure, spring, 100.0, 0.5e-6, 5e-6, options, steps)
-    linear = balance(structure, NoForce(), 100.0, 1e-6)
+    linear = balance(structure, LINEAR, 100.0, 1e-6)
     assert branch.events[0].kind is BifurcationKind.GRAZING
     assert branch.events[0].amplitude_m == pytest.approx(45e-6 / linear.response_ii[3], rel=1e-6)
     # Near a resonance a stop stiffens the motion away from it: the branch turns back at once.

@@ -9,7 +9,7 @@ from vibench.sim import Accuracy, Harmonic, PowerSpring, gong2025, integrate, sp
 from vibench.sim.periodic.balance_branch import BalanceOptions, Guess, balance
 from vibench.sim.periodic.floquet import Motion, crossings, multipliers, transition
 from vibench.sim.periodic.harmonic_balance import LinearStructure, phasors_of
-from vibench.sim.periodic.restoring_force import GapSpring, NoForce
+from vibench.sim.periodic.restoring_force import LINEAR, GapSpring
 
 ONE = np.array([[1.0]])
 
@@ -22,7 +22,7 @@ def test_without_a_spring_the_multipliers_match_the_modes():
     specimen = gong2025()
     structure = structure_of(specimen)
     motion = Motion(130.0, np.array([1]), np.array([1e-6 + 0j]))
-    found = multipliers(transition(structure, NoForce(), motion))
+    found = multipliers(transition(structure, LINEAR, motion))
     system = np.block(
         [
             [np.zeros((3, 3)), np.eye(3)],

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -13,37 +12,6 @@ from ..specimen.specimen import Specimen
 from ..specimen.state import Floats
 
 
-class RestoringForce(Protocol):
-    """F(p, dp/dt), added to the linear spring between the masses."""
-
-    @property
-    def length(self) -> float:
-        """Return the length scale of the force [m]: a gap, or the fit displacement of a power law."""
-        ...
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """Values of p where a derivative of the force jumps, ascending [m]."""
-        ...
-
-    @property
-    def is_odd(self) -> bool:
-        """Whether F(-p, -v) = -F(p, v)."""
-        ...
-
-    def force(self, p: Floats, rate: Floats) -> Floats:
-        """F [N]."""
-        ...
-
-    def stiffness(self, p: Floats, rate: Floats) -> Floats:
-        """dF/dp [N/m]."""
-        ...
-
-    def damping(self, p: Floats, rate: Floats) -> Floats:
-        """dF/d(dp/dt) [N s/m]."""
-        ...
-
-
 @dataclass(frozen=True)
 class PowerSpring:
     """A sum of odd powers, F = sum F_i (p / length)^n_i; this form has no overflowing coefficients."""
@@ -51,7 +19,7 @@ class PowerSpring:
     length: float
     """Displacement at which the terms have the given forces [m]."""
     terms: tuple[tuple[int, float], ...]
-    """(n_i, F_i [N]) with n_i odd."""
+    """(n_i, F_i [N]) with n_i odd; none for no force."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.length < math.inf:
@@ -66,12 +34,12 @@ class PowerSpring:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """No kinks: a power law is smooth."""
+        """Values of p where a derivative of the force jumps [m]: none, because a power law is smooth."""
         return ()
 
     @property
     def is_odd(self) -> bool:
-        """True, because all powers are odd."""
+        """Whether F(-p, -v) = -F(p, v): True, because all powers are odd."""
         return True
 
     def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
@@ -125,7 +93,7 @@ class GapSpring:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Positions of the stops [m]."""
+        """Values of p where a derivative of the force jumps, ascending [m]: the stops."""
         return tuple(stop for stop in (-self.lower, self.upper) if math.isfinite(stop))
 
     @property
@@ -157,34 +125,10 @@ class GapSpring:
         return np.sign(p), np.maximum(depth, 0.0)
 
 
-@dataclass(frozen=True)
-class NoForce:
-    """No nonlinear spring: the linear structure."""
-
-    length: float = 1.0
-    """Arbitrary length scale."""
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """No kinks."""
-        return ()
-
-    @property
-    def is_odd(self) -> bool:
-        """True, because zero is an odd function."""
-        return True
-
-    def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
-        """Zero."""
-        return np.zeros_like(p)
-
-    def stiffness(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
-        """Zero."""
-        return np.zeros_like(p)
-
-    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
-        """Zero."""
-        return np.zeros_like(p)
+RestoringForce = PowerSpring | GapSpring
+"""F(p, dp/dt), added to the linear spring between the masses."""
+LINEAR = PowerSpring(1.0, ())
+"""No force, with an arbitrary length scale."""
 
 
 def spring_of(specimen: Specimen) -> RestoringForce:
@@ -197,7 +141,7 @@ def spring_of(specimen: Specimen) -> RestoringForce:
         case PowerLaw(reference=reference, terms=terms):
             return PowerSpring(reference, terms)
         case NoContact():
-            return NoForce()
+            return LINEAR
         case RigidStops():
             raise ValueError(
                 "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
