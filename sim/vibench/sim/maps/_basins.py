@@ -156,7 +156,9 @@ def kick_stability(
 
 def _kick_scenes(results: MapResults, point: int, size: float, kicks: int, seed: int) -> list[Scene]:
     scene = results.plan.scene(results.plan.grid.place(point))
-    scene = replace(scene, drive=replace(scene.drive, phase_rad=results.phase_after(point)))
+    scene = replace(
+        scene, drive=replace(scene.drive, phase_rad=results.plan.phase_after(point, results.arrays))
+    )
     state: Floats = results.arrays["final_state"][point].astype(np.float64)
     rng = np.random.default_rng([seed, point])
     drawn = state + size * state_scales(scene.specimen, scene.drive) * rng.standard_normal((kicks, 6))

@@ -2,21 +2,18 @@
 
 import math
 import os
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.batch import batches_pay
-from ..scene.cost import expected_cost_s, longest_cost_s, pilot_cost_s
-from ..scene.prediction import MotionKind
+from ..scene.cost import longest_cost_s, pilot_cost_s
+from ..scene.prediction import MotionKind, state_of
 from ..scene.refinement import LONGEST_S
 from ..scene.scene import Given, Scene
 from ..scene.solve import InBatches, Question, Solved, settle_scene, solve_scene
 from ..specimen.outcome import Outcome
-from ..specimen.state import Floats
 from ..study import (
     NUMBERS,
     Arrays,
@@ -24,13 +21,9 @@ from ..study import (
     Grid,
     InvalidStudy,
     PointAnswer,
+    Points,
     PointState,
     Solver,
-    continued_point,
-    end_phase,
-    failed_point,
-    planned_times,
-    predecessors,
 )
 from ._map import OF_SPECIMEN, START, Map, contact_energy_j, labels_of, section_cells
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
@@ -40,9 +33,6 @@ JUMP = 0.1
 BASIN_JUMP = 2e-3
 """The same if only the start varies: responses of one motion then differ only by remaining transients."""
 NOTHING = -1
-NOBODY = -1
-
-
 BUNDLE_S = 0.3
 """Worker time of a bundle of scenes [s], enough for full SIMD batches."""
 
@@ -61,8 +51,8 @@ def map_solver(plan: Map) -> Solver:
     )
 
 
-class MapPoints:
-    """Scenes of a map, created on demand."""
+class MapPoints(Points):
+    """The points of a map."""
 
     bundle_s = BUNDLE_S
 
@@ -74,24 +64,9 @@ class MapPoints:
                 f"random_starts = {plan.random_starts} would be the same states at every {of_start[-1]}, "
                 "which varies the start; leave them out, or give ranges of drive or specimen alone."
             )
+        super().__init__(plan.grid, plan.chain, map_solver(plan))
         self.plan = plan
-        self.grid: Grid = plan.grid
         self._kept = {column.name for column in plan.columns}
-
-    @cached_property
-    def after(self) -> NDArray[np.int64]:
-        """Return the point that each point continues, or NOBODY, shape (points,)."""
-        return predecessors(self.grid, self.plan.chain)
-
-    @cached_property
-    def planned_s(self) -> Floats:
-        """Return the planned time of each point, shape (points,)."""
-        return planned_times(self.grid, lambda number: self._cost_s(number, expected_cost_s))
-
-    @cached_property
-    def longest_s(self) -> Floats:
-        """Return the planned time of each point if its motion never repeats, shape (points,)."""
-        return planned_times(self.grid, lambda number: self._cost_s(number, longest_cost_s))
 
     @property
     def wanted_first(self) -> NDArray[np.int64]:
@@ -106,18 +81,16 @@ class MapPoints:
             return np.arange(self.grid.size)
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
 
-    def scene(self, number: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point whose predecessor, if any, is done."""
-        before = continued_point(int(self.after[number]), arrays)
+    def unchained(self, number: int) -> Scene:
+        """Return the scene of a point that does not continue another."""
+        return self.plan.scene(self.grid.place(number))
+
+    def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
+        """Return the scene of a point that continues another."""
         place = self.grid.place(number)
-        if before == NOBODY:
-            return self.plan.scene(place)
-        x, y, z, vx, vy, vz = (float(value) for value in arrays["final_state"][before])
-        frequency_hz = self.plan.frequency_at(self.grid.place(before))
-        phase_rad = end_phase(frequency_hz, before, arrays)
-        return self.plan.scene(
-            place, Given((x, y, z, vx, vy, vz), self.plan.start_labels[place[-2]]), phase_rad
-        )
+        state = state_of(arrays["final_state"][before].astype(np.float64))
+        start = Given(state, self.plan.start_labels[place[-2]])
+        return self.plan.scene(place, start, self.plan.phase_after(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
         """Return the stored results of a prediction."""
@@ -131,7 +104,7 @@ class MapPoints:
             "outcome": int(found.outcome),
             "final_state": found.final_state,
             "drive_phase": scene.drive.phase_rad,
-            "continues": continued_point(int(self.after[number]), arrays),
+            "continues": self.predecessor(number, arrays),
             "taken": solved.taken_s,
             **section_cells(found),
         }
@@ -143,16 +116,6 @@ class MapPoints:
         return PointAnswer(
             number, PointState.STOPPED, {**cells, "message": found.outcome.text.encode()}, solved.taken_s
         )
-
-    def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Return the stored results of a failed scene."""
-        return failed_point(number, error)
-
-    def _cost_s(self, number: int, cost_s: Callable[[Scene, Solver], float]) -> float:
-        try:
-            return cost_s(self.plan.scene(self.grid.place(number)), map_solver(self.plan))
-        except ValueError:
-            return 0.0
 
 
 def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
@@ -285,9 +248,9 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
     first, count = points.wanted_first, plan.grid.size
     if plan.target is None:
         work_s, first_s = float(points.planned_s.sum()), float(points.planned_s[first].sum())
-        longest_s = float(points.longest_s.sum())
+        longest_s = float(points.times_s(longest_cost_s).sum())
     else:
-        each_s = pilot_cost_s(lambda number: plan.scene(plan.grid.place(number)), count)
+        each_s = pilot_cost_s(points.unchained, count)
         work_s, first_s = count * each_s, len(first) * each_s
         longest_s = count * (LONGEST_S if plan.target.time_s is None else plan.target.time_s)
     return MapEstimate(

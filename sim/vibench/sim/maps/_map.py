@@ -426,7 +426,7 @@ class Map(GridPlan):
         )
 
     def frequency_at(self, place: tuple[int, ...]) -> float:
-        """Drive frequency at a place of the grid."""
+        """Drive frequency at a place of the grid [Hz]."""
         return float(self._numbers(place)["frequency_hz"])
 
     def _start(

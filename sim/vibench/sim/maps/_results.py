@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..scene.prediction import MotionKind
 from ..scene.shares import UNSURE, Count, Share, shares_of, wilson_share
 from ..specimen.state import Floats
-from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
+from ..study import GridResults, PointState, read_arrays, read_plan, read_sessions
 from ._expansion import BASIN_JUMP, cell_codes, refinement_of
 from ._map import Map, labels_of, without_impacts
 from ._refinement import RefinementPlan
@@ -115,11 +115,6 @@ class MapResults(GridResults[Map]):
     """Results of a map. Axes in the order of ``plan.axes``."""
 
     @property
-    def is_complete(self) -> bool:
-        """Return whether every point is computed or filled in."""
-        return bool(np.all(self.state != PointState.MISSING))
-
-    @property
     def computed(self) -> int:
         """Return the number of computed points."""
         return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
@@ -190,11 +185,6 @@ class MapResults(GridResults[Map]):
         """Return the first computed point with the motion of this number."""
         is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
         return int(np.flatnonzero(is_it)[0])
-
-    def phase_after(self, point: int) -> float:
-        """Return the drive phase at the end of a computed point [rad], to continue from its final state."""
-        frequency_hz = self.plan.frequency_at(self.plan.grid.place(point))
-        return end_phase(frequency_hz, point, dict(self.arrays))
 
     @cached_property
     def _labels(self) -> NDArray[np.int64]:

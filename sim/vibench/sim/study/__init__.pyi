@@ -19,6 +19,7 @@ from ._grid import (
     StudyAxis as StudyAxis,
 )
 from ._queue import (
+    Points as Points,
     StudyEnd as StudyEnd,
     run_points as run_points,
 )
@@ -36,13 +37,8 @@ from ._software import (
 )
 from ._solve import (
     ExistingStudy as ExistingStudy,
-    continued_point as continued_point,
-    end_phase as end_phase,
     executor_of as executor_of,
-    failed_point as failed_point,
-    planned_times as planned_times,
     planned_work_s as planned_work_s,
-    predecessors as predecessors,
     run_study as run_study,
     solve_study as solve_study,
     store_of as store_of,

@@ -5,10 +5,13 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..scene.prediction import Method, MotionKind, StartMemory
 from ..specimen.frozen_model import FrozenModel
@@ -292,6 +295,16 @@ class GridPlan(FrozenModel, ABC):
         return Grid(
             tuple(len(axis.values) for axis in self.axes), tuple(axis.is_ordered for axis in self.axes)
         )
+
+    @abstractmethod
+    def frequency_at(self, place: tuple[int, ...]) -> float:
+        """Drive frequency at a place of the grid [Hz]."""
+
+    def phase_after(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> float:
+        """Return the drive phase at the end of a computed point [rad], to continue from its final state."""
+        frequency_hz = self.frequency_at(self.grid.place(number))
+        turns = math.fmod(frequency_hz * float(arrays[DURATION][number]), 1.0)
+        return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][number]), 2.0 * math.pi)
 
     def coordinates(self, number: int) -> dict[str, float | str]:
         """Return the values of the axes at a point."""

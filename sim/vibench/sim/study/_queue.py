@@ -3,20 +3,23 @@
 import heapq
 import math
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import StrEnum
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Cancelled, Observer, Progress
+from ..scene.cost import expected_cost_s
 from ..scene.scene import Scene
-from ..scene.solve import Solved
+from ..scene.solve import Solved, Solver
 from ..specimen.state import Floats
 from ._executor import Bundle, Executor, Reply
-from ._grid import TAKEN, Grid, PointState
-from ._store import Arrays, PointAnswer, Store, is_failed, states
+from ._grid import FINAL_STATE, MESSAGE, TAKEN, Grid, PointState
+from ._store import Arrays, PointAnswer, Store, cut_text, is_failed, states
+from ._study import Start
 
 # A point may be computed when its predecessor is done; ready points are started longest first.
 #
@@ -205,35 +208,89 @@ class StudyEnd(StrEnum):
     CANCELLED = "cancelled"
 
 
-class Points(Protocol):
-    """The points of a plan as scenes, and which of them are to be computed."""
+PLANNED = 2000
+"""Most points that are planned individually; in a larger plan, every n-th point represents those up to the
+next."""
+
+
+class Points(ABC):
+    """The points of a plan as scenes, created on demand, and which of them are to be computed."""
 
     bundle_s: float
     """Largest worker time of a bundle."""
 
-    @property
-    def grid(self) -> Grid:
-        """Grid of all points."""
+    def __init__(self, grid: Grid, starts: Sequence[object], solver: Solver) -> None:
+        self.grid, self._starts, self._solver = grid, starts, solver
 
-    @property
+    @cached_property
     def after(self) -> NDArray[np.int64]:
         """Point that each point continues, or NOBODY, shape (points,)."""
+        blocks = np.full(self.grid.shape, NOBODY)
+        numbers = np.arange(self.grid.size).reshape(self.grid.shape)
+        for index, start in enumerate(self._starts):
+            match start:
+                case Start.UP:
+                    blocks[..., index, 1:] = numbers[..., index, :-1]
+                case Start.DOWN:
+                    blocks[..., index, :-1] = numbers[..., index, 1:]
+                case _:
+                    pass
+        return blocks.reshape(-1)
 
-    @property
+    @cached_property
     def planned_s(self) -> Floats:
         """Planned time of each point, shape (points,)."""
+        return self.times_s(expected_cost_s)
 
-    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points to compute, given the results so far; called again when all have an answer."""
+    def times_s(self, cost_s: Callable[[Scene, Solver], float]) -> Floats:
+        """Return the time of each point by a function, shape (points,); 0 for scenes that are not allowed."""
+
+        def time_s(number: int) -> float:
+            try:
+                return cost_s(self.unchained(number), self._solver)
+            except ValueError:
+                return 0.0
+
+        every = max(1, math.ceil(self.grid.size / PLANNED))
+        some = [time_s(number) for number in range(0, self.grid.size, every)]
+        return np.repeat(some, every)[: self.grid.size]
+
+    def predecessor(self, number: int, arrays: Arrays) -> int:
+        """Return the point that a point continues; NOBODY if there is none with a finite final state."""
+        before = int(self.after[number])
+        if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
+            return NOBODY
+        return before
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point whose predecessor, if any, is done; ValueError if not allowed."""
+        """Return the scene of a point whose predecessor, if any, is done.
 
-    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the values of a prediction that the file stores."""
+        If the predecessor has no finite final state, the point starts as without it. Raises ValueError when
+        a scene of these numbers is not allowed.
+        """
+        before = self.predecessor(number, arrays)
+        return self.unchained(number) if before == NOBODY else self.continued(number, before, arrays)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
         """Return the values that the file stores for a failed scene."""
+        message = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(message)})
+
+    @abstractmethod
+    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+        """Return the points to compute, given the results so far; called again when all have an answer."""
+
+    @abstractmethod
+    def unchained(self, number: int) -> Scene:
+        """Return the scene of a point that does not continue another."""
+
+    @abstractmethod
+    def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
+        """Return the scene of a point that continues another."""
+
+    @abstractmethod
+    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+        """Return the values of a prediction that the file stores."""
 
 
 def run_points(

@@ -266,6 +266,10 @@ class Study(GridPlan):
             target=self.target,
         )
 
+    def frequency_at(self, place: tuple[int, ...]) -> float:
+        """Drive frequency at a place of the grid [Hz]."""
+        return self.frequencies_hz[place[-1]]
+
     @property
     def target(self) -> Target | None:
         """Return the target of each point; None without an error and a time."""
