@@ -13,7 +13,7 @@ from vibench.acquisition.rig import Rig
 
 from ..background.background import Background
 from ..engine_link.bridge import Bridge, Starter
-from ..widgets.notice import Notice
+from ..widgets.notice import Notice, NoticeKind, notice_of
 from ..widgets.theme import LIGHT, THEMES, Theme
 from ..widgets.units import CHOICES, UNITS
 
@@ -219,3 +219,11 @@ class AppContext(QObject):
     def say(self, notice: Notice) -> None:
         """Show a message on the strip."""
         self.noticed.emit(notice)
+
+    def warn(self, what: str, done: str = "", next_step: str = "", details: str = "") -> None:
+        """Show a warning with the parts of a `Notice`."""
+        self.say(Notice(NoticeKind.WARNING, what, done, next_step, details=details))
+
+    def fail(self, error: BaseException) -> None:
+        """Show an error."""
+        self.say(notice_of(error))

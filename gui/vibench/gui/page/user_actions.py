@@ -10,7 +10,7 @@ from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
 from vibench.acquisition.plan import Campaign, Measurement
 
-from ..widgets.notice import RUN, Notice, NoticeKind
+from ..widgets.notice import RUN
 from .app_context import AppContext
 
 OPERATOR_STOP = "stopped by the operator, in the window"
@@ -31,11 +31,18 @@ class UserActions(QObject):
             return
         self._context.bridge.order(EngineClient.check, self._context.folder, new_reference=new_reference)
 
-    def arm_test(self) -> None:
-        """Arm the test of the Test page, under an unused name."""
+    def complete_test(self) -> Measurement | None:
+        """Return the test of the Test page; without a complete one, give a message and None."""
         measurement = self._context.selection.measurement
         if measurement is None:
-            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
+            next_step = "Correct what is marked on the Test page (Ctrl+2)."
+            self._context.warn("The test is not complete.", next_step=next_step)
+        return measurement
+
+    def arm_test(self) -> None:
+        """Arm the test of the Test page, under an unused name."""
+        measurement = self.complete_test()
+        if measurement is None:
             return
         folder = self._context.folder
         named = measurement.model_copy(update={"name": free_name(folder, measurement)})
@@ -49,7 +56,7 @@ class UserActions(QObject):
         """Arm the campaign of the Queue page, in a folder with its name."""
         campaign = self._context.selection.campaign
         if campaign is None:
-            self._warn("There is no campaign.", "Open or create one on the Queue page.")
+            self._context.warn("There is no campaign.", next_step="Open or create one on the Queue page.")
             return
         folder = self._context.folder / campaign.name
         self._arm(campaign, folder, existing=existing, attendance=attendance)
@@ -72,9 +79,9 @@ class UserActions(QObject):
         if self._context.is_armed_read():
             self._context.bridge.order(EngineClient.start)
         else:
-            self._warn(
+            self._context.warn(
                 "Cannot start: the description of the test has not been shown to its end.",
-                "Read it on the Run page (Ctrl+3); PgDn scrolls.",
+                next_step="Read it on the Run page (Ctrl+3); PgDn scrolls.",
             )
             self._context.page_requested.emit(RUN)
 
@@ -98,15 +105,14 @@ class UserActions(QObject):
         """Return whether an order is possible now; if not, warn before the engine refuses it as an error."""
         bridge = self._context.bridge
         if bridge.is_ordering:
-            self._warn(f"Cannot {verb} yet: {_BUSY}.", "Try again when the state above has changed.")
+            self._context.warn(
+                f"Cannot {verb} yet: {_BUSY}.", next_step="Try again when the state above has changed."
+            )
         elif bridge.state not in states:
-            self._warn(f"Cannot {verb}: {_STANDS[bridge.state]}.", _NEXT[bridge.state])
+            self._context.warn(f"Cannot {verb}: {_STANDS[bridge.state]}.", next_step=_NEXT[bridge.state])
         else:
             return True
         return False
-
-    def _warn(self, what: str, next_step: str) -> None:
-        self._context.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
 
 
 _BUSY = "the last order is still being carried out"

@@ -32,7 +32,6 @@ from ..forms.model_form import ValidatedForm
 from ..page.app_context import AppContext, SettingKey
 from ..page.user_actions import UserActions
 from ..widgets.boxes import fill_box, push_button
-from ..widgets.notice import notice_of
 from ..widgets.theme import DARK, LIGHT, THEMES, Theme
 from ..widgets.units import UNITS
 
@@ -179,13 +178,10 @@ def show_about(parent: QWidget, context: AppContext) -> Reader:
         reader.browser.selectAll()
         reader.browser.copy()
 
-    def failed(error: BaseException) -> None:
-        context.say(notice_of(error))
-
     reader.buttons.addButton(
         push_button("&Copy", "Copy all of it", copy), QDialogButtonBox.ButtonRole.ActionRole
     )
-    job = context.background.ask(installation_text, reader.browser.setPlainText, failed)
+    job = context.background.ask(installation_text, reader.browser.setPlainText, context.fail)
     reader.finished.connect(lambda _result: job.drop())
     reader.show()
     return reader

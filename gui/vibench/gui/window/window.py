@@ -48,7 +48,6 @@ from ..widgets.notice import (
     TEST,
     Notice,
     NoticeKind,
-    notice_of,
 )
 from ..widgets.theme import Theme, palette, style_sheet
 from .banner import NEXT_STEPS, Banner, MessageStrip, StatusField, StatusLine, indicator_of, status_fields
@@ -221,9 +220,7 @@ class Window(QMainWindow):
 
     def look_for_left_campaign(self) -> None:
         """Take over the engine of a campaign that another window left, if there is one."""
-        self.context.background.ask(
-            left_alone, self._take_over, lambda error: self.context.say(notice_of(error))
-        )
+        self.context.background.ask(left_alone, self._take_over, self.context.fail)
 
     def _take_over(self, left: Announcement | None) -> None:
         if left is not None:
@@ -363,7 +360,7 @@ class Window(QMainWindow):
         try:
             kind = file_kind(path)
         except ConfigurationError as error:
-            self.context.say(notice_of(error))
+            self.context.fail(error)
             return
         name, act = next((name, page.opens[kind]) for name, page in self.pages.items() if kind in page.opens)
         self.show_page(name)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Matrix, Specimen, Triple
+from ..specimen.stops import STRICT
 
 MASSES_PER_CELL = 3
 """m0, m1, m2: a cell's displacements x, y, z."""
@@ -25,7 +25,7 @@ MOST_CELLS = 1000
 class Chain:
     """Cells from the driven base to the free end; they may differ in all parameters."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     cells: tuple[Specimen, ...]
     """Cell 0 is coupled to the base through its (k0, c0), cell i to cell i - 1."""
@@ -34,14 +34,11 @@ class Chain:
         if not 1 <= len(self.cells) <= MOST_CELLS:
             raise ValueError(f"A chain of {len(self.cells)} cells is not allowed: give 1 to {MOST_CELLS}.")
         for place, cell in enumerate(self.cells, start=1):
-            match cell.contact:
-                case RigidStops():
-                    raise ValueError(
-                        f"Cell {place} has rigid stops, which a chain cannot follow: take stops that yield, "
-                        "such as hunt_crossley:0.5."
-                    )
-                case _:
-                    pass
+            if cell.contact.stops.restitution is not None:
+                raise ValueError(
+                    f"Cell {place} has rigid stops, which a chain cannot follow: take stops that yield, "
+                    "such as hunt_crossley:0.5."
+                )
 
     @property
     def size(self) -> int:

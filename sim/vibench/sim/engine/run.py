@@ -17,6 +17,7 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Specimen, gong2025
 from ..specimen.state import Y, Z
+from ..specimen.stops import require_positive
 from .library import Engine, EngineError, Structure, Tables, library_path
 from .scene import fill_power, fill_specimen, scene_of
 
@@ -327,8 +328,7 @@ def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Table
 
     Raises ValueError when the engine refuses the interval or the specimen.
     """
-    if not 0.0 < interval_s < math.inf:
-        raise ValueError(f"Interval {interval_s} s is not allowed: it must be positive and finite.")
+    require_positive("Interval", interval_s, "s")
     scene = engine.new("CubicScene", interval=interval_s)
     fill_specimen(scene["specimen"], specimen)
     scene["fastest"] = np.max(np.abs(np.linalg.eigvals(state_matrix(specimen)[0])))

@@ -24,6 +24,7 @@ from ..specimen.modes import modal_form
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen, energy_metric
 from ..specimen.state import Floats, Table
+from ..specimen.stops import require_positive
 
 # Standard error of the mean of a correlated series, from sufficiently long blocks.
 #
@@ -139,8 +140,7 @@ def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = No
     If a drive period is longer than twice that time, the interval is ``about_s``.
     """
     about = CYCLES / float(specimen.natural_frequencies_hz[0]) if about_s is None else about_s
-    if not 0.0 < about < math.inf:
-        raise ValueError(f"Interval {about} s is not allowed: it must be positive and finite.")
+    require_positive("Interval", about, "s")
     periods = max(1, round(about * drive.frequency_hz))
     if periods > 2.0 * about * drive.frequency_hz:
         return Interval(about, 0)

@@ -11,7 +11,7 @@ from ..specimen.drive import WHOLE, Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen
 from ..specimen.state import Floats
-from ..specimen.stops import chosen
+from ..specimen.stops import chosen, require_positive
 from .integrate import check_impact_rate
 
 
@@ -124,8 +124,7 @@ def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
         raise ValueError(
             "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
         )
-    if not 0.0 < duration_s < math.inf:
-        raise ValueError(f"Duration {duration_s} s is not allowed: it must be positive and finite.")
+    require_positive("Duration", duration_s, "s")
     if not 0.0 < window_s <= duration_s:
         raise ValueError(
             f"Window {window_s} s is not allowed: it must be positive and within the run of {duration_s} s."

@@ -10,10 +10,9 @@ from pydantic import ConfigDict
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import WHOLE, Harmonic
 from ..specimen.specimen import Specimen
-from ..specimen.stops import chosen
+from ..specimen.stops import STRICT, chosen, require_positive
 from .prediction import State
 
-_STRICT = ConfigDict(extra="forbid")
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 """Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed."""
 BUDGET_S = 1.0
@@ -46,7 +45,7 @@ MOST_PERIODS = 1e12
 class FixedDuration:
     """Follow the motion for a given time and observe its end."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     duration_s: float = PAPER_DURATION_S
     window_s: float = PAPER_WINDOW_S
@@ -58,9 +57,7 @@ class FixedDuration:
         return self.duration_s
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.duration_s < math.inf:
-            msg = f"Duration {self.duration_s} s is not allowed: it must be positive and finite."
-            raise ValueError(msg)
+        require_positive("Duration", self.duration_s, "s")
         if not 0.0 < self.window_s <= self.duration_s:
             msg = (
                 f"Window {self.window_s} s is not allowed: "
@@ -73,7 +70,7 @@ class FixedDuration:
 class AutomaticDuration:
     """Follow the motion until it has settled, then observe one period, or a window if it never repeats."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
@@ -81,17 +78,15 @@ class AutomaticDuration:
     kind: Literal["automatic"] = "automatic"
 
     def __post_init__(self) -> None:
-        for name, value in (("Window", self.window_s), ("Longest duration", self.longest_s)):
-            if not 0.0 < value < math.inf:
-                msg = f"{name} {value} s is not allowed: it must be positive and finite."
-                raise ValueError(msg)
+        require_positive("Window", self.window_s, "s")
+        require_positive("Longest duration", self.longest_s, "s")
 
 
 @dataclass(frozen=True)
 class Target:
     """Requested error or time, or both."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     error: float | None = None
     """Relative error of each response; absent: as small as the time allows."""
@@ -105,16 +100,15 @@ class Target:
         if self.error is not None and not 0.0 < self.error <= 1.0:
             msg = f"Error {self.error} is not allowed: it must be above 0 and at most 1, which is 100 %."
             raise ValueError(msg)
-        if self.time_s is not None and not 0.0 < self.time_s < math.inf:
-            msg = f"Time {self.time_s} s is not allowed: it must be positive and finite."
-            raise ValueError(msg)
+        if self.time_s is not None:
+            require_positive("Time", self.time_s, "s")
 
 
 @dataclass(frozen=True)
 class Rest:
     """Start from rest."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     kind: Literal["rest"] = "rest"
 
@@ -133,7 +127,7 @@ class Rest:
 class Given:
     """Start from a given state."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     state: State
     """x, y, z, vx, vy, vz, absolute [m, m/s]."""
@@ -151,7 +145,7 @@ class Given:
 class Scene:
     """Request for one simulation."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     specimen: Specimen
     drive: Harmonic

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from .stops import require_positive
+from .stops import STRICT, require_positive
 
-_STRICT = ConfigDict(extra="forbid")
 FEWEST_SAMPLES = 4
 """A not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e100
@@ -23,7 +22,7 @@ LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
 class Harmonic:
     """U = amplitude_m * sin(2 pi frequency_hz t + phase_rad)."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     frequency_hz: float
     amplitude_m: float
@@ -40,7 +39,7 @@ class Harmonic:
 class _Sweep:
     """A sine of constant displacement amplitude and rising or falling frequency; starts at phase zero."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     start_hz: float
     stop_hz: float

@@ -47,10 +47,7 @@ class Elasticity:
     poissons_ratio: float
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.youngs_modulus < math.inf:
-            raise ValueError(
-                f"Young's modulus {self.youngs_modulus} Pa is not allowed: it must be positive and finite."
-            )
+        require_positive("Young's modulus", self.youngs_modulus, "Pa")
         if not -1.0 < self.poissons_ratio <= 0.5:
             raise ValueError(
                 f"Poisson's ratio {self.poissons_ratio} is not allowed: it must lie in (-1, 0.5]."
@@ -70,7 +67,6 @@ def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> f
 
     Raises ValueError when the radius is not positive.
     """
-    if not 0.0 < radius_m < math.inf:
-        raise ValueError(f"Sphere radius {radius_m} m is not allowed: it must be positive and finite.")
+    require_positive("Sphere radius", radius_m, "m")
     modulus = 1.0 / (sphere.plane_strain_compliance + plane.plane_strain_compliance)
     return 4.0 / 3.0 * modulus * math.sqrt(radius_m)

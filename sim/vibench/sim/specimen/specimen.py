@@ -17,6 +17,7 @@ from .contact_law import ContactLaw, law_by_name
 from .drive import Harmonic
 from .hertz import Elasticity, hertz_stiffness
 from .state import Floats
+from .stops import STRICT
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
@@ -38,7 +39,7 @@ class Specimen:
     }
     """Units of values whose names do not state one."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     masses: Triple
     """m0, m1, m2 [kg]."""

@@ -140,9 +140,9 @@ def _fill(file: h5py.File, plan: layout.GridPlan) -> None:
         for index, scale in enumerate([*scales, *along]):
             dataset.dims[index].attach_scale(scale)
     sessions = file.create_group(layout.SESSIONS)
-    for text_column in layout.SESSION_COLUMNS:
-        kind = h5py.string_dtype("utf-8", text_column.width)
-        sessions.create_dataset(text_column.name, data=np.zeros(layout.MOST_SESSIONS, dtype=kind), dtype=kind)
+    for name, width in layout.SESSION_COLUMNS.items():
+        kind = h5py.string_dtype("utf-8", width)
+        sessions.create_dataset(name, data=np.zeros(layout.MOST_SESSIONS, dtype=kind), dtype=kind)
     sessions.create_dataset(layout.N_SESSIONS, data=np.zeros(1, dtype=layout.COUNTER_DTYPE))
 
 
@@ -223,9 +223,9 @@ class FileStore:
         """Record time, software and executor in the next row of sessions."""
         self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
-        for column, text in zip(layout.SESSION_COLUMNS, texts, strict=True):
-            raw = text.encode()[: column.width].ljust(column.width, b"\0")
-            self._write(self._places.session_columns[column.name] + self._session * column.width, raw)
+        for (name, width), text in zip(layout.SESSION_COLUMNS.items(), texts, strict=True):
+            raw = text.encode()[:width].ljust(width, b"\0")
+            self._write(self._places.session_columns[name] + self._session * width, raw)
         self._sync()
         counter = np.asarray(self._session + 1, dtype=layout.COUNTER_DTYPE)
         self._write(self._places.n_sessions, counter.tobytes())

@@ -47,20 +47,8 @@ class PointState(IntEnum):
     """Filled in on a map, not computed: neighbours agree, and numbers are interpolated between them."""
 
 
-@dataclass(frozen=True)
-class TextColumn:
-    """One column of the table of sessions: text of fixed length."""
-
-    name: str
-    width: int
-
-
-SESSION_COLUMNS = (
-    TextColumn("started_utc", 32),
-    TextColumn("software_json", 512),
-    TextColumn("executor", 160),
-)
-"""Columns of the sessions; a session is the first run of a study or a resumption."""
+SESSION_COLUMNS = {"started_utc": 32, "software_json": 512, "executor": 160}
+"""Columns of the sessions and their bytes; a session is the first run of a study or a resumption."""
 MOST_SESSIONS = 1024
 """Rows; further sessions share the last one."""
 

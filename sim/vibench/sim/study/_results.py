@@ -64,7 +64,7 @@ def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
     with _open_store(path, kind) as file:
         group = file[layout.SESSIONS]
         rows = range(int(group[layout.N_SESSIONS][0]))
-        columns = [group[column.name][:] for column in layout.SESSION_COLUMNS]
+        columns = [group[name][:] for name in layout.SESSION_COLUMNS]
     return tuple(Session(*(bytes(column[row]).decode() for column in columns)) for row in rows)
 
 
@@ -74,7 +74,7 @@ def places_of(path: Path, plan: GridPlan) -> Places:
         group = file[layout.SESSIONS]
         return Places(
             columns={column.name: _offset(file[column.name]) for column in plan.columns},
-            session_columns={each.name: _offset(group[each.name]) for each in layout.SESSION_COLUMNS},
+            session_columns={name: _offset(group[name]) for name in layout.SESSION_COLUMNS},
             n_sessions=_offset(group[layout.N_SESSIONS]),
             sessions=int(group[layout.N_SESSIONS][0]),
         )

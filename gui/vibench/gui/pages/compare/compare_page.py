@@ -16,7 +16,7 @@ from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext
 from ...page.page import FileKind, Page, SideAndPicture
 from ...widgets.boxes import TimedBar, column, fill_box, new_path, push_button, row
-from ...widgets.notice import COMPARE, Notice, NoticeKind, notice_of
+from ...widgets.notice import COMPARE, Notice, NoticeKind
 from .curve_plots import (
     PEAK_HEADINGS,
     CurveList,
@@ -177,27 +177,25 @@ class ComparePage(Page):
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
         marked = self.plots.markers_hz
         ask = self.context.background.ask
-        ask(export_comparison, self._exported, self._refused, path, shown, recordings, pair, marked)
+        ask(export_comparison, self._exported, self.context.fail, path, shown, recordings, pair, marked)
 
     def _compared(self, found: ComparedRecording) -> None:
         others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
         if (first := first_copies([*others, found])[-1]) < len(others):
             del self._recordings[found.path]
             text = copy_sentence(others[first], str(others[first].path), found)
-            self.context.say(Notice(NoticeKind.WARNING, f"{found.path} {text}.", "It is shown once."))
+            self.context.warn(f"{found.path} {text}.", "It is shown once.")
             self._end_job()
             return
         self._recordings[found.path] = found
         self.curves.replace_source(found.name, found.curves)
         for sentence in found.failures:
-            self.context.say(
-                Notice(NoticeKind.WARNING, sentence, "The measured curves are shown without it.")
-            )
+            self.context.warn(sentence, "The measured curves are shown without it.")
         self._end_job()
 
     def _failed(self, error: BaseException) -> None:
         self._recordings = {path: each for path, each in self._recordings.items() if each is not None}
-        self.context.say(notice_of(error))
+        self.context.fail(error)
         self._end_job()
 
     def _end_job(self) -> None:
@@ -211,9 +209,6 @@ class ComparePage(Page):
 
     def _exported(self, path: Path) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {path}"))
-
-    def _refused(self, error: BaseException) -> None:
-        self.context.say(notice_of(error))
 
     def _draw(self) -> None:
         shown = self.curves.ticked()
@@ -245,7 +240,7 @@ class ComparePage(Page):
     def add_branches(self, paths: tuple[Path, ...]) -> None:
         """Read results of `vibench branches` in the background and overlay them."""
         for path in paths:
-            self.context.background.ask(branch_curves, self.add_prediction, self._refused, path)
+            self.context.background.ask(branch_curves, self.add_prediction, self.context.fail, path)
 
     def _remove(self) -> None:
         gone = set(self.curves.remove_chosen())

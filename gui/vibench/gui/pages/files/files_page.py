@@ -19,7 +19,7 @@ from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext, SettingKey
 from ...page.page import DisplayedResult, FileKind, Page
 from ...widgets.boxes import ElidedLabel, ScrollArea, column, fill_box, new_path, push_button, row
-from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind, notice_of
+from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind
 from ...widgets.units import SentenceLabel
 from .recording_table import (
     CampaignChoice,
@@ -61,7 +61,7 @@ class FilesPage(Page):
         self._listing: Job | None = None
         self._making: Job | None = None
         self._check = LatestRequest(
-            context.background, whole_check, self._show_facts, self._failed, CHECK_WAIT_MS, self
+            context.background, whole_check, self._show_facts, context.fail, CHECK_WAIT_MS, self
         )
         self._wanted: Path | None = None
         self._folder = context.folder
@@ -115,7 +115,7 @@ class FilesPage(Page):
         if self._listing is not None:
             self._listing.drop()
         self.table.is_listing = True
-        self._listing = self.context.background.ask(read_listing, self._listed, self._failed, folder)
+        self._listing = self.context.background.ask(read_listing, self._listed, self.context.fail, folder)
 
     def open_path(self, path: Path) -> None:
         """Show a recording from any folder."""
@@ -144,15 +144,12 @@ class FilesPage(Page):
         self._count.setText(f"{len(entries)} recording{'s' if len(entries) != 1 else ''}")
         missing = shown.missing_pictures()
         if missing:
-            self.context.background.ask(thumbnails, shown.show_thumbnails, self._failed, missing)
+            self.context.background.ask(thumbnails, shown.show_thumbnails, self.context.fail, missing)
         if chosen:
             # A recording that was still growing may have its final name now.
             self.table.choose(*map(name_now, chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
-
-    def _failed(self, error: BaseException) -> None:
-        self.context.say(notice_of(error))
 
     def _open_chosen(self) -> None:
         paths = self.table.chosen_paths()
@@ -173,7 +170,7 @@ class FilesPage(Page):
             self._title.setText(path.name)
             self._facts.setText(str(error))
             self.pictures.show_recording(None, printable(str(error)))
-            self.context.say(notice_of(error))
+            self.context.fail(error)
             return
         self._opened = recording
         self._title.setText(recording.path.name)
@@ -187,7 +184,7 @@ class FilesPage(Page):
             self._take_next(recording, {})
         else:
             self._facts.setText("Reading all samples, because this file has no overview…")
-            self._making = self.context.background.ask(read_levels, self._show, self._failed, path)
+            self._making = self.context.background.ask(read_levels, self._show, self.context.fail, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
         """Add one channel per pass of the event loop; reading all channels at once would block the window."""
@@ -251,8 +248,9 @@ class FilesPage(Page):
         if os.path.isdir(folder):  # noqa: PTH112
             self._go_to(folder)
         else:
-            texts = f"{folder} is not a folder.", "The list is unchanged.", "Type or choose another folder."
-            self.context.say(Notice(NoticeKind.WARNING, *texts))
+            self.context.warn(
+                f"{folder} is not a folder.", "The list is unchanged.", "Type or choose another folder."
+            )
             self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:
@@ -265,7 +263,7 @@ class FilesPage(Page):
     def _choose_export(self) -> None:
         path = self.table.chosen_paths()[0]
         if (target := new_path(self, "Export", path.with_suffix(".uff"), EXPORTS)) is not None:
-            self.context.background.ask(export_recording, self._exported, self._failed, path, target)
+            self.context.background.ask(export_recording, self._exported, self.context.fail, path, target)
 
     def _exported(self, files: tuple[Path, ...]) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
@@ -274,7 +272,7 @@ class FilesPage(Page):
         text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is stored in the recording.")
         if is_given and text.strip():
             self.context.background.ask(
-                add_note, self._choose, self._failed, self.table.chosen_paths()[0], text.strip()
+                add_note, self._choose, self.context.fail, self.table.chosen_paths()[0], text.strip()
             )
 
     def _hand_to_compare(self) -> None:

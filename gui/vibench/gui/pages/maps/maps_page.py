@@ -309,7 +309,7 @@ class MapsPage(Page):
                     self.picture, self._is_stale = part, True
                     self._show_text(part.text)
                 case Trouble():
-                    self.context.say(Notice(NoticeKind.WARNING, part.sentence))
+                    self.context.warn(part.sentence)
                 case _:
                     pass
 

@@ -39,7 +39,7 @@ from ...page.app_context import AppContext, SettingKey
 from ...page.page import DisplayedResult, FileKind, History, Page, SideAndPicture
 from ...page.user_actions import UserActions
 from ...widgets.boxes import ProgressBar, column, fill_box, push_button, row, titled_box
-from ...widgets.notice import QUEUE, Notice, NoticeKind, clock, notice_of
+from ...widgets.notice import QUEUE, clock, notice_of
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel
 from .draft import (
@@ -178,7 +178,7 @@ class QueuePage(Page):
         self.unattended.setChecked(True)
         self.hold_button = push_button("Hold (drive on)", "Hold the run; the drive stays on", self._hold)
         self._looking = LatestRequest(
-            context.looks, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
+            context.looks, preview_campaign, self._looked, context.fail, LOOK_MS, self
         )
         self._lay_out()
         self._connect()
@@ -240,7 +240,7 @@ class QueuePage(Page):
             self.context.selection.choose_campaign(load_campaign(path))
             self.context.note_file(path)
         except ConfigurationError as error:
-            self.context.say(notice_of(error))
+            self.context.fail(error)
 
     def _show_progress(self, status: EngineStatus | None) -> None:
         run = None if status is None else status.run
@@ -288,30 +288,22 @@ class QueuePage(Page):
             f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )
 
-    def _look_failed(self, error: BaseException) -> None:
-        self.context.say(notice_of(error))
-
     def _add_test(self) -> None:
-        measurement = self.context.selection.measurement
-        if measurement is None:
-            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
-        else:
-            self.context.selection.choose_campaign(
-                with_measurement(self.context.selection.campaign, measurement)
-            )
+        measurement = self._actions.complete_test()
+        if measurement is not None:
+            chosen = self.context.selection
+            chosen.choose_campaign(with_measurement(chosen.campaign, measurement))
 
     def _add_sweep(self, axis: SweepAxis, values: Range) -> None:
-        measurement = self.context.selection.measurement
+        chosen, measurement = self.context.selection, self._actions.complete_test()
         if measurement is None:
-            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
             return
         try:
-            chosen = self.context.selection
             campaign = with_sweep(chosen.campaign, measurement, axis, values, chosen.rig)
         except ConfigurationError as error:
-            self.context.say(notice_of(error))
+            self.context.fail(error)
         else:
-            self.context.selection.choose_campaign(campaign)
+            chosen.choose_campaign(campaign)
 
     @property
     def _chosen_entry(self) -> int:
@@ -352,7 +344,7 @@ class QueuePage(Page):
     def _save(self) -> None:
         campaign = self.context.selection.campaign
         if campaign is None:
-            self._warn("There is no campaign to save.", "Add a test first.")
+            self.context.warn("There is no campaign to save.", next_step="Add a test first.")
             return
         wish = str(self.context.folder / f"{campaign.name}.toml")
         given, _ = QFileDialog.getSaveFileName(self, "Save the campaign", wish, "Campaigns (*.toml)")
@@ -360,7 +352,7 @@ class QueuePage(Page):
             try:
                 save_toml(campaign, Path(given))
             except ConfigurationError as error:
-                self.context.say(notice_of(error))
+                self.context.fail(error)
 
     def _take(self, row: int) -> None:
         if row > 0:
@@ -377,9 +369,6 @@ class QueuePage(Page):
                 self.context.selection.choose_campaign(campaign)
         self._show_campaign()
 
-    def _warn(self, what: str, next_step: str) -> None:
-        self.context.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
-
     def _connect(self) -> None:
         self.context.selection.campaign_changed.connect(self._show_campaign)
         self.context.selection.rig_changed.connect(self._show_campaign)
@@ -387,7 +376,7 @@ class QueuePage(Page):
         self.context.recording_made.connect(lambda _path: self._show_campaign())
         self.choice.activated.connect(self._take)
         self.sweep.wanted.connect(self._add_sweep)
-        self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))
+        self.sweep.refused.connect(lambda text: self.context.warn(text, next_step="Correct the sweep."))
 
     def _lay_out(self) -> None:
         self.choice.setAccessibleName("Known campaigns")

@@ -40,7 +40,7 @@ from ...page.app_context import AppContext, SettingKey
 from ...page.page import FileKind, Page, SideAndPicture
 from ...page.user_actions import UserActions
 from ...widgets.boxes import column, fill_box, plain_tip, push_button, titled_box
-from ...widgets.notice import RIG, Notice, NoticeKind, moment_text, notice_of
+from ...widgets.notice import RIG, moment_text
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, prefixed_unit
 
@@ -299,11 +299,7 @@ class RigPage(Page):
         if self.choice.isEnabled():
             self.choice.choose(path.resolve())
         else:
-            self.context.say(
-                Notice(
-                    NoticeKind.WARNING, "A bench is open.", "It was kept.", "Close it, then choose another."
-                )
-            )
+            self.context.warn("A bench is open.", "It was kept.", "Close it, then choose another.")
 
     def open_bench(self) -> None:
         """Open the chosen bench."""
@@ -373,7 +369,7 @@ class RigPage(Page):
     def _not_found(self, error: BaseException) -> None:
         self.find_button.setEnabled(True)
         self.instruments.show_rows([])
-        self.context.say(notice_of(error))
+        self.context.fail(error)
 
     def _close(self) -> None:
         self.context.bridge.order(EngineClient.close_bench)
@@ -381,7 +377,7 @@ class RigPage(Page):
 
     def _connect(self) -> None:
         self.choice.chosen.connect(self._chosen)
-        self.choice.refused.connect(lambda error: self.context.say(notice_of(error)))
+        self.choice.refused.connect(self.context.fail)
 
     def _lay_out(self) -> None:
         buttons = self.open_button, self.check_button, self.find_button, self.close_button

@@ -148,7 +148,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._take(())
         self._show_text("Complete.")
         if self._course is not None and self._course.troubles:
-            self.context.say(Notice(NoticeKind.WARNING, self._course.troubles[0]))
+            self.context.warn(self._course.troubles[0])
 
     def _die(self, what: str) -> None:
         self.context.say(

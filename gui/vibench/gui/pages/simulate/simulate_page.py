@@ -145,7 +145,7 @@ class SimulatePage(Page):
             else text
         )
         if troubles:
-            self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
+            self.context.warn(troubles[0], details="\n".join(troubles[1:]))
 
     def _die(self, what: str) -> None:
         self.context.say(

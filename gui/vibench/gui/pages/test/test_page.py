@@ -53,7 +53,7 @@ from ...plots.line_style import Dash, LineStyle, curve_style
 from ...plots.plot import Plot
 from ...plots.signal_curve import SHARE_ROLE, BarDelegate, SignalCurve
 from ...widgets.boxes import column, fill_box, push_button, row, titled_box
-from ...widgets.notice import TEST, Notice, NoticeKind, clock, notice_of
+from ...widgets.notice import TEST, Notice, NoticeKind, clock
 from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel, prefixed_unit
@@ -507,9 +507,7 @@ class TestPage(Page):
     def _save(self) -> None:
         measurement = self.form.value
         if measurement is None:
-            self.context.say(
-                Notice(NoticeKind.WARNING, "The test is not complete.", next_step=self.form.complaint)
-            )
+            self.context.warn("The test is not complete.", next_step=self.form.complaint)
             return
         wish = str(self._own_folder / f"{measurement.name}.toml")
         given, _ = QFileDialog.getSaveFileName(self, "Save the test", wish, "Tests (*.toml)")
@@ -521,7 +519,7 @@ class TestPage(Page):
         try:
             save_toml(measurement, path)
         except ConfigurationError as error:
-            self.context.say(notice_of(error))
+            self.context.fail(error)
         else:
             self.context.note_file(path)
             self.context.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
@@ -538,7 +536,7 @@ class TestPage(Page):
             self.form.show_value(load_test(path))
             self.context.note_file(path)
         except ConfigurationError as error:
-            self.context.say(notice_of(error))
+            self.context.fail(error)
 
     def _connect(self) -> None:
         self.choice.activated.connect(self._take)
