@@ -11,7 +11,6 @@ from typing import Any
 
 from nidaqmx._stubs import nidaqmx_pb2
 from nidaqmx.constants import (
-    AOIdleOutputBehavior,
     ChannelType,
     Coupling as WireCoupling,
     ExcitationSource,
@@ -27,14 +26,13 @@ from .acquisition import Acquisition, check_memory
 from .calls import DaqmxSystem
 from .channels import OutputChannel
 from .data_calls import count_available, default_samples, newest
-from .devices import AnalogInputs, Device, Idle, Overloads
+from .devices import AnalogInputs, Device
 from .errors import DaqmxRefusal, member, unsupported_value
 from .rig import QUESTION_S
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)
 """Major, minor and update number. From 24.5 on, nidaqmx asks the driver how many samples "all" means."""
-_IDLE = {Idle.ZERO: AOIdleOutputBehavior.ZERO_VOLTS, Idle.HOLD: AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE}
 
 
 @dataclass(frozen=True)
@@ -111,14 +109,9 @@ def _set_rate(task: Task, rate_hz: float) -> None:
 
 def _running_acquisition(task: Task) -> Acquisition:
     """Return the running acquisition of a device with overload detection."""
-    match task.side:
-        case AnalogInputs(overloads=Overloads.DETECTED):
-            pass
-        case _:
-            device = task.devices[0]
-            raise not_supported(
-                "Read.OVERLOADED_CHANS_EXIST", f"Device: {device.name} ({device.product_type})"
-            )
+    if not (isinstance(task.side, AnalogInputs) and task.side.detects_overloads):
+        device = task.devices[0]
+        raise not_supported("Read.OVERLOADED_CHANS_EXIST", f"Device: {device.name} ({device.product_type})")
     if task.acquisition is None:
         raise DaqmxRefusal(DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING, f"Task Name: {task.name}")
     return task.acquisition
@@ -232,8 +225,8 @@ OUTPUT: Attributes = {
     "CHAN_TYPE": Attribute(lambda _: ChannelType.ANALOG_OUTPUT),
     "AO_MAX": Attribute(lambda channel: channel.maximum, _field("maximum")),
     "AO_MIN": Attribute(lambda channel: channel.minimum, _field("minimum")),
-    "AO_IDLE_OUTPUT_BEHAVIOR": Attribute(lambda channel: _IDLE[channel.outputs.idle],
-        _require("AO_IdleOutputBehavior", lambda channel: _IDLE[channel.outputs.idle])),
+    "AO_IDLE_OUTPUT_BEHAVIOR": Attribute(lambda channel: channel.outputs.idle,
+        _require("AO_IdleOutputBehavior", lambda channel: channel.outputs.idle)),
 }
 # fmt: on
 

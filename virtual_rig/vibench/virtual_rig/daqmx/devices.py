@@ -6,10 +6,9 @@ and the output memory of the USB-4431, the default couplings, and the USB-6211's
 """
 
 import math
-from dataclasses import dataclass, field, replace
-from enum import Enum, auto
+from dataclasses import dataclass, replace
 
-from nidaqmx.constants import ProductCategory, TerminalConfiguration
+from nidaqmx.constants import AOIdleOutputBehavior, ProductCategory, SampleTimingType, TerminalConfiguration
 
 from vibench.acquisition import ConfigurationError
 
@@ -51,36 +50,6 @@ class DividedRate:
 Rates = AnyRate | DividedRate
 
 
-class Idle(Enum):
-    """State of an output after its generation."""
-
-    ZERO = auto()
-    HOLD = auto()
-
-
-class Untimed(Enum):
-    """Behaviour of a task without a sample clock."""
-
-    ON_DEMAND = auto()
-    """Converts when the program reads (successive approximation)."""
-    SAMPLE_CLOCK = auto()
-    """Runs the sample clock at its default rate (delta-sigma converters have no other mode)."""
-
-
-class Overloads(Enum):
-    """Whether the device reports clipped inputs."""
-
-    DETECTED = auto()
-    NOT_DETECTED = auto()
-
-
-class Conversion(Enum):
-    """Whether the inputs of a task are sampled simultaneously."""
-
-    SIMULTANEOUS = auto()
-    MULTIPLEXED = auto()
-
-
 @dataclass(frozen=True)
 class AnalogInputs:
     """Inputs of a device."""
@@ -95,9 +64,12 @@ class AnalogInputs:
     """Possible excitation currents without 0; empty: no excitation."""
     terminals: tuple[TerminalConfiguration, ...]
     """The first is the default."""
-    untimed: Untimed
-    overloads: Overloads
-    conversion: Conversion
+    untimed: SampleTimingType
+    """Timing of a task without a sample clock: delta-sigma converters run the clock at its default rate."""
+    detects_overloads: bool = False
+    """Whether the device reports clipped inputs."""
+    is_multiplexed: bool = False
+    """Whether the inputs of a task share one converter, and so its highest rate."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +79,9 @@ class AnalogOutputs:
     count: int
     range_v: float
     rates: Rates
-    idle: Idle
-    untimed: Untimed
+    idle: AOIdleOutputBehavior
+    """State of an output after its generation."""
+    untimed: SampleTimingType
     memory: int
     """Samples per channel in the device's memory, between the program's buffer and the converter."""
 
@@ -166,8 +139,7 @@ NI_9234 = Device(
         count=4, ranges_v=(5.0,), bits=24,
         rates=DividedRate(_NI_9234_RATE_HZ, _NI_9234_RATE_HZ / _NI_9234_MAX_DIVISOR, _NI_9234_RATE_HZ),
         couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.002,),
-        terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=Untimed.SAMPLE_CLOCK,
-        overloads=Overloads.NOT_DETECTED, conversion=Conversion.SIMULTANEOUS,
+        terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=SampleTimingType.SAMPLE_CLOCK,
     ),
 )  # fmt: skip
 
@@ -177,12 +149,12 @@ USB_4431 = Device(
     inputs=AnalogInputs(
         count=4, ranges_v=(10.0,), bits=24, rates=AnyRate(1000.0, 102.4e3),
         couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.0021,),
-        terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=Untimed.SAMPLE_CLOCK,
-        overloads=Overloads.DETECTED, conversion=Conversion.SIMULTANEOUS,
+        terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=SampleTimingType.SAMPLE_CLOCK,
+        detects_overloads=True,
     ),
     outputs=AnalogOutputs(
-        count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), idle=Idle.ZERO,
-        untimed=Untimed.SAMPLE_CLOCK, memory=1023,
+        count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), idle=AOIdleOutputBehavior.ZERO_VOLTS,
+        untimed=SampleTimingType.SAMPLE_CLOCK, memory=1023,
     ),
 )  # fmt: skip
 
@@ -194,10 +166,11 @@ USB_6211 = Device(
         rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
         couplings=(Coupling.DC,), iepe_currents_a=(),
         terminals=(TerminalConfiguration.DIFF, TerminalConfiguration.RSE, TerminalConfiguration.NRSE),
-        untimed=Untimed.ON_DEMAND, overloads=Overloads.NOT_DETECTED, conversion=Conversion.MULTIPLEXED,
+        untimed=SampleTimingType.ON_DEMAND, is_multiplexed=True,
     ),
     outputs=AnalogOutputs(
-        count=2, range_v=10.0, idle=Idle.HOLD, untimed=Untimed.ON_DEMAND, memory=8191,
+        count=2, range_v=10.0, idle=AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE,
+        untimed=SampleTimingType.ON_DEMAND, memory=8191,
         rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
     ),
 )  # fmt: skip
@@ -208,14 +181,11 @@ class Catalogue:
     """The devices of a system by name (DAQmx ignores case)."""
 
     devices: tuple[Device, ...] = (CDAQ1, NI_9234, USB_4431, USB_6211)
-    _by_name: dict[str, Device] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_by_name", {device.name.lower(): device for device in self.devices})
 
     def find(self, name: str) -> Device | None:
         """Return a device by name; a leading slash is ignored."""
-        return self._by_name.get(name.strip("/").lower())
+        wanted = name.strip("/").lower()
+        return next((device for device in self.devices if device.name.lower() == wanted), None)
 
 
 def catalogue_with(product_type: str, name: str) -> Catalogue:

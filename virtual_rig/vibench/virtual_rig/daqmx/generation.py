@@ -3,12 +3,12 @@
 import math
 
 import numpy as np
-from nidaqmx.constants import RegenerationMode
+from nidaqmx.constants import AOIdleOutputBehavior, RegenerationMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..world.world import World
-from .devices import AnalogOutputs, Idle
+from .devices import AnalogOutputs
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
@@ -173,7 +173,7 @@ class Generation:
         self._is_open = False
         for output in self._outputs:
             self._world.silence(output)
-        if self._idle is Idle.HOLD and self.generated:
+        if self._idle is AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE and self.generated:
             last = max(0, self._recent.shape[1] - 1 - (self.delivered - self.generated))
             for output, volts in zip(self._outputs, self._recent[:, last : last + 1], strict=True):
                 self._world.play(output, volts, self.rate_hz)

@@ -15,7 +15,7 @@ from vibench.acquisition import AcquisitionError, ConfigurationError
 
 from .acquisition import Acquisition, LogSettings, Timing, check_memory
 from .channels import Channel, InputChannel, OutputChannel, expand
-from .devices import AnalogInputs, AnalogOutputs, Conversion, Device, Untimed
+from .devices import AnalogInputs, AnalogOutputs, Device
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation, OutputBuffer
 from .rig import Rig
@@ -133,16 +133,13 @@ class Task:
     @property
     def kind(self) -> SampleTimingType:
         """Effective timing: the configured one, or the device's default."""
-        if self.timing.kind is not None:
-            return self.timing.kind
-        is_on_demand = self.side.untimed is Untimed.ON_DEMAND
-        return SampleTimingType.ON_DEMAND if is_on_demand else SampleTimingType.SAMPLE_CLOCK
+        return self.timing.kind or self.side.untimed
 
     @property
     def rate_hz(self) -> float:
         """Effective rate, the next possible one above the requested [Hz]; -200077 out of range."""
         side, requested_hz = self.side, self.timing.requested_hz
-        is_shared = isinstance(side, AnalogInputs) and side.conversion is Conversion.MULTIPLEXED
+        is_shared = isinstance(side, AnalogInputs) and side.is_multiplexed
         highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
         lowest = side.rates.minimum_hz
         requested_hz = max(requested_hz, lowest) if self.timing.kind is None else requested_hz
