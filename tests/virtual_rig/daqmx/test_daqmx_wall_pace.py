@@ -37,7 +37,7 @@ def wait_for(daq, samples, task):
     """Wait until the server has caught up with its clock."""
     rig = daq.server._rig
     with rig.changed:
-        assert rig.changed.wait_for(lambda: rig._acquisitions[0].acquired >= samples, 10.0)
+        assert rig.changed.wait_for(lambda: rig._acquisitions[0].transferred >= samples, 10.0)
 
 
 def test_samples_exist_only_after_their_time(connect, clock):

@@ -97,8 +97,34 @@ _ROUNDING_SAMPLES = 1e-5
 """Tolerance in sample periods for due samples, because rig time is a sum with rounding errors."""
 
 
-class Acquisition:
-    """Acquired samples per channel, counted from the start of the task [V]."""
+class Stream:
+    """A running acquisition or generation; samples are counted per channel from the start of the task."""
+
+    def __init__(self, rate_hz: float, began_s: float, total: float) -> None:
+        """Start at rig time ``began_s``; ``total`` is the number of samples, or infinity."""
+        self.rate_hz = rate_hz
+        self.began_s = began_s
+        self.total = total
+        self.transferred = 0
+        """Number of samples acquired or generated so far."""
+        self.failure: DaqmxRefusal | None = None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all samples are transferred, or never will be."""
+        return self.transferred >= self.total or self.failure is not None
+
+    def time_of(self, count: float) -> float:
+        """Return the rig time at which ``count`` samples are transferred [s]; infinite for more than all."""
+        return self.began_s + count / self.rate_hz if count <= self.total else math.inf
+
+    def due(self, now_s: float) -> int:
+        """Return how many samples a stream without end has transferred at rig time ``now_s``."""
+        return math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
+
+
+class Acquisition(Stream):
+    """Acquired samples [V], and those that the program has not read."""
 
     def __init__(
         self,
@@ -111,15 +137,11 @@ class Acquisition:
         overflow: Overflow,
         reference: ReferenceTrigger | None = None,
     ) -> None:
-        """Start at rig time ``began_s``; ``total`` is the number of samples, or infinity."""
-        self.rate_hz = rate_hz
-        self.began_s = began_s
-        self.total = total if reference is None else math.inf
-        self.acquired = 0
+        super().__init__(rate_hz, began_s, total if reference is None else math.inf)
         self.position = 0
+        """Number of samples read by the program."""
         self.queried_at = -1
         """Read position at the last query of available samples."""
-        self.failure: DaqmxRefusal | None = None
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
         self._sampler = sampler
         self._unread = SampleQueue(channels)
@@ -132,37 +154,13 @@ class Acquisition:
     @property
     def available(self) -> int:
         """Number of unread samples."""
-        return 0 if self.awaits_trigger else self.acquired - self.position
-
-    @property
-    def is_done(self) -> bool:
-        """Whether the acquisition is complete."""
-        return self.acquired >= self.total or self.failure is not None
-
-    def time_of(self, count: float) -> float:
-        """Return the rig time at which ``count`` samples exist [s]; infinite if they never will."""
-        return self.began_s + count / self.rate_hz if count <= self.total else math.inf
-
-    @property
-    def transferred(self) -> int:
-        """Number of samples per channel stored so far."""
-        return self.acquired
-
-    @property
-    def used(self) -> float:
-        """Number of samples per channel read by the program."""
-        return self.position
-
-    def listener_due_s(self, count: int) -> float:
-        """Return the rig time at which a listener expects ``count`` samples [s]."""
-        return self.time_of(count)
+        return 0 if self.awaits_trigger else self.transferred - self.position
 
     def advance_to(self, now_s: float) -> None:
         """Acquire all samples that are due at rig time ``now_s``."""
-        due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
-        due = int(min(due, self.total))
-        while self.acquired < min(due, self.total) and self._is_open and self.failure is None:
-            self._store(self._sampler.read(min(due - self.acquired, self.buffer_size)))
+        due = int(min(self.due(now_s), self.total))
+        while self.transferred < min(due, self.total) and self._is_open and self.failure is None:
+            self._store(self._sampler.read(min(due - self.transferred, self.buffer_size)))
         if self.is_done:
             self.close()
 
@@ -176,7 +174,7 @@ class Acquisition:
         """Rig time from which the reference trigger is accepted; infinite if it is accepted already [s]."""
         assert self._reference is not None
         kept = self._reference.pretrigger
-        return self.began_s + kept / self.rate_hz if self.acquired < kept else math.inf
+        return self.began_s + kept / self.rate_hz if self.transferred < kept else math.inf
 
     def trigger(self) -> bool:
         """Apply the reference trigger now; return whether it is accepted.
@@ -184,16 +182,16 @@ class Acquisition:
         It is rejected until enough samples before it are stored.
         """
         assert self._reference is not None
-        if not self.awaits_trigger or self.acquired < self._reference.pretrigger:
+        if not self.awaits_trigger or self.transferred < self._reference.pretrigger:
             return False
         self.total = self.position + self._samples
         return True
 
     def _store(self, block: NDArray[np.float64]) -> None:
         self._unread.append(block)
-        self.acquired += block.shape[1]
+        self.transferred += block.shape[1]
         if self._reference is not None and self.awaits_trigger:
-            self._take(max(0, self.acquired - self.position - self._reference.pretrigger))
+            self._take(max(0, self.transferred - self.position - self._reference.pretrigger))
         elif self.available > self._capacity:
             self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
 

@@ -132,7 +132,7 @@ def _total_generated(task: Task) -> int:
     if task.generation is None:
         return 0
     task.rig.pace.pass_time(task.rig, QUESTION_S)
-    return task.generation.generated
+    return task.generation.transferred
 
 
 def _set_regeneration(task: Task, mode: int) -> None:

@@ -26,11 +26,10 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .acquisition import Acquisition, LogSettings, Overflow, ReferenceTrigger
+from .acquisition import Acquisition, LogSettings, Overflow, ReferenceTrigger, Stream
 from .channels import InputChannel, OutputChannel, channel_names, expand
 from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
-from .generation import Generation
 from .rig import QUESTION_S, Rig
 from .tasks import Task
 
@@ -283,7 +282,6 @@ CALLS: Mapping[str, Call] = {
 
 
 Listener = Iterator[Any]
-Stream = Acquisition | Generation
 _BY_OTHERS = math.inf
 """Rig time of an event that only other calls can cause."""
 
@@ -356,11 +354,12 @@ class _Subscription:
         If the buffer never loses samples, first wait until the announced samples have been read.
         """
         with self._rig.changed:
-            if self._rig.pace.overflow is Overflow.GROW:
-                self._wait(_BY_OTHERS, lambda: stream.used >= announced or self._is_over(stream))
-            self._wait(
-                stream.listener_due_s(count), lambda: stream.transferred >= count or self._is_over(stream)
-            )
+            due_s = _BY_OTHERS  # a listener to a repeated buffer must not advance time
+            if isinstance(stream, Acquisition):
+                due_s = stream.time_of(count)
+                if self._rig.pace.overflow is Overflow.GROW:
+                    self._wait(_BY_OTHERS, lambda: stream.position >= announced or self._is_over(stream))
+            self._wait(due_s, lambda: stream.transferred >= count or self._is_over(stream))
             return stream.transferred >= count and not self._has_gone
 
     def _is_over(self, stream: Stream) -> bool:

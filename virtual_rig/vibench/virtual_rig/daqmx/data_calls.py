@@ -93,7 +93,7 @@ def available(task: Task) -> int:
 def newest(task: Task) -> int:
     """Return how many samples per channel have been acquired so far."""
     available(task)
-    return task.acquisition.acquired if task.acquisition else 0
+    return task.acquisition.transferred if task.acquisition else 0
 
 
 def count_available(task: Task) -> int:
@@ -134,7 +134,7 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
         piece = min(count - taken, acquisition.buffer_size)
         has_come = _await_samples(task, acquisition, first + taken + piece, deadline_s)
         if not has_come:
-            piece = max(0, min(piece, acquisition.acquired - first - taken))
+            piece = max(0, min(piece, acquisition.transferred - first - taken))
             status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE)
         blocks.append(acquisition.read(piece))
         taken += piece
@@ -156,7 +156,7 @@ def _nothing_in_time(task: Task, wanted: int) -> Reading:
 def _await_samples(task: Task, acquisition: Acquisition, end: int, deadline_s: float) -> bool:
     def is_there() -> bool:
         return (
-            acquisition.acquired >= end
+            acquisition.transferred >= end
             or acquisition.failure is not None
             or task.acquisition is not acquisition
         )

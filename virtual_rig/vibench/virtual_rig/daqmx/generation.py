@@ -8,13 +8,12 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..world.world import World
+from .acquisition import Stream
 from .devices import AnalogOutputs
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
 """Time by which samples are passed to the world in advance [s]: avoids gaps, yet plays new data soon."""
-
-_ROUNDING_SAMPLES = 1e-5
 
 
 class OutputBuffer:
@@ -51,8 +50,8 @@ class OutputBuffer:
         return self._ring[:, (first + np.arange(count)) % self.filled]
 
 
-class Generation:
-    """The played samples, counted from the start of the task."""
+class Generation(Stream):
+    """The played samples, and those that wait in the buffer and in the device."""
 
     def __init__(
         self,
@@ -65,14 +64,9 @@ class Generation:
         regeneration: RegenerationMode,
         device: AnalogOutputs,
     ) -> None:
-        """Start at rig time ``began_s``; ``total`` is the number of samples, or infinity."""
-        self.rate_hz = rate_hz
-        self.began_s = began_s
-        self.total = total
+        super().__init__(rate_hz, began_s, total)
         self.buffer = buffer
         self.delivered = 0
-        self.generated = 0
-        self.failure: DaqmxRefusal | None = None
         self._world = world
         self._outputs = outputs
         self._repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
@@ -83,11 +77,6 @@ class Generation:
         self._fetched = 0
         self._recent = np.empty((len(outputs), 0))
         self._is_open = True
-
-    @property
-    def is_done(self) -> bool:
-        """Whether the generation is complete."""
-        return self.generated >= self.total or self.failure is not None
 
     @property
     def space(self) -> int:
@@ -106,24 +95,6 @@ class Generation:
     def uses_up_its_buffer(self) -> bool:
         """Whether every sample is played only once."""
         return not self._repeats
-
-    def time_of(self, count: float) -> float:
-        """Return the rig time at which ``count`` samples are played [s]; infinite if they never will be."""
-        return self.began_s + count / self.rate_hz if count <= self.total else math.inf
-
-    @property
-    def transferred(self) -> int:
-        """Number of samples per channel that have left the buffer."""
-        return self.generated
-
-    @property
-    def used(self) -> float:
-        """Infinity, because a listener to a generation does not wait for any reader."""
-        return math.inf
-
-    def listener_due_s(self, count: int) -> float:  # noqa: ARG002 - see below
-        """Return infinity, because a listener to a repeated buffer must not advance time."""
-        return math.inf
 
     def prepare(self, until_s: float) -> None:
         """Pass the samples up to rig time ``until_s``, plus a lead, to the world."""
@@ -155,8 +126,8 @@ class Generation:
         """Update the number of played samples at rig time ``now_s``, and detect an underflow."""
         if not self._is_open:
             return
-        due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
-        self.generated = int(min(due, self.total, self.delivered))
+        due = self.due(now_s)
+        self.transferred = int(min(due, self.total, self.delivered))
         if due > self.delivered and self.delivered < self.total:
             self.failure = DaqmxRefusal(
                 DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, samples_written=0
@@ -173,7 +144,7 @@ class Generation:
         self._is_open = False
         for output in self._outputs:
             self._world.silence(output)
-        if self._idle is AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE and self.generated:
-            last = max(0, self._recent.shape[1] - 1 - (self.delivered - self.generated))
+        if self._idle is AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE and self.transferred:
+            last = max(0, self._recent.shape[1] - 1 - (self.delivered - self.transferred))
             for output, volts in zip(self._outputs, self._recent[:, last : last + 1], strict=True):
                 self._world.play(output, volts, self.rate_hz)

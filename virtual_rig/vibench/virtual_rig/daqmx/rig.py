@@ -73,8 +73,7 @@ class Rig:
             self._advance_to(until_s)
         except AcquisitionError as error:
             lost = DaqmxRefusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, str(error))
-            streams: list[Acquisition | Generation] = [*self._acquisitions, *self._generations]
-            for stream in streams:
+            for stream in (*self._acquisitions, *self._generations):
                 stream.failure = lost
             self.changed.notify_all()
             raise lost from error
