@@ -79,13 +79,6 @@ class LogSettings:
     group: str
 
 
-class StartsItself(Enum):
-    """Whether a write starts a stopped task."""
-
-    YES = auto()
-    NO = auto()
-
-
 def check_memory(samples: int, channels: int) -> None:
     """Refuse more samples than the simulated computer has memory for (-50352)."""
     if samples * channels > MOST_SAMPLES:

@@ -11,7 +11,7 @@ from nidaqmx.constants import AcquisitionType, FillMode, SampleTimingType, Wavef
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from .acquisition import Acquisition, StartsItself, check_memory
+from .acquisition import Acquisition, check_memory
 from .calls import Call, DaqmxSystem, Fields, deadline, pick, task_of
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation
@@ -43,7 +43,9 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
 
     Raises DaqmxRefusal: -200279 for lost samples, -200278 past the end, -200284 if no sample came in time.
     """
-    require_inputs(task)
+    if not task.inputs:
+        task.require_channels()
+        raise DaqmxRefusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
     check_memory(samples, len(task.inputs))
     has_to_start = not task.is_running
     if has_to_start:
@@ -56,13 +58,6 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
     if has_to_start and _is_used_up(task):
         task.stop()
     return reading
-
-
-def require_inputs(task: Task) -> None:
-    """Refuse to read from a task without inputs."""
-    if not task.inputs:
-        task.require_channels()
-        raise DaqmxRefusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
 
 
 def _is_used_up(task: Task) -> bool:
@@ -167,24 +162,24 @@ def _await_samples(task: Task, acquisition: Acquisition, end: int, deadline_s: f
     return has_come
 
 
-def write(task: Task, volts: NDArray[np.float64], start: StartsItself, deadline_s: float) -> int:
+def write(task: Task, volts: NDArray[np.float64], request: Any) -> Fields:
     """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
+    ``request`` has the timeout, and says whether a stopped task is started.
     Raises DaqmxRefusal: -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full
     buffer, -200290 after an underflow.
     """
-    require_outputs(task)
     for row, channel in enumerate(task.outputs):
         channel.check(volts[row])
     if task.kind is SampleTimingType.ON_DEMAND:
-        return _write_on_demand(task, volts, start)
-    if task.is_running:
-        written = _write_running(task, volts, deadline_s)
+        _write_on_demand(task, volts, starts_task=request.auto_start)
+    elif task.is_running:
+        _write_running(task, volts, deadline(request.timeout))
     else:
-        written = _write_stopped(task, volts)
-        if start is StartsItself.YES:
+        _write_stopped(task, volts)
+        if request.auto_start:
             task.start()
-    return written
+    return {"samps_per_chan_written": volts.shape[1]}
 
 
 def require_outputs(task: Task) -> None:
@@ -194,19 +189,18 @@ def require_outputs(task: Task) -> None:
         raise DaqmxRefusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
 
 
-def _write_on_demand(task: Task, volts: NDArray[np.float64], start: StartsItself) -> int:
+def _write_on_demand(task: Task, volts: NDArray[np.float64], *, starts_task: bool) -> None:
     if not task.is_running:
-        if start is StartsItself.NO:
+        if not starts_task:
             code = DAQmxErrors.CANNOT_WRITE_WHEN_AUTO_START_FALSE_AND_TASK_NOT_RUNNING
             raise DaqmxRefusal(code, f"Task Name: {task.name}", samples_written=0)
         task.start()
     for channel, row in zip(task.outputs, volts, strict=True):
         task.rig.world.silence(channel.physical)
         task.rig.world.play(channel.physical, row, channel.outputs.rates.maximum_hz)
-    return int(volts.shape[1])
 
 
-def _write_stopped(task: Task, volts: NDArray[np.float64]) -> int:
+def _write_stopped(task: Task, volts: NDArray[np.float64]) -> None:
     buffer, count = task.output_buffer, volts.shape[1]
     missing = buffer.written + count - buffer.size
     if missing > 0 and not buffer.is_sized:
@@ -218,10 +212,9 @@ def _write_stopped(task: Task, volts: NDArray[np.float64]) -> int:
         )
         raise DaqmxRefusal(DAQmxErrors.NO_MORE_SPACE, detail, samples_written=0)
     buffer.write(volts)
-    return int(count)
 
 
-def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) -> int:
+def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) -> None:
     count, written = volts.shape[1], 0
     while written < count:
         piece = min(count - written, task.output_buffer.size)
@@ -231,7 +224,6 @@ def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) ->
             )
         task.output_buffer.write(volts[:, written : written + piece])
         written += piece
-    return written
 
 
 def _await_space(task: Task, generation: Generation, samples: int, deadline_s: float) -> bool:
@@ -287,7 +279,9 @@ def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMod
 
 def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
-    reading = _whole(read(task, request.num_samps_per_chan, deadline(request.timeout)))
+    reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
+    if reading.status:  # the caller cannot use a part
+        raise DaqmxRefusal(reading.status, samples_read=reading.samples)
     size = task.inputs[0].raw_bits // 8
     raw = np.ascontiguousarray(_counts(task, reading).T).astype(f"<i{size}").tobytes()
     return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
@@ -307,7 +301,7 @@ def _write(system: DaqmxSystem, request: Any) -> Fields:
     _check_size(task, values.size, samples)
     is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
     rows = values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
-    return {"samps_per_chan_written": write(task, rows, _start(request), deadline(request.timeout))}
+    return write(task, rows, request)
 
 
 def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
@@ -317,7 +311,7 @@ def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
     if len({row.size for row in rows}) != 1:
         raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
     _check_size(task, sum(row.size for row in rows), rows[0].size)
-    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), deadline(request.timeout))}
+    return write(task, np.stack(rows), request)
 
 
 def _read_what_fits(task: Task, request: Any) -> Reading:
@@ -346,22 +340,11 @@ def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
     return rows
 
 
-def _whole(reading: Reading) -> Reading:
-    """Return a complete reading; raise the status of an incomplete one, which the caller cannot use."""
-    if reading.status:
-        raise DaqmxRefusal(reading.status, samples_read=reading.samples)
-    return reading
-
-
 def _counts(task: Task, reading: Reading) -> NDArray[np.float64]:
     steps = np.array([[channel.volts_per_count] for channel in task.inputs])
     largest = 2 ** (task.inputs[0].inputs.bits - 1)
     counts: NDArray[np.float64] = np.clip(np.rint(reading.volts / steps), -largest, largest - 1)
     return counts
-
-
-def _start(request: Any) -> StartsItself:
-    return StartsItself.YES if request.auto_start else StartsItself.NO
 
 
 def _check_size(task: Task, size: int, samples: int) -> None:
