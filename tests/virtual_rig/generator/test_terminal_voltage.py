@@ -219,9 +219,9 @@ def test_the_built_in_dc_ignores_the_offset_and_a_flat_waveform_does_not():
 def test_a_welded_relay_keeps_playing_although_the_output_reports_off():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:OUTP ON")
-    rig.generator.weld_output_relay()
+    rig.generator.stick_output_relay(is_stuck=True)
     rig.send("OUTP OFF")
     assert rig.generator.execute(b"OUTP?").data == b"0\n"
     assert rig.render(512).max() == pytest.approx(1.0, rel=1e-3)
-    rig.generator.repair_output_relay()
+    rig.generator.stick_output_relay(is_stuck=False)
     assert not rig.render(512).any()

@@ -55,6 +55,8 @@ class Group:
     subjects: Callable[[DaqmxSystem, Any], Sequence[Any]]
     """Returns the objects of a request: the first one is read, all of them are set."""
     attributes: Callable[[Any], Attributes]
+    is_set_at_rest: bool = False
+    """Whether these properties cannot be set while the task runs."""
 
 
 # Functions that read and write properties
@@ -245,18 +247,19 @@ GROUPS = {
     "SystemInfo": Group("System", lambda system, _: [system], lambda _: SYSTEM),
     "Device": Group("Device", lambda system, request: [system.device(request.device_name)], lambda _: DEVICE),
     "Task": Group("Task", _task, lambda _: TASK),
-    "Timing": Group("Timing", _task, lambda _: TIMING),
-    "Trig": Group("Trigger", _task, lambda _: TRIGGER),
+    "Timing": Group("Timing", _task, lambda _: TIMING, is_set_at_rest=True),
+    "Trig": Group("Trigger", _task, lambda _: TRIGGER, is_set_at_rest=True),
     "Read": Group("Read", _task, lambda _: READ),
     "Write": Group("Write", _task, lambda _: WRITE),
-    "Buffer": Group("Buffer", _task, lambda _: BUFFER),
+    "Buffer": Group("Buffer", _task, lambda _: BUFFER, is_set_at_rest=True),
     "Chan": Group(
-        "Channel", _channels, lambda channel: OUTPUT if isinstance(channel, OutputChannel) else INPUT
+        "Channel",
+        _channels,
+        lambda channel: OUTPUT if isinstance(channel, OutputChannel) else INPUT,
+        is_set_at_rest=True,
     ),
 }
 """Groups, keyed by their part of the call names in the protocol."""
-SET_AT_REST = ("Timing", "Trig", "Buffer", "Chan")
-"""Groups that cannot be set while the task runs."""
 
 
 # From call to property, and from value to message
@@ -267,33 +270,38 @@ _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")
 
 def attribute_calls(system: DaqmxSystem) -> dict[str, Callable[[Any], Mapping[str, object]]]:
     """Return the calls that get and set properties of these groups, by their names in the protocol."""
-    made = {}
+    made: dict[str, Callable[[Any], Mapping[str, object]]] = {}
     for method in SERVICE.methods:
         found = _CALL.match(method.name)
         if found and found["scope"] in GROUPS:
-            make = _getter if found["verb"] == "Get" else _setter
-            made[method.name] = make(system, found["scope"], method.output_type)
+            group = GROUPS[found["scope"]]
+            is_read = found["verb"] == "Get"
+            made[method.name] = (
+                _getter(system, group, method.output_type) if is_read else _setter(system, group)
+            )
     return made
 
 
-def _getter(system: DaqmxSystem, scope: str, response: Any) -> Callable[[Any], Mapping[str, object]]:
-    group, row = GROUPS[scope], _finder(GROUPS[scope])
+def _getter(system: DaqmxSystem, group: Group, response: Any) -> Callable[[Any], Mapping[str, object]]:
+    find = _finder(group)
+    field = "value_raw" if "value_raw" in response.fields_by_name else "value"
 
     def get(request: Any) -> Mapping[str, object]:
         subject = group.subjects(system, request)[0]
-        return _fields(response, row(subject, request)[1].get(subject))
+        value = find(subject, request)[1].get(subject)
+        return {field: value.value if isinstance(value, Enum) else value}
 
     return get
 
 
-def _setter(system: DaqmxSystem, scope: str, _: Any) -> Callable[[Any], Mapping[str, object]]:
-    group, row = GROUPS[scope], _finder(GROUPS[scope])
+def _setter(system: DaqmxSystem, group: Group) -> Callable[[Any], Mapping[str, object]]:
+    find = _finder(group)
 
     def write(request: Any) -> Mapping[str, object]:
-        if scope in SET_AT_REST:
+        if group.is_set_at_rest:
             system.task(request.task.name).require_stopped()
         for subject in group.subjects(system, request):
-            name, attribute = row(subject, request)
+            name, attribute = find(subject, request)
             if attribute.set is None:
                 raise not_supported(name, "It can only be read.")
             has_raw = "value_raw" in request.DESCRIPTOR.fields_by_name
@@ -321,8 +329,3 @@ def _finder(group: Group) -> Callable[[Any, Any], tuple[str, Attribute]]:
         return f"{group.name}.{name}", attributes[name]
 
     return find
-
-
-def _fields(response: Any, value: object) -> Mapping[str, object]:
-    name = "value_raw" if "value_raw" in response.fields_by_name else "value"
-    return {name: value.value if isinstance(value, Enum) else value}

@@ -246,26 +246,22 @@ class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
     def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler | None:
         """Return the handler of a call; None for another service."""
         service, _, name = handler_call_details.method.removeprefix("/").partition("/")
-        method = SERVICE.methods_by_name.get(name) if service == SERVICE.full_name else None
-        return None if method is None else _rpc(method, self._unary, self._listening)
-
-
-def _rpc(method: Any, unary: dict[str, Handler], listening: dict[str, Handler]) -> grpc.RpcMethodHandler:
-    request, response = _message(method.input_type), _message(method.output_type)
-    if method.name in listening:
-        return grpc.unary_stream_rpc_method_handler(
-            listening[method.name], request.FromString, lambda message: message.SerializeToString()
+        method = SERVICE.methods_by_name.get(name)
+        if service != SERVICE.full_name or method is None:
+            return None
+        request, response = (
+            getattr(nidaqmx_pb2, each.name) for each in (method.input_type, method.output_type)
         )
+        if name in self._listening:
+            return grpc.unary_stream_rpc_method_handler(
+                self._listening[name], request.FromString, lambda message: message.SerializeToString()
+            )
 
-    def serialise(answer: Fields) -> bytes:
-        return bytes(response(**answer).SerializeToString())
+        def serialise(answer: Fields) -> bytes:
+            return bytes(response(**answer).SerializeToString())
 
-    handler = unary.get(method.name) or _not_simulated(method.name)
-    return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
-
-
-def _message(descriptor: Any) -> Any:
-    return getattr(nidaqmx_pb2, descriptor.name)
+        handler = self._unary.get(name) or _not_simulated(name)
+        return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
 
 
 def _not_simulated(name: str) -> Handler:

@@ -165,18 +165,11 @@ class AFG1022(ScpiInstrument):
 
     # Faults
 
-    def weld_output_relay(self) -> None:
-        """Make ``OUTP OFF`` ineffective, although it is accepted and reported as off."""
-        self._set_relay_stuck(stuck=True)
-
-    def repair_output_relay(self) -> None:
-        """Restore the function of the output relay."""
-        self._set_relay_stuck(stuck=False)
-
-    def _set_relay_stuck(self, *, stuck: bool) -> None:
+    def stick_output_relay(self, *, is_stuck: bool) -> None:
+        """Make ``OUTP OFF`` ineffective, although it is accepted and reported as off; or repair the relay."""
         now_s = self.clock()
         with self.lock:
-            self._output.relay_is_stuck = stuck
+            self._output.relay_is_stuck = is_stuck
             settings = self._channels[SOUNDING_CHANNEL]
             self._output.follow(settings, settings, now_s)
 

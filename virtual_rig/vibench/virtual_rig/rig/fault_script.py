@@ -91,8 +91,8 @@ class RigFaults:
 
     def stick_output(self) -> Heal:
         """Weld the generator's output relay: the output stays on although the generator reports off."""
-        self._generator.weld_output_relay()
-        return self._until(self._generator.repair_output_relay)
+        self._generator.stick_output_relay(is_stuck=True)
+        return self._until(lambda: self._generator.stick_output_relay(is_stuck=False))
 
     def turn_amplifier_gain(self, gain_db: float) -> Heal:
         """Set the amplifier's gain to a value other than the configured one."""
