@@ -8,7 +8,6 @@ own unit. `COMMANDS` names the source of each command.
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from enum import Enum
 from functools import partial
 
 import numpy as np
@@ -204,11 +203,6 @@ def modulation_switch(mode: RunMode) -> Command:
     )  # fmt: skip
 
 
-class _FrequencyMode(Enum):
-    FIXED = "CW"
-    SWEEP = "SWEep"
-
-
 def _shape_name(parameter: bytes) -> str:
     word = scpi.text(parameter)
     name = standard_shape(word) or scpi.memory_name(word)
@@ -355,9 +349,9 @@ COMMANDS = (
     Command(_DUTY.header, _DUTY.source, _write_duty, _DUTY.ask),
     Command("[SOURce#:]FREQuency:CONCurrent[:STATe]", "drivers",
         _write_lock, lambda generator, *_: b"1" if generator.frequencies_are_locked else b"0"),
-    choice("[SOURce#:]FREQuency:MODE", "IVI; sweep: not simulated", _FrequencyMode,
-        lambda s: _FrequencyMode.SWEEP if s.mode is RunMode.SWEEP else _FrequencyMode.FIXED,
-        lambda s, word: without_mode(RunMode.SWEEP, s, word is _FrequencyMode.SWEEP)),
+    choice("[SOURce#:]FREQuency:MODE", "IVI; sweep: not simulated", ("CW", "SWEep"),
+        lambda s: "SWEep" if s.mode is RunMode.SWEEP else "CW",
+        lambda s, word: without_mode(RunMode.SWEEP, s, word == "SWEep")),
     switch("[SOURce#:]BURSt[:STATe]", "IVI, drivers",
         lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on), channels=1),
     burst_cycles(50_000, channels=1),

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum, StrEnum
+from enum import StrEnum
 from operator import attrgetter
 
 import numpy as np
@@ -77,14 +77,14 @@ def standard_shape(word: str) -> str | None:
     return next((shape for known, shape in _WORDS.items() if mnemonic_matches(word, known)), None)
 
 
-class BurstMode(Enum):
+class BurstMode(StrEnum):
     """How a burst is started; nothing is connected to the gate input."""
 
     TRIGGERED = "TRIGgered"
     GATED = "GATed"
 
 
-class Trigger(Enum):
+class Trigger(StrEnum):
     """How a sweep is started, for generators that offer a choice."""
 
     IMMEDIATE = "IMMediate"

@@ -6,7 +6,6 @@ Source: Keysight Trueform Series Operating and Service Guide, as used by public 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -43,32 +42,12 @@ _QUIRKS = Quirks(
 )
 
 
-class _Shape(Enum):
-    SINE = "SINusoid"
-    ARBITRARY = "ARB"
-
-
-class _Unit(Enum):
-    VPP = "VPP"
-
-
-class _Order(Enum):
-    NORMAL = "NORMal"
-    SWAPPED = "SWAPped"
-
-
-class _Filter(Enum):
-    OFF = "OFF"
-    STEP = "STEP"
-    NORMAL = "NORMal"
-
-
 @dataclass(frozen=True)
 class _Settings(ChannelSettings):
     frequency_hz: float = 1e3
     amplitude_vpp: float = 0.2
-    order: _Order = _Order.NORMAL
-    filter: _Filter = _Filter.NORMAL
+    order: str = "NORMal"
+    filter: str = "NORMal"
 
 
 class Keysight33500B(AFG1022):
@@ -114,7 +93,7 @@ def _write_dac(own: Keysight33500B, _: int, parameters: Parameters) -> None:
 def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]:
     if parameters[0].startswith(b"#"):
         settings: Any = own.settings(1)
-        order = ">i2" if settings.order is _Order.NORMAL else "<i2"
+        order = ">i2" if settings.order == "NORMal" else "<i2"
         data = scpi.block(parameters[0])
         if len(data) % 2:
             raise scpi.ScpiError(scpi.ErrorCode.INVALID_BLOCK_DATA)
@@ -185,20 +164,21 @@ _SECONDS = {"": 1.0, "S": 1.0, "MS": 1e-3}
 # fmt: off
 _COMMANDS = (
     load_command("OUTPut#:LOAD"),
-    choice("[SOURce#:]FUNCtion", _GUIDE, _Shape,
-        lambda s: _Shape.ARBITRARY if s.shape == scpi.EDIT_MEMORY else _Shape.SINE,
-        lambda s, word: replace(s, shape=SINE if word is _Shape.SINE else scpi.EDIT_MEMORY)),
+    choice("[SOURce#:]FUNCtion", _GUIDE, ("SINusoid", "ARB"),
+        lambda s: "ARB" if s.shape == scpi.EDIT_MEMORY else "SINusoid",
+        lambda s, word: replace(s, shape=scpi.EDIT_MEMORY if word == "ARB" else SINE)),
     Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, *_: own.selected.encode()),
     Command("[SOURce#:]FUNCtion:ARBitrary:SRATe", _GUIDE, _write_rate,
         lambda own, channel, _: scpi.as_number(_rate_hz(own, channel))),
-    choice("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, _Filter,
+    choice("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, ("OFF", "STEP", "NORMal"),
         lambda s: s.filter, lambda s, word: replace(s, filter=word)),
     Command("[SOURce#:]DATA:ARBitrary:DAC", _GUIDE, _write_dac, None),
     Command("[SOURce#:]DATA:VOLatile:CLEar", _GUIDE, _clear, None),
     _attribute("POINts", len),
     _attribute("AVERage", lambda codes: float(np.mean(codes)) / _MIDDLE - 1),
-    choice("FORMat:BORDer", _GUIDE, _Order, lambda s: s.order, lambda s, word: replace(s, order=word)),
-    choice("[SOURce#:]VOLTage:UNIT", _GUIDE, _Unit, lambda _: _Unit.VPP, lambda s, _: s),
+    choice("FORMat:BORDer", _GUIDE, ("NORMal", "SWAPped"),
+        lambda s: s.order, lambda s, word: replace(s, order=word)),
+    choice("[SOURce#:]VOLTage:UNIT", _GUIDE, ("VPP",), lambda _: "VPP", lambda s, _: s),
     number("[SOURce#:]FREQuency:STARt", _GUIDE, "sweep_start_hz", scpi.FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=100e3, decimals=6),
     number("[SOURce#:]FREQuency:STOP", _GUIDE, "sweep_stop_hz", scpi.FREQUENCY_UNITS,

@@ -6,7 +6,7 @@ over hours (like a DDS accumulator that never overflows).
 """
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ class SteadyPhase:
         return NO_TIMES
 
 
-class Spacing(Enum):
+class Spacing(StrEnum):
     """Spacing of frequencies in a sweep."""
 
     LINEAR = "LINear"

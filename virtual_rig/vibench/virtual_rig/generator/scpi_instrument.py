@@ -3,10 +3,9 @@
 import math
 import socketserver
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Any, Protocol
 
 from . import scpi_message as scpi
@@ -78,24 +77,24 @@ def number(
 def choice(
     header: str,
     source: str,
-    words: type[Enum],
-    get: Callable[[Any], Enum],
+    words: Iterable[str],
+    get: Callable[[Any], str],
     put: Callable[[Any, Any], ChannelSettings],
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the command of a setting whose values are the words of an enum."""
+    """Return the command of a setting whose values are words, with the short form in capitals."""
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
         word = scpi.text(only(parameters))
         for candidate in words:
-            if scpi.mnemonic_matches(word, candidate.value):
+            if scpi.mnemonic_matches(word, candidate):
                 generator.configure(channel, put(generator.settings(channel), candidate))
                 return
         raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
 
     def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
         none(parameters)
-        return scpi.short_form(get(generator.settings(channel)).value).encode("ascii")
+        return scpi.short_form(get(generator.settings(channel))).encode("ascii")
 
     return Command(header, source, write, ask, channels)
 
