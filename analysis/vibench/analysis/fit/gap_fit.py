@@ -33,14 +33,25 @@ _LEAST_INTERVALS = 3
 
 @dataclass(frozen=True)
 class Onset:
-    """Onset of collisions in a sweep, and the gap from it."""
+    """Onset of collisions in a sweep or among dwells of one frequency, and the gap from it."""
 
-    recording: str
     frequency_hz: float
     gap_m: float
     low_m: float
     high_m: float
-    """Bounds of the gap from those of the edge, widened by uncertainties of drive and linear specimen."""
+
+
+def _narrowest(found: Sequence[Onset], linear: Specimen) -> FittedValue:
+    """Return the gap of the sharpest onset."""
+    best = min(found, key=lambda each: each.high_m / each.low_m)
+    return FittedValue(
+        parameter=Parameter.GAP,
+        value=best.gap_m,
+        low=best.low_m,
+        high=best.high_m,
+        sd=float("nan"),
+        nominal=min(linear.gaps_m),
+    )
 
 
 def fit_gap(
@@ -71,15 +82,7 @@ def fit_gap(
             "no sweep enters a region in which the masses collide, so the gap is undetermined; sweep with "
             "more drive, or start outside the region"
         )
-    best = min(found, key=lambda each: each.high_m / each.low_m)
-    return FittedValue(
-        parameter=Parameter.GAP,
-        value=best.gap_m,
-        low=best.low_m,
-        high=best.high_m,
-        sd=float("nan"),
-        nominal=min(linear.gaps_m),
-    )
+    return _narrowest(found, linear)
 
 
 def onsets(
@@ -88,7 +91,10 @@ def onsets(
     fit: SpecimenFit | None = None,
     confidence: float = DEFAULT_CONFIDENCE,
 ) -> Iterator[Onset]:
-    """Yield every onset of collisions in a sweep, with the gap that follows from it."""
+    """Yield every onset of collisions in a sweep, with the gap that follows from it.
+
+    The bounds are those of the edge, widened by uncertainties of drive and linear specimen.
+    """
     reach = float(norm.ppf(0.5 + 0.5 * confidence))
     rate = sweep.response.sweep_rate_hz_per_s
     for region in sweep.collisions.regions:
@@ -101,7 +107,6 @@ def onsets(
         at_edge = np.array([edge.frequency_hz])
         spread = reach * np.hypot(drive.relative_sd, _linear_spread(linear, fit, at_edge, rate))
         yield Onset(
-            recording=sweep.facts.name,
             frequency_hz=edge.frequency_hz,
             gap_m=float(drive.at(at_edge)[0] * np.abs(swept_relative(linear, at_edge, rate))[0]),
             low_m=float(np.min(filled) * np.exp(-spread)),
@@ -173,17 +178,6 @@ _SAME_HZ = 0.5
 """Dwells closer than this [Hz] have the same frequency."""
 
 
-@dataclass(frozen=True)
-class Bracket:
-    """Bounds of the gap from the dwells at one frequency."""
-
-    frequency_hz: float
-    low_m: float
-    """Largest relative motion without collisions."""
-    high_m: float
-    """Smallest linear relative motion with collisions."""
-
-
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
     """Return the gap as the geometric mean of the narrowest bracket.
 
@@ -195,22 +189,13 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
             "no frequency has both a dwell that does not collide and one that does, so dwells do not "
             "determine the gap; add one below and one above the onset"
         )
-    best = min(found, key=lambda each: each.high_m / each.low_m)
-    return FittedValue(
-        parameter=Parameter.GAP,
-        value=float(np.sqrt(best.low_m * best.high_m)),
-        low=best.low_m,
-        high=best.high_m,
-        sd=float("nan"),
-        nominal=min(linear.gaps_m),
-    )
+    return _narrowest(found, linear)
 
 
-def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Bracket]:
-    """Yield a bracket for every frequency with dwells with and without collisions.
+def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onset]:
+    """Yield the onset for every frequency with dwells with and without collisions.
 
-
-
+    The bounds are the largest relative motion without collisions, and the smallest linear one with them.
     Collisions disturb the base, so its linear motion in a colliding dwell is scaled from the largest dwell
     without collisions by the generator's setting.
     """
@@ -229,4 +214,4 @@ def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Brac
         volts = min(each.excitation.amplitude_vpp for each in colliding)
         high_m = low_m * volts / loudest.excitation.amplitude_vpp
         if high_m > low_m:
-            yield Bracket(at_hz, low_m, high_m)
+            yield Onset(at_hz, float(np.sqrt(low_m * high_m)), low_m, high_m)
