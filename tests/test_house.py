@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_310,
+    "acquisition": 28_284,
     "analysis": 32_646,
     "cli": 5_076,
     "extensions": 2_712,

@@ -1,18 +1,15 @@
 """Sines one after the other with a constant response: response-controlled stepped sines."""
 
-from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field, PositiveFloat
 
 from vibench.sim import PhaseReference
 
-from ..recording import SegmentLabel
 from .feedback import BaseLevel, HeldMetres, Share
 from .plan import AbstractFeedback
 from .settled_sine import GLIDE_TONE_S
 from .stepped_sine import FrequencySteps
-from .steps import Segment, Step, Tone
 
 
 class HeldResponse(FrequencySteps, AbstractFeedback):
@@ -24,7 +21,6 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     voltage, or that grow more slowly than feedback acts.
     """
 
-    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["held_response"] = "held_response"
     response_m: HeldMetres
     """Amplitude of m0's fundamental to be held [m]."""
@@ -59,13 +55,3 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
         steps_s = len(self.rising_hz) * (self.longest_wait_s + self.record_s)
         return passes * (steps_s + glides * GLIDE_TONE_S)
-
-    def segment(self, frequency_hz: float, direction: str) -> Segment:
-        """Return the segment of a step."""
-        return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
-
-    def steps(self) -> Iterator[Step]:
-        """Yield one step for every frequency of the list, without its wait, at the largest setting."""
-        for direction, frequencies_hz in self.passes():
-            for frequency_hz in frequencies_hz:
-                yield Step(Tone(frequency_hz), 0.0, self.record_s, self.segment(frequency_hz, direction))

@@ -93,18 +93,17 @@ def shaped_period(lines: Lines, peaks: Samples, points: int, seed: int, realisat
     Samples
         Shape (points,), in the unit of ``peaks``.
     """
+    return _smoothest(lines, realisation, seed, points, peaks) * (points / 2)
+
+
+def _smoothest(
+    lines: Lines, realisation: int, seed: int, points: int, peaks: Samples | float = 1.0
+) -> Samples:
     candidates = [_period(lines, seed, (realisation, each), points, peaks) for each in range(CANDIDATES)]
-    return min(candidates, key=lambda period: float(np.max(np.abs(period)))) * (points / 2)
-
-
-def _smoothest(lines: Lines, realisation: int, seed: int, points: int) -> Samples:
-    candidates = [_period(lines, seed, (realisation, candidate), points) for candidate in range(CANDIDATES)]
     return min(candidates, key=lambda period: float(np.max(np.abs(period))))
 
 
-def _period(
-    lines: Lines, seed: int, key: tuple[int, ...], points: int, peaks: Samples | float = 1.0
-) -> Samples:
+def _period(lines: Lines, seed: int, key: tuple[int, ...], points: int, peaks: Samples | float) -> Samples:
     random = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
     spectrum = np.zeros(points // 2 + 1, dtype=np.complex128)
     spectrum[lines] = peaks * np.exp(2j * np.pi * random.random(len(lines))) / hold_droop(lines, points)

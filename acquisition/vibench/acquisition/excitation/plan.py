@@ -55,36 +55,8 @@ class SignalPreview:
         return self.peak_v / self.rms_v
 
 
-def signal_preview(
-    steps: Iterable[Step],
-    amplitude_vpp: float,
-    sample_rate_hz: float,
-    highest_frequency_hz: float,
-    duration_s: float,
-) -> SignalPreview:
-    """Sample ``steps`` one after the other; a tone continues the phase of the one before it."""
-    if sample_rate_hz <= 2 * highest_frequency_hz:
-        raise ConfigurationError(
-            f"a preview at {sample_rate_hz:g} samples/s cannot show {highest_frequency_hz:g} Hz; "
-            f"ask for more than {2 * highest_frequency_hz:g} samples/s"
-        )
-    volts = 0.5 * amplitude_vpp * _sample(steps, sample_rate_hz)
-    one_sided = np.abs(np.fft.rfft(volts)) * 2 / len(volts)
-    one_sided[0] /= 2
-    if len(volts) % 2 == 0:
-        one_sided[-1] /= 2
-    return SignalPreview(
-        time_s=np.arange(len(volts)) / sample_rate_hz,
-        volts=volts,
-        frequency_hz=np.asarray(np.arange(len(one_sided)) * sample_rate_hz / len(volts), dtype=np.float64),
-        spectrum_v=one_sided,
-        rms_v=float(np.sqrt(np.mean(volts**2))),
-        peak_v=float(np.max(np.abs(volts))),
-        duration_s=duration_s,
-    )
-
-
 def _sample(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
+    """Sample steps one after the other; a tone continues the phase of the one before it."""
     pieces: list[Samples] = []
     elapsed_s = 0.0
     first = 0
@@ -275,12 +247,25 @@ class AbstractExcitation(FrozenModel, ABC):
 
         Raises ConfigurationError when ``sample_rate_hz`` is too low to show the highest frequency.
         """
-        return signal_preview(
-            self.shown_steps(),
-            self.amplitude_vpp,
-            sample_rate_hz,
-            self.highest_frequency_hz,
-            self.playing_s,
+        highest_hz = self.highest_frequency_hz
+        if sample_rate_hz <= 2 * highest_hz:
+            raise ConfigurationError(
+                f"a preview at {sample_rate_hz:g} samples/s cannot show {highest_hz:g} Hz; "
+                f"ask for more than {2 * highest_hz:g} samples/s"
+            )
+        volts = 0.5 * self.amplitude_vpp * _sample(self.shown_steps(), sample_rate_hz)
+        one_sided = np.abs(np.fft.rfft(volts)) * 2 / len(volts)
+        one_sided[0] /= 2
+        if len(volts) % 2 == 0:
+            one_sided[-1] /= 2
+        return SignalPreview(
+            time_s=np.arange(len(volts)) / sample_rate_hz,
+            volts=volts,
+            frequency_hz=np.asarray(np.arange(len(one_sided)) * sample_rate_hz / len(volts), np.float64),
+            spectrum_v=one_sided,
+            rms_v=float(np.sqrt(np.mean(volts**2))),
+            peak_v=float(np.max(np.abs(volts))),
+            duration_s=self.playing_s,
         )
 
 

@@ -1,6 +1,5 @@
 """Sines one after the other, each recorded when its motion has settled."""
 
-from collections.abc import Iterator
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
@@ -9,7 +8,6 @@ from ..recording import SegmentLabel
 from .feedback import BaseLevel, JumpSearch, Settling
 from .plan import AbstractFeedback
 from .stepped_sine import FrequencySteps
-from .steps import Segment, Step, Tone
 
 MOST_SETTLED_STEPS = 600
 """Largest number of steps: four events a step, and as many for searches, fit into a recording's table."""
@@ -59,10 +57,3 @@ class SettledSine(FrequencySteps, AbstractFeedback):
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
         searches = 0 if self.jumps is None else self.jumps.most_searches
         return passes * (steps_s + glides * GLIDE_TONE_S + searches * self.search_s)
-
-    def steps(self) -> Iterator[Step]:
-        """Yield one step for every frequency of the list, without its wait, at the largest setting."""
-        for direction, frequencies_hz in self.passes():
-            for frequency_hz in frequencies_hz:
-                segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
-                yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)

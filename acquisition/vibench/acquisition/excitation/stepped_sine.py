@@ -109,6 +109,22 @@ class FrequencySteps(AbstractExcitation):
         """Yield each pass through the list: its direction, and its frequencies in the order played [Hz]."""
         return self.direction.ways(self.rising_hz)
 
+    @property
+    def planned_wait_s(self) -> float:
+        """Wait before each recording that the plan fixes; zero where feedback ends the wait [s]."""
+        return 0.0
+
+    def segment(self, frequency_hz: float, direction: str) -> Segment:
+        """Return the segment of a step; the direction separates those of a turning point."""
+        return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
+
+    def steps(self) -> Iterator[Step]:
+        """Yield one step for every frequency, in the order of time, with the wait that the plan fixes."""
+        for direction, frequencies_hz in self.passes():
+            for each_hz in frequencies_hz:
+                segment = self.segment(each_hz, direction)
+                yield Step(Tone(each_hz), self.planned_wait_s, self.record_s, segment)
+
 
 class SteppedSine(FrequencySteps):
     """A list of frequencies; each is played until it has settled, then recorded as a separate segment.
@@ -128,10 +144,7 @@ class SteppedSine(FrequencySteps):
         passes = sum(1 for _ in self.passes())
         return passes * len(self.rising_hz) * (self.settle_s + self.record_s)
 
-    def steps(self) -> Iterator[Step]:
-        """Yield one step for every frequency, in the order of time."""
-        for direction, frequencies_hz in self.passes():
-            for frequency_hz in frequencies_hz:
-                # The direction separates the segments of the turning point of an up and down pass.
-                segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
-                yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)
+    @property
+    def planned_wait_s(self) -> float:
+        """The settling time [s]."""
+        return self.settle_s
