@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_284,
-    "analysis": 32_646,
+    "analysis": 32_629,
     "cli": 5_076,
     "extensions": 2_712,
     "gui": 12_449,

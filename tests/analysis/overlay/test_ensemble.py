@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from vibench.analysis.overlay.draws import Draw, DrawSource, drawn
+from vibench.analysis.overlay.draws import Draw, DrawSource, SimulatedRun, drawn
 from vibench.analysis.overlay.driven_rig import Driven
 from vibench.analysis.overlay.ensemble import (
     Ending,
@@ -173,8 +173,7 @@ def test_draws_stop_at_clear_agreement_unless_more_than_usual_are_requested(requ
         value = np.exp(0.1 * np.random.default_rng(number).standard_normal(3))
         return Draw(lambda: number, (Quantity("q", FREQUENCY_HZ[:3], value),), (), 100.0, 1.0)
 
-    source = DrawSource(
-        gong2025(), Driven.GENERATOR, Accuracy.STANDARD, None, requested, 1000, "", lambda number: number
-    )
+    run = SimulatedRun(gong2025(), Driven.GENERATOR, Accuracy.STANDARD, None)
+    source = DrawSource(run, requested, 1000, lambda number: number)
     found = drawn(source, estimate, [Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)))])
     assert (found.run.draws, len(found.quantities), found.response) == (made, made, 0)

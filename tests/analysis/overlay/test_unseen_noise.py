@@ -42,9 +42,9 @@ def test_draws_include_unrecorded_amplifier_noise(recording):
     measured = noise_power(recording.read("base_acceleration"), rate_hz)
     # 0.1 s of silence shows the noise's power to 15 %.
     assert np.mean(drawn) == pytest.approx(measured, rel=0.2)
-    assert source.why == ""
+    assert source.run.why == ""
 
 
 def test_a_twin_reports_unknown_amplifier_noise(recording):
     unheard = replace(recording, segments=())
-    assert "noise of the amplifier is unknown" in voltage_source(unheard, specimen_of(RIG)).why
+    assert "noise of the amplifier is unknown" in voltage_source(unheard, specimen_of(RIG)).run.why

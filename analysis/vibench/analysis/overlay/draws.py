@@ -163,12 +163,12 @@ class SimulatedRun:
     """Accuracy of contacts under a recorded base motion; standard under a voltage."""
     base_band_hz: tuple[float, float] | None
     """Band of the driving base displacement; None under a voltage."""
-    draws: int
-    impacts: float
-    """Number of contacts during the analysed parts, mean over the draws."""
-    played_s: float
     why: str = ""
     """Reason why the recorded voltage was not used, or remarks on the rig."""
+    draws: int = 0
+    impacts: float = 0.0
+    """Number of contacts during the analysed parts, mean over the draws."""
+    played_s: float = 0.0
 
     @property
     def smaller_gap_m(self) -> float:
@@ -210,13 +210,10 @@ class Drawn(Generic[R]):
 class DrawSource:
     """Source of draws, reproducible by number."""
 
-    specimen: Specimen
-    driven: Driven
-    accuracy: Accuracy
-    base_band_hz: tuple[float, float] | None
+    run: SimulatedRun
+    """Facts of the simulation before the first draw."""
     most: int
     samples: int
-    why: str
     channels: Callable[[int], SimulatedChannels]
 
 
@@ -247,16 +244,9 @@ def voltage_source(
     known = unseen_noise(channels, rig, noise)
     unseen, noise = known or (UnseenNoise(), noise)
     why = ["" if fitted is None else fitted.sentence, "" if known else UNKNOWN_NOISE]
-    return DrawSource(
-        specimen=specimen,
-        driven=rig.driven,
-        accuracy=Accuracy.STANDARD,
-        base_band_hz=None,
-        most=draws,
-        samples=recording.samples,
-        why=". ".join(filter(None, why)),
-        channels=partial(_drawn_channels, channels, rig, fitted, voltage, noise, unseen),
-    )
+    run = SimulatedRun(specimen, rig.driven, Accuracy.STANDARD, None, ". ".join(filter(None, why)))
+    drawn_channels = partial(_drawn_channels, channels, rig, fitted, voltage, noise, unseen)
+    return DrawSource(run, draws, recording.samples, drawn_channels)
 
 
 def base_source(
@@ -266,7 +256,8 @@ def base_source(
     channels = under_base_motion(recording, measurement, specimen, accuracy)
     rate = recording.sample_rate_hz
     band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
-    return DrawSource(specimen, Driven.BASE, accuracy, band, 1, channels.samples, why, lambda _: channels)
+    run = SimulatedRun(specimen, Driven.BASE, accuracy, band, why)
+    return DrawSource(run, 1, channels.samples, lambda _: channels)
 
 
 def drawn(
@@ -304,16 +295,8 @@ def drawn(
                 break
             stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
             found += pool.map(estimated, range(len(found), stop))
-    run = SimulatedRun(
-        specimen=source.specimen,
-        driven=source.driven,
-        accuracy=source.accuracy,
-        base_band_hz=source.base_band_hz,
-        draws=len(found),
-        impacts=float(np.mean([each.impacts for each in found])),
-        played_s=found[0].played_s,
-        why=source.why,
-    )
+    impacts = float(np.mean([each.impacts for each in found]))
+    run = replace(source.run, draws=len(found), impacts=impacts, played_s=found[0].played_s)
     return Drawn(
         run, responses[0], tuple(each.quantities for each in found), tuple(each.endings for each in found)
     )
