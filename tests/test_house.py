@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_284,
-    "analysis": 32_629,
-    "cli": 5_076,
+    "acquisition": 28_280,
+    "analysis": 32_612,
+    "cli": 5_069,
     "extensions": 2_712,
     "gui": 12_449,
     "native": 6_625,
     "sim": 20_603,
     "studies": 3_182,
-    "virtual_rig": 7_600,
+    "virtual_rig": 7_577,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

@@ -128,11 +128,7 @@ def _operator_at_terminal() -> str:
 
 @_allow_interrupt()
 def _configure(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
-    return configure(template, target, seen, _ask, note, refuse=_report_refusal)
-
-
-def _report_refusal(error: ConfigurationError) -> None:
-    console.print(f"! {error}")
+    return configure(template, target, seen, _ask, note, refuse=lambda error: console.print(f"! {error}"))
 
 
 def _confirm_wire(target: Path, pair: str) -> str:

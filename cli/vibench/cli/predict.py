@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -16,7 +16,6 @@ from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import (
     BUDGET_S,
     Ensemble,
-    FoundMotion,
     Observable,
     Outcome,
     Rest,
@@ -259,7 +258,12 @@ def _share_text(point: ScenePrediction) -> str:
 
 def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
     """Return a table of the motions at points with several motions; None without such a point."""
-    several = list(_several(points))
+    several = [
+        (point, motion)
+        for point in points
+        if point.ensemble is not None and point.is_one_of_several
+        for motion in point.ensemble.motions
+    ]
     if not several:
         return None
     rows = Table(
@@ -296,10 +300,3 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
         f"{text} There {starts} starts were simulated for {followed_s:.0f} s in all; "
         f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
     )
-
-
-def _several(points: Sequence[ScenePrediction]) -> Iterator[tuple[ScenePrediction, FoundMotion]]:
-    for point in points:
-        if point.ensemble is not None and point.is_one_of_several:
-            for motion in point.ensemble.motions:
-                yield point, motion

@@ -25,7 +25,7 @@ from ..campaign import (
 )
 from ..check.admission import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
-from ..plan import Campaign, OnChange
+from ..plan import OnChange
 from ..rig import Confirm, Rig
 from ..stopping.program import stop_on_signal
 from ..stopping.stop import DRIVES_ON, Cause, StopSwitch
@@ -155,7 +155,9 @@ class Engine:
             on_event(event)
 
         self.published.begin(request.campaign, request.folder)
-        if request.twin is TwinSwitch.ON or _may_end_by_change(request.campaign):
+        plans = (each for _, each in request.campaign.recordings())
+        may_end_by_change = any(each.limits.on_changed_specimen is OnChange.STOP for each in plans)
+        if request.twin is TwinSwitch.ON or may_end_by_change:
             self.turn_twin(TwinSwitch.ON)
         try:
             # Before the check of the bench: a plan that cannot be played is refused before anything moves.
@@ -233,10 +235,6 @@ class Engine:
         finally:
             self.published.bench(None)
             self.turn_twin(TwinSwitch.OFF)
-
-
-def _may_end_by_change(campaign: Campaign) -> bool:
-    return any(each.limits.on_changed_specimen is OnChange.STOP for _, each in campaign.recordings())
 
 
 def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:

@@ -47,9 +47,7 @@ class AdoptedEngine(ClosedOnLeaving):
         with suppress(EngineGone):
             self.client.shutdown()
         self.client.close()
-        give_up_s, pause = monotonic() + LEAVING_S, Event()
-        while self._announcement.is_alive and monotonic() < give_up_s:
-            pause.wait(LOOK_S)
+        _until(lambda: not self._announcement.is_alive, LEAVING_S)
 
 
 def left_alone() -> Announcement | None:

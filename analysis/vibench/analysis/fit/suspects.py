@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -122,17 +123,17 @@ def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumpti
     top_hz = float(lines.frequency_hz.max())
     starts = (float(np.log(1.3 * top_hz)), float(np.log(2.5 * top_hz)))
     low_hz = float(lines.frequency_hz.min())
-    for model, where in ((_on_m0, "on m0"), (_on_m2, "on m2")):
+    for mass in (0, 2):
         yield (
             Assumption.EXTRA_MODE,
             Freedom(
                 (),
-                model,
+                partial(_on_mass, mass),
                 tuple((each, *_MODE_START) for each in starts),
                 (float(np.log(low_hz)), *np.log(_MODE_LOW)),
                 (float(np.log(_HIGHEST_HZ)), *np.log(_MODE_HIGH)),
             ),
-            _resonates(where),
+            _resonates(f"on m{mass}"),
         )
     yield (
         Assumption.EXTRA_MODE,
@@ -188,16 +189,9 @@ def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
     return np.asarray(-share * mass * (2 * np.pi * frequency_hz) ** 2 * spring / (spring - ratio**2))
 
 
-def _on_m0(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return loaded_response(
-        specimen, frequency_hz, (_absorber(specimen.masses[0], frequency_hz, further), 0.0)
-    )
-
-
-def _on_m2(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return loaded_response(
-        specimen, frequency_hz, (0.0, _absorber(specimen.masses[2], frequency_hz, further))
-    )
+def _on_mass(mass: int, specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
+    absorber = _absorber(specimen.masses[mass], frequency_hz, further)
+    return loaded_response(specimen, frequency_hz, (absorber, 0.0) if mass == 0 else (0.0, absorber))
 
 
 def _under_foot(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:

@@ -105,7 +105,8 @@ class _Search:
         while looked + block < stop:
             model = motion_model(self._current(), self._motion)
             if at is None:
-                begun = acquire(self._inflated(model), self._motion, looked)
+                inflated = replace(model, velocity_variance=self._inflation() * model.velocity_variance)
+                begun = acquire(inflated, self._motion, looked)
                 match begun:
                     case str():
                         # Report the first reason; the last one is always the end of the motion.
@@ -147,9 +148,6 @@ class _Search:
     def _inflation(self) -> float:
         followed_s = self._followed / self._motion.sample_rate_hz
         return next(factor for until_s, factor in _SCHEDULE if followed_s < until_s)
-
-    def _inflated(self, model: MotionModel) -> MotionModel:
-        return replace(model, velocity_variance=self._inflation() * model.velocity_variance)
 
     def _with_parameters(self, begun: FilterState) -> FilterState:
         size = STATES + len(self._wanted)

@@ -284,7 +284,8 @@ class LiveView:
         self.levels = self._meters.add(fresh / self._units_per_volt)
         if self._response in self._rows:
             self._impacts.add(fresh[self._rows[self._response]])
-        if self._has(DRIVE, BASE, self._response) and self._is_point_due():
+        is_point_due = self._ring.next_sample - self._pointed >= _POINT_EVERY_S * self._rate_hz
+        if self._has(DRIVE, BASE, self._response) and is_point_due:
             self._add_point()
 
     def time_histories(self, span_s: float, columns: int) -> TimeHistories:
@@ -351,9 +352,6 @@ class LiveView:
 
     def _has(self, *roles: str) -> bool:
         return all(role in self._rows for role in roles)
-
-    def _is_point_due(self) -> bool:
-        return self._ring.next_sample - self._pointed >= _POINT_EVERY_S * self._rate_hz
 
     def _add_point(self) -> None:
         self._pointed = self._ring.next_sample

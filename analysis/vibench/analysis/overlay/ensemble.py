@@ -170,15 +170,12 @@ class EnsembleCurve(Labelled):
                 f"{self.lower[0]:.4g} to {self.upper[0]:.4g}; rank {self.rank[0]} of {self.count[0]}, z = "
                 f"{self.z[0]:+.1f}{limit})"
             )
+        worst_hz = self.frequency_hz[np.nanargmax(np.abs(self.z))]
         return (
             f"{self.name}: {100 * self.share_in_band:.0f} % of {self.compared} values within the twin's 95 % "
-            f"band, largest |z| {abs(self.largest_z):.1f} at {self._worst_hz:.4g} Hz, {verdict} the limit "
+            f"band, largest |z| {abs(self.largest_z):.1f} at {worst_hz:.4g} Hz, {verdict} the limit "
             f"of {self.limit:.1f}"
         )
-
-    @property
-    def _worst_hz(self) -> float:
-        return float(self.frequency_hz[np.nanargmax(np.abs(self.z))])
 
     @cached_property
     def _z_of_draws(self) -> Reals:

@@ -60,7 +60,8 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
     approach = measurement.excitation.approach
     match approach:
         case Approach.REST:
-            grid, each_s = _thin_grid(prediction_grid(specimen, low_hz, high_hz)), SIMULATED_S
+            grid, each_s = prediction_grid(specimen, low_hz, high_hz), SIMULATED_S
+            grid = grid[:: -(-len(grid) // MOST_POINTS)]
         case Approach.UP | Approach.DOWN:
             grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
     base = base_motion(measurement.excitation, rig, grid)
@@ -76,8 +77,3 @@ def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float]
     change = np.diff(np.concatenate([[0], np.asarray(is_inside, dtype=np.int64), [0]]))
     starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
     return tuple((float(lows[a]), float(highs[b])) for a, b in zip(starts, ends, strict=True))
-
-
-def _thin_grid(grid: Reals) -> Reals:
-    step = -(-len(grid) // MOST_POINTS)
-    return np.asarray(grid[::step])

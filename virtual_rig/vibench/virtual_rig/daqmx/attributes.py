@@ -63,7 +63,7 @@ class Group:
 
 
 def _field(name: str, convert: Callable[[Any], object] = lambda value: value) -> Callable[[Any, Any], None]:
-    """Return a function that sets a field of a channel."""
+    """Return a function that sets a field of a channel or task."""
 
     def write(thing: object, value: object) -> None:
         setattr(thing, name, convert(value))
@@ -142,10 +142,6 @@ def _set_regeneration(task: Task, mode: int) -> None:
     task.regeneration = member(RegenerationMode, mode, "Write_RegenMode")
 
 
-def _set_input_buffer(task: Task, size: int) -> None:
-    task.input_size = size
-
-
 def _set_output_buffer(task: Task, size: int) -> None:
     check_memory(size, len(task.outputs))
     task.output_size = size
@@ -201,7 +197,7 @@ WRITE: Attributes = {
     "TOTAL_SAMP_PER_CHAN_GENERATED": Attribute(_total_generated),
 }
 BUFFER: Attributes = {
-    "INPUT_BUF_SIZE": Attribute(lambda task: task.buffer_size, _set_input_buffer),
+    "INPUT_BUF_SIZE": Attribute(lambda task: task.buffer_size, _field("input_size")),
     "OUTPUT_BUF_SIZE": Attribute(lambda task: task.output_buffer.size, _set_output_buffer),
 }
 INPUT: Attributes = {

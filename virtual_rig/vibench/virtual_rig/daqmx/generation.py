@@ -69,11 +69,12 @@ class Generation(Stream):
         self.delivered = 0
         self._world = world
         self._outputs = outputs
-        self._repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
+        self.repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
+        """Whether the buffer is played again and again; if not, every sample is played once."""
         self._idle = device.idle
         self._memory = np.empty((len(outputs), 0))
         """Samples in the device's memory; a repeated buffer is not transferred ahead."""
-        self._most_in_memory = 0 if self._repeats else device.memory
+        self._most_in_memory = 0 if self.repeats else device.memory
         self._fetched = 0
         self._recent = np.empty((len(outputs), 0))
         self._is_open = True
@@ -81,7 +82,7 @@ class Generation(Stream):
     @property
     def space(self) -> int:
         """Samples per channel that can be written now; a repeated buffer can always be rewritten."""
-        if self._repeats:
+        if self.repeats:
             return self.buffer.size
         self._fetch(self.delivered + self._most_in_memory)
         return self.buffer.size - (self.buffer.written - self._fetched)
@@ -90,11 +91,6 @@ class Generation(Stream):
         """Return the rig time at which ``samples`` can be written [s]."""
         left = self.buffer.written + samples - self.buffer.size - self._most_in_memory
         return self.time_of(max(0, left)) - LEAD_S
-
-    @property
-    def uses_up_its_buffer(self) -> bool:
-        """Whether every sample is played only once."""
-        return not self._repeats
 
     def prepare(self, until_s: float) -> None:
         """Pass the samples up to rig time ``until_s``, plus a lead, to the world."""
@@ -120,7 +116,7 @@ class Generation(Stream):
 
     @property
     def _end(self) -> float:
-        return math.inf if self._repeats and self.buffer.filled else self.buffer.written
+        return math.inf if self.repeats and self.buffer.filled else self.buffer.written
 
     def advance_to(self, now_s: float) -> None:
         """Update the number of played samples at rig time ``now_s``, and detect an underflow."""

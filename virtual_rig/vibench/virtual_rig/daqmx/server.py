@@ -114,9 +114,8 @@ class DaqServer:
         self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
         guards = () if token is None else (TokenRequired(token),)
         self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
-        self._server.add_generic_rpc_handlers(
-            (_Service(self._unary_calls(), self._listening_calls()), *handlers)
-        )
+        listening = {name: self._listen(name, partial(call, self._system)) for name, call in EVENTS.items()}
+        self._server.add_generic_rpc_handlers((_Service(self._unary_calls(), listening), *handlers))
         try:
             port = self._server.add_insecure_port(address)
         except RuntimeError as error:
@@ -163,9 +162,6 @@ class DaqServer:
         for name, call in {**CALLS, **DATA_CALLS}.items():
             calls[name] = partial(call, self._system)
         return {name: self._answer(name, call) for name, call in calls.items()}
-
-    def _listening_calls(self) -> dict[str, Handler]:
-        return {name: self._listen(name, partial(call, self._system)) for name, call in EVENTS.items()}
 
     def _answer(self, name: str, call: Callable[[Any], Fields]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Fields:

@@ -389,7 +389,7 @@ class Task:
         self.rig.disarm(self._reference_edge)
         if self.stream is not None:
             self.rig.end(self.stream)
-        if self.generation is not None and self.generation.uses_up_its_buffer:
+        if self.generation is not None and not self.generation.repeats:
             self.buffer = None
         self.acquisition = self.generation = self.log = None
         self.state = self._rests_in

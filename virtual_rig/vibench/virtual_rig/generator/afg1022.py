@@ -260,7 +260,7 @@ def _load_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
 
 
 def _read_memory(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
-    return scpi.as_block(scpi.big_endian(generator.memory.codes(_memory(only(parameters)))))
+    return scpi.as_block(generator.memory.codes(_memory(only(parameters))).astype(">u2").tobytes())
 
 
 def _define_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:

@@ -432,11 +432,6 @@ def memory_name(word: str) -> str | None:
     return None
 
 
-def big_endian(codes: Codes) -> bytes:
-    """Return codes in the byte order of transfers."""
-    return codes.astype(">u2").tobytes()
-
-
 def _blank(points: int) -> Codes:
     codes = np.full(points, _MIDDLE_CODE, dtype=np.uint16)
     codes.flags.writeable = False

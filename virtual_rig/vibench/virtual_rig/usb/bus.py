@@ -394,17 +394,13 @@ class _usb_errors:  # noqa: N801 - reads as a verb where it is used
 _BUS = UsbBus()
 
 
-def _bus(find_library: object = None) -> UsbBus:  # noqa: ARG001 - signature of PyUSB's get_backend
-    return _BUS
-
-
 def install() -> None:
     """Make PyUSB, and thus pyvisa-py, use the virtual bus in this process.
 
     Without libusb, pyvisa-py registers no USB sessions at its first import; in that case they are registered
     now. May be called repeatedly; ``plug_in`` calls it.
     """
-    usb.backend.libusb1.get_backend = _bus
+    usb.backend.libusb1.get_backend = lambda find_library=None: _BUS  # noqa: ARG005 - PyUSB's signature
     if "pyvisa_py" in sys.modules and "pyvisa_py.usb" not in sys.modules:
         importlib.import_module("pyvisa_py.usb")
 

@@ -307,8 +307,9 @@ class Conversion:
 
     def read(self, count: int) -> FloatArray:
         """Return the next ``count`` samples, shape (inputs, count) [V]; the world advances as necessary."""
-        self._advance(self._step_after(self._handed_out + count))
         self._handed_out += count
+        steps = int(np.ceil(self._handed_out * self._steps_per_sample - _ROUNDING))
+        self._advance(self._start_step + steps)
         return self._waiting.take(count)
 
     def overloaded(self) -> NDArray[np.bool_]:
@@ -337,9 +338,6 @@ class Conversion:
         if count:
             self._waiting.append(np.array(parts))
         self._converted = complete
-
-    def _step_after(self, samples: int) -> int:
-        return self._start_step + int(np.ceil(samples * self._steps_per_sample - _ROUNDING))
 
 
 _ROUNDING = 1e-6
