@@ -251,7 +251,6 @@ def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
         yield from stepping.carry_out(frequencies_hz, came_from)
         came_from = f"{direction} pass {number}, {frequencies_hz[-1]:g} Hz"
     yield from loop.ramp_down()
-    yield from loop.say()
 
 
 class Pass:

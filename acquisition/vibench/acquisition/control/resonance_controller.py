@@ -116,7 +116,6 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
         followed = (yield from _go_on(loop, plan, number, last, last.mode)) if last.mode else None
         last = followed or (yield from _search(loop, plan, number, last))
     yield from loop.ramp_down()
-    yield from loop.say()
 
 
 def _go_on(

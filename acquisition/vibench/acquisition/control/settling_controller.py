@@ -303,7 +303,6 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
             loop.change(plan.frequency_hz, next_vpp)
     loop.note(DwellNote(segment=SegmentLabel.DWELL, looks=pieces, looks_outside=outside))
     yield from loop.ramp_down()
-    yield from loop.say()
 
 
 def record_settled(
@@ -372,7 +371,6 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
         SweepNote(segment=SegmentLabel.SWEEP, steps=steps, steps_outside=outside, average_s=plan.average_s)
     )
     yield from loop.ramp_down()
-    yield from loop.say()
 
 
 def _excursion(

@@ -183,8 +183,9 @@ class SineLoop:
         yield from self.run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
-        """End the drive."""
+        """End the drive, and write all pending notes."""
         yield from self.run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
+        yield from self.say()
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
         """Continue the drive for a while, and evaluate it."""
@@ -221,11 +222,12 @@ _GLIDE_MEMORY_S = 0.5
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
     """Ramp up at a frequency to the level, by the rig's model; without level, to the plan's setting."""
-    setting_vpp = loop.most_vpp
-    if level is not None:
-        guess_vpp = _bare_vpp(loop, level, frequency_hz)
-        setting_vpp = loop.bounded_vpp(guess_vpp)
-    loop.change(frequency_hz, setting_vpp)
+    wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
+    yield from _start_at(loop, frequency_hz, wanted_vpp)
+
+
+def _start_at(loop: SineLoop, frequency_hz: float, wanted_vpp: float) -> Controller[None]:
+    loop.change(frequency_hz, loop.bounded_vpp(wanted_vpp))
     yield from loop.listen_to_silence()
     yield from loop.ramp_up()
 
@@ -302,9 +304,7 @@ _IN_A_ROW = 2
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
     """Begin quietly, bring m0 to its amplitude at each frequency, record, ramp down (decision 0066)."""
     passes = tuple(plan.passes())
-    loop.change(passes[0][1][0], loop.bounded_vpp(plan.start_share * loop.most_vpp))
-    yield from loop.listen_to_silence()
-    yield from loop.ramp_up()
+    yield from _start_at(loop, passes[0][1][0], plan.start_share * loop.most_vpp)
     for direction, frequencies_hz in passes:
         for frequency_hz in frequencies_hz:
             if frequency_hz != loop.setting.frequency_hz:
@@ -312,7 +312,6 @@ def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
             yield from _bring_to_response(loop, plan)
             yield from _record(loop, plan, frequency_hz, direction)
     yield from loop.ramp_down()
-    yield from loop.say()
 
 
 def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
