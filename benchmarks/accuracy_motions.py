@@ -242,13 +242,13 @@ class MotionBenchmark:
         """Sentence that recommends a level."""
         match self.motion.regime:
             case Regime.FREE:
-                return "Flight is exact: all levels are the same."
+                return "Motion without contact is exact: all levels are the same."
             case Regime.PERIODIC | Regime.TRANSIENT:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
-                    "Quick is as good as any: with the start of the motion Response I scatters by "
-                    f"{self.levels[0].response_i_scatter:.1%}, which no accuracy lessens."
+                    "Quick is sufficient: from start to start Response I "
+                    f"scatters by {self.levels[0].response_i_scatter:.1%}, which no level reduces."
                 )
 
     @property
@@ -263,17 +263,17 @@ class MotionBenchmark:
     def _periodic_advice(self) -> str:
         quick, standard, reference = self.levels
         steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
-        errors = f"{steps} of the state"
+        errors = f"{steps} in the state"
         price = f"costs {reference.cost / quick.cost:.1f} times the first"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
-                return f"Each level buys digits: {errors}; the last {price}."
+                return f"Each level reduces the error: {errors}; the last {price}."
             case [Accuracy.STANDARD]:
-                return f"Standard is no better than quick, reference is: {errors}; the last {price}."
+                return f"Only reference reduces the error: {errors}; the last {price}."
             case [Accuracy.REFERENCE]:
-                return f"Standard buys digits, reference no more: {errors}; the last {price}."
+                return f"Standard reduces the error, reference does not: {errors}; the last {price}."
             case _:
-                return f"No level buys digits: {errors}; the last {price}."
+                return f"No level reduces the error: {errors}; the last {price}."
 
 
 def _is_better(level: LevelFigures, before: LevelFigures) -> bool:

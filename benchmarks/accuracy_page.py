@@ -26,9 +26,7 @@ from vibench.sim import Accuracy
 
 _HEAD = "| level | simulated s per s | error of the state | of Response I | of Response II | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
-_LOTTERY_HEAD = (
-    "| scene | motion | Response I | error | share stated | of many | covered | chaos dies out [1/s] | cost |"
-)
+_LOTTERY_HEAD = "| scene | motion | Response I | error | predicted share | share found | covered | chaos dies out [1/s] | cost |"
 ABSENT = "–"
 
 
@@ -39,9 +37,9 @@ def accuracy_document(benchmark: AccuracyBenchmark) -> str:
 
 def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
     yield from (
-        "# Speed and accuracy, measured",
+        "# Speed and accuracy",
         "",
-        "`standard` is the default. Use `quick` to look around, and `reference` to check a result.",
+        "`standard` is the default. Use `quick` for a first look, and `reference` to check a result.",
         f"A periodic motion is correct to {', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}.",
         "In chaos no level predicts a single motion; only averages are meaningful.",
     )
@@ -50,16 +48,16 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "",
         "## How it was measured",
         "",
-        "Made by `python benchmarks/accuracy_page.py`; then `python benchmarks/error_curves.py` adds what a",
-        "target costs, `python benchmarks/work_precision.py --markdown docs/accuracy.md` the comparison with",
-        "other solvers, and `python benchmarks/error_targets.py --sum FILE --markdown docs/accuracy.md` the",
-        "requested errors. Not edited by hand.",
+        "Made by `python benchmarks/accuracy_page.py`, and not edited by hand. Three scripts add their sections:",
+        "`python benchmarks/error_curves.py` the cost of a target, `python benchmarks/work_precision.py --markdown",
+        "docs/accuracy.md` other solvers, and `python benchmarks/error_targets.py --sum FILE --markdown",
+        "docs/accuracy.md` requested errors.",
         f"Machine: {benchmark.machine}; vibench {json.loads(benchmark.software)['vibench']}.",
         "",
-        "Errors of the state are the largest of six components, in units of 100 µm and 0.1 m/s, against an",
+        "An error of the state is the largest of six components, in units of 100 µm and 0.1 m/s, compared with an",
         "independent solution (scipy's DOP853 at 1e-12, restarted at every contact). Errors of the responses",
-        "are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6; the numbers",
-        "are simulated seconds per second and the error of the state. Times are of one core.",
+        "are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6; their numbers",
+        "are simulated seconds per second and the error of the state. Times are for one core.",
     )
     for each in benchmark.motions:
         yield from _motion(each)
@@ -73,12 +71,13 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         return
     yield from (
         "",
-        "## Where the start is forgotten",
+        "## Sensitive dependence on the start",
         "",
-        f"Scenes followed until they settle, and {lotteries[0].starts} more starts of each, a millionth of",
-        "the gap apart, for at most 300 s. A chaotic or undecided motion may still end in any other; the",
-        "intervals of the shares hold together in 19 of 20 cases, now and in the end. Cost is that of the",
-        "whole answer over one run.",
+        "Each scene is simulated until it settles, and from "
+        f"{lotteries[0].starts} further starts, a millionth of the gap",
+        "apart, for at most 300 s. A chaotic or undecided motion may still change into another motion. The",
+        "intervals of the shares hold together in 19 of 20 cases, now and after such changes. Cost is the time",
+        "of the whole prediction divided by that of one run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -115,11 +114,11 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "",
         "## Transients, from rest",
         "",
-        "A settled motion forgets the errors of its steps; in a transient a small change may grow a",
-        "thousandfold. A level promises its error above times the largest growth. The stated error of the",
-        "responses is measured by a stricter run from the start. The state is compared after 0.1 s with the",
-        "independent solution, the responses of the second half with the reference level. Cells: error of",
-        "the state (promised); of the responses (stated).",
+        "In a settled motion, integration errors decay; in a transient a small error may grow a thousandfold.",
+        "Each level promises its error above multiplied by the largest growth. The stated error of the",
+        "responses comes from a stricter run from the same start. The state is compared after 0.1 s with the",
+        "independent solution, the responses of the second half with the reference level. Each cell has the error",
+        "of the state (promised), then the error of the responses (stated).",
         "",
         f"| motion | growth | {' | '.join(Accuracy)} |",
         "|---|---|---|---|---|",

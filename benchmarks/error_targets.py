@@ -54,11 +54,11 @@ LONG_S = 60.0
 """Time after which a damped motion of these scenes has settled [s]."""
 SHORT, SMALL = 0.1, 1e-3
 """With sensitive dependence, errors up to SMALL get this share of the time, as no mean reaches them."""
-KINDS = ("periodic", "named window", "forgotten")
+KINDS = ("periodic", "named window", "start lost")
 HEADING, LAST = "## Requested errors", "## Other solvers"
-INTRODUCTION = """A motion that keeps its start but does not repeat is observed in a window that the answer
-names. Where the start is forgotten, the answer is the mean over starts in a named window, and the error is
-the uncertainty of this mean. This section is made by `python
+INTRODUCTION = """For motion that does not repeat, the responses depend on a window, which the result names ("named window").
+With sensitive dependence on the start ("start lost"), the result is the mean over starts in a named window,
+and the error is the uncertainty of this mean. This section is made by `python
 benchmarks/error_targets.py --save FILE`, then `--sum FILE --markdown docs/accuracy.md`."""
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
@@ -136,7 +136,7 @@ def solve_and_measure(scene, time_s):
         taken_s = time.process_time() - began
         is_forgotten = found.memory is StartMemory.LOST
         kind = (
-            "forgotten"
+            "start lost"
             if found.memory is StartMemory.LOST
             else "periodic"
             if found.motion is MotionKind.PERIODIC
@@ -201,20 +201,20 @@ def costs_of(rows):
     taken_s, default_s = [each["taken_s"] for _, each in pairs], [row["default_s"] for row, _ in pairs]
     middle_s, usual_s = np.median(taken_s), np.median(default_s)
     yield (
-        f"To 1 %: median {middle_s:.4f} s of processor time, the 30 s default {usual_s:.4f} s, "
-        f"{usual_s / middle_s:.1f} times as much; median of the ratios "
+        f"Median processor time for 1 % is {middle_s:.4f} s, for the 30 s default {usual_s:.4f} s, "
+        f"{usual_s / middle_s:.1f} times as much; the median of the ratios is "
         f"{np.median(np.divide(default_s, taken_s)):.1f}."
     )
     for kind in KINDS:
         own = [row["default_s"] / each["taken_s"] for row, each in pairs if each["kind"] == kind]
         if own:
-            yield f"The default over it, {kind}: median {np.median(own):.1f}."
+            yield f"Median ratio of the default to 1 %, {kind}: {np.median(own):.1f}."
     costs = [
         {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == KINDS[0]}
         for row in rows
     ]
     ratios = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
-    yield f"On periodic motion 1e-6 costs {np.median(ratios):.2f} times 1e-2 (median of {len(ratios)})."
+    yield f"For periodic motion, 1e-6 takes {np.median(ratios):.2f} times as long as 1e-2 (median of {len(ratios)})."
 
 
 def report(rows):
@@ -244,12 +244,12 @@ def write_section(page, rows, time_s):
         "",
         INTRODUCTION,
         "",
-        f"Measured on {len(rows)} random scenes of all contact laws, with {time_s:g} s for an answer (a",
-        "tenth for small errors of forgotten starts) on a busy machine, which gave a small part of it.",
-        "*Covered*: the part of the responses whose truth is within the stated error and the truth's own.",
-        "The truth is an answer of *reference*; of forgotten starts, the mean over other starts at *quick*.",
+        f"Measured on {len(rows)} random scenes of all contact laws, with at most {time_s:g} s per prediction (a",
+        "tenth for small errors of lost starts) on a busy machine.",
+        "*Covered* is the share of responses whose true value is within its own and the stated error.",
+        "True values come from *reference*; for lost starts, from the mean over other starts at *quick*.",
         "",
-        "| motion | requested | answers | covered | met | stated, median | processor time, median |",
+        "| motion | requested | predictions | covered | met | stated, median | processor time, median |",
         "|---|---|---|---|---|---|---|",
         *(
             f"| {kind} | {error} | {count} | {covered:.0%} | {met:.0%} | {wide:.1e} | {cost_s:.2g} s |"

@@ -4,12 +4,12 @@
 (numbalsoda is built from source and needs a Fortran compiler). A peer that is not installed is omitted,
 and the page says so.
 
-Every solver starts in the same settled state; its error is the distance from the independent solution
+Every solver starts in the same settled state; its error is the difference from the independent solution
 after 0.2 s, in chaos after 0.03 s. Cost is processor time over simulated time in runs of three seconds
-(scipy: 0.3 s), the least of several, without preparation. scipy has a compiled right-hand side; numbalsoda
-is compiled completely; heyoka's Taylor method has terminal events at the stops. "At its best" heyoka has
-the variables in which its series converges (in contact the penetration is w^2, and time runs as w): one
-trajectory at a time, and eight in its batch mode, with the time divided by eight.
+(scipy: 0.3 s), the least of several runs, without preparation. scipy has a compiled right-hand side;
+numbalsoda is compiled completely; heyoka's Taylor method has terminal events at the stops. "At its best"
+heyoka uses variables in which its series converges (in contact the penetration is w^2, and time runs as w):
+one trajectory at a time, and eight in its batch mode, with the time divided by eight.
 """
 
 import argparse
@@ -296,8 +296,8 @@ def write_section(page, curves):
         __doc__.split("\n\n", 2)[2].strip(),
         f"Measured with vibench {version('vibench')}.{absent}",
         "",
-        "Cells: time over that of vibench for the same error (never: no tolerance reaches it); then, at the",
-        "solver's tolerance of 1e-6, time over that of vibench, and error.",
+        "Each cell has the solver's time over vibench's for the same error (never: no tolerance reaches it). For a",
+        "tolerance of 1e-6 it then has the solver's time over vibench's, and the solver's error.",
         "",
         "![Error over cost](images/work_precision.png)",
         "",

@@ -58,7 +58,7 @@ def test_the_page_has_the_shares_of_scenes_sensitive_to_the_start(benchmark, pag
     assert len(rows) == len(lottery.answered.ensemble.motions)
     assert all("yes" in row or "**no**" in row for row in rows)
     without = page_of(replace(benchmark, lotteries=()))
-    assert "start is forgotten" not in without
+    assert "Sensitive dependence" not in without
 
 
 def test_the_page_reports_missed_accuracy(benchmark, page_of):
