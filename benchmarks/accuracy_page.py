@@ -26,7 +26,10 @@ from vibench.sim import Accuracy
 
 _HEAD = "| level | simulated s per s | error of the state | of Response I | of Response II | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
-_LOTTERY_HEAD = "| scene | motion | Response I | error | predicted share | share found | covered | chaos dies out [1/s] | cost |"
+_LOTTERY_HEAD = (
+    "| scene | motion | Response I | error | predicted share | share found | covered "
+    "| chaos dies out [1/s] | cost |"
+)
 ABSENT = "–"
 
 
@@ -48,16 +51,17 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "",
         "## How it was measured",
         "",
-        "Made by `python benchmarks/accuracy_page.py`, and not edited by hand. Three scripts add their sections:",
-        "`python benchmarks/error_curves.py` the cost of a target, `python benchmarks/work_precision.py --markdown",
-        "docs/accuracy.md` other solvers, and `python benchmarks/error_targets.py --sum FILE --markdown",
-        "docs/accuracy.md` requested errors.",
+        "Made by `python benchmarks/accuracy_page.py`, and not edited by hand. Three scripts add their",
+        "sections: `python benchmarks/error_curves.py` the cost of a target, `python",
+        "benchmarks/work_precision.py --markdown docs/accuracy.md` other solvers, and `python",
+        "benchmarks/error_targets.py --sum FILE --markdown docs/accuracy.md` requested errors.",
         f"Machine: {benchmark.machine}; vibench {json.loads(benchmark.software)['vibench']}.",
         "",
-        "An error of the state is the largest of six components, in units of 100 µm and 0.1 m/s, compared with an",
-        "independent solution (scipy's DOP853 at 1e-12, restarted at every contact). Errors of the responses",
-        "are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6; their numbers",
-        "are simulated seconds per second and the error of the state. Times are for one core.",
+        "An error of the state is the largest of six components, in units of 100 µm and 0.1 m/s, compared",
+        "with an independent solution (scipy's DOP853 at 1e-12, restarted at every contact). Errors of the",
+        "responses are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6;",
+        "their numbers are simulated seconds per second and the error of the state. Times are for one",
+        "core.",
     )
     for each in benchmark.motions:
         yield from _motion(each)
@@ -73,11 +77,10 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "",
         "## Sensitive dependence on the start",
         "",
-        "Each scene is simulated until it settles, and from "
-        f"{lotteries[0].starts} further starts, a millionth of the gap",
-        "apart, for at most 300 s. A chaotic or undecided motion may still change into another motion. The",
-        "intervals of the shares hold together in 19 of 20 cases, now and after such changes. Cost is the time",
-        "of the whole prediction divided by that of one run.",
+        f"Each scene is simulated until it settles, and from {lotteries[0].starts} further starts, a millionth",
+        "of the gap apart, for at most 300 s. A chaotic or undecided motion may still change into another motion.",
+        "The intervals of the shares hold together in 19 of 20 cases, now and after such changes. Cost is",
+        "the time of the whole prediction divided by that of one run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -114,11 +117,11 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "",
         "## Transients, from rest",
         "",
-        "In a settled motion, integration errors decay; in a transient a small error may grow a thousandfold.",
-        "Each level promises its error above multiplied by the largest growth. The stated error of the",
-        "responses comes from a stricter run from the same start. The state is compared after 0.1 s with the",
-        "independent solution, the responses of the second half with the reference level. Each cell has the error",
-        "of the state (promised), then the error of the responses (stated).",
+        "In a settled motion, integration errors decay; in a transient a small error may grow a",
+        "thousandfold. Each level promises its error above multiplied by the largest growth. The stated",
+        "error of the responses comes from a stricter run from the same start. The state is compared after",
+        "0.1 s with the independent solution, the responses of the second half with the reference level.",
+        "Each cell has the error of the state (promised), then the error of the responses (stated).",
         "",
         f"| motion | growth | {' | '.join(Accuracy)} |",
         "|---|---|---|---|---|",

@@ -56,9 +56,9 @@ SHORT, SMALL = 0.1, 1e-3
 """With sensitive dependence, errors up to SMALL get this share of the time, as no mean reaches them."""
 KINDS = ("periodic", "named window", "start lost")
 HEADING, LAST = "## Requested errors", "## Other solvers"
-INTRODUCTION = """For motion that does not repeat, the responses depend on a window, which the result names ("named window").
-With sensitive dependence on the start ("start lost"), the result is the mean over starts in a named window,
-and the error is the uncertainty of this mean. This section is made by `python
+INTRODUCTION = """If motion does not repeat, its responses depend on a window, which the result names ("named
+window"). With sensitive dependence on the start ("start lost"), the result is the mean over starts in a
+named window, and the error is the uncertainty of this mean. This section is made by `python
 benchmarks/error_targets.py --save FILE`, then `--sum FILE --markdown docs/accuracy.md`."""
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
@@ -214,7 +214,8 @@ def costs_of(rows):
         for row in rows
     ]
     ratios = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
-    yield f"For periodic motion, 1e-6 takes {np.median(ratios):.2f} times as long as 1e-2 (median of {len(ratios)})."
+    ratio = f"{np.median(ratios):.2f} times as long as 1e-2 (median of {len(ratios)})"
+    yield f"For periodic motion, 1e-6 takes {ratio}."
 
 
 def report(rows):
@@ -244,10 +245,10 @@ def write_section(page, rows, time_s):
         "",
         INTRODUCTION,
         "",
-        f"Measured on {len(rows)} random scenes of all contact laws, with at most {time_s:g} s per prediction (a",
-        "tenth for small errors of lost starts) on a busy machine.",
-        "*Covered* is the share of responses whose true value is within its own and the stated error.",
-        "True values come from *reference*; for lost starts, from the mean over other starts at *quick*.",
+        f"Measured on {len(rows)} random scenes of all contact laws, with at most {time_s:g} s per prediction",
+        "(a tenth for small errors of lost starts) on a busy machine. *Covered* is the share of responses",
+        "whose true value is within its own and the stated error. True values come from *reference*; for",
+        "lost starts, from the mean over other starts at *quick*.",
         "",
         "| motion | requested | predictions | covered | met | stated, median | processor time, median |",
         "|---|---|---|---|---|---|---|",
