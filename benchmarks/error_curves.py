@@ -256,9 +256,10 @@ def section(curves, models, chaos):
         "![Similarity of continuous models with the stops over their cost](images/model_similarity.png)",
         "",
         "The paper replaces stops by continuous models. Here R is the similarity of Response I from",
-        f"{GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz, 30 s from rest, by eqs. 6 and 7 of the paper.",
-        "Up to 10 µm the stops take less time than any continuous model, because motion between contacts is exact.",
-        "At 50 µm the lowest orders take less time, but are similar at few frequencies only.",
+        f"{GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz, 30 s from rest, by eqs. 6 and 7.",
+        "Up to 10 µm the stops take less time than any continuous model, because motion between",
+        "contacts is exact. At 50 µm the lowest orders take less time, but are similar at few",
+        "frequencies only.",
         "",
         "| model | time of a point | "
         + " | ".join(f"R at {1e6 * amplitude_m:g} µm" for amplitude_m in AMPLITUDES_M)

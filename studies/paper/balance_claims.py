@@ -17,7 +17,7 @@ _MOST, _MAJORITY = 0.8, 0.5
 _SMOOTH_PROMINENCE = 1.1
 """Smallest prominence of a peak in a curve without chaos."""
 _GRID_HZ, _ROUGH_HZ = 5.0, 10.0
-_BENT = "The force of n = 5 acts at every p, so that a resonance at which p nears the gap is bent upwards."
+_BENT = "The force of n = 5 acts at every p, so a resonance at which p approaches the gap moves upwards."
 
 
 @costly_claim(
@@ -73,7 +73,7 @@ def _two_of(what: str) -> tuple[Expectation, ...]:
     *_two_of("Response I"),
 )
 def continuous_strong(r: Reading) -> Values:
-    """At 50 µm both have two resonances, like the piece-wise model."""
+    """At 50 µm both responses of n = 5 have two resonances, like the piece-wise model."""
     curve = r.level(STRONG_M, CONTINUOUS)
     return (
         *two_highest(curve.frequency_hz, _lowest(r, STRONG_M)),

@@ -57,7 +57,7 @@ def p_saturates(r: Reading) -> Values:
     at_most("smallest", "", 0.7),
 )
 def ii_below_i(r: Reading) -> Values:
-    """Where they collide, Response II may be much lower than Response I."""
+    """With collisions, Response II may be much lower than Response I."""
     curve = r.level(MODERATE_M)
     ratio = (curve.response_ii / curve.response_i)[curve.collides]
     return (np.max(ratio), np.min(ratio)) if ratio.size else (np.nan, np.nan)
@@ -81,7 +81,7 @@ def damping_lowers_i(r: Reading) -> Values:
     at_least("at 7 µm", "%", 0.01),
 )
 def damping_shrinks_regions(r: Reading) -> Values:
-    """Damping reduces the colliding regions, as does 5 in place of 7 µm."""
+    """Damping, or 5 instead of 7 µm, reduces the regions of collisions."""
     share, undamped, higher = (float(np.mean(each.collides)) for each in _fig_5(r))
     return undamped - share, higher - share
 
@@ -128,12 +128,12 @@ def second_region(r: Reading) -> Values:
     ),
     draws=16,  # the last impact of a sweep depends on the end of chaos
     remark=(
-        "The paper does not give the sweep's base amplitude, nor how it changed with frequency. Motion "
-        "that collides goes on colliding beyond where it would begin, so the end depends on the sweep."
+        "The paper does not give the sweep's base amplitude, nor how it changed with frequency. "
+        "Collisions continue beyond the frequency at which they would start, so the end depends on the sweep."
     ),
 )
 def sweep(r: Reading) -> Values:
-    """In a sweep from 150 to 350 Hz within 200 s they collide at about 240 to 290 Hz."""
+    """In a sweep from 150 to 350 Hz within 200 s, m1 and m2 collide at about 240 to 290 Hz."""
     case, specimen = r.case, r.specimen()
 
     def run() -> Values:

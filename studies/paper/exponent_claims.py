@@ -47,7 +47,7 @@ def severe_at_5um(r: Reading) -> Values:
     tried=(*DAMPINGS, BY_ODE45),
 )
 def severe_where_shown(r: Reading) -> Values:
-    """When they collide, as around 260 Hz, the exponent jumps to more than 100 per second."""
+    """With collisions, as around 260 Hz, the exponent jumps to more than 100 per second."""
     return _severe(r, *SECOND_REGION_HZ)
 
 
@@ -58,7 +58,7 @@ def severe_where_shown(r: Reading) -> Values:
     tried=(*DAMPINGS, BY_ODE45),
 )
 def severe_wherever_colliding(r: Reading) -> Values:
-    """Read strictly: wherever they collide, the exponent is more than 100 per second."""
+    """Read strictly: at every frequency with collisions, the exponent is more than 100 per second."""
     return _severe(r, 0.0, np.inf)
 
 
@@ -99,7 +99,7 @@ def chaos_grows(r: Reading) -> Values:
 
 @costly_claim("section 4, Fig. 10(b)", "As above.", *_GROWS)
 def chaos_grows_continuous(r: Reading) -> Values:
-    """The same holds for the continuous model n = 5."""
+    """With more drive the exponent of the continuous model n = 5 is larger, too."""
     return _grows(r, CONTINUOUS)
 
 
@@ -144,7 +144,7 @@ def exponents_part(r: Reading) -> Values:
     tried=(NARROWER_FIT,),
 )
 def exponents_near_with_order(r: Reading) -> Values:
-    """With larger n the exponents of the continuous model approach the piece-wise one's."""
+    """With larger n the exponents of the continuous model approach those of the piece-wise model."""
     stops = r.exponents(MODERATE_M)
     cubic, fifth, seventh = (
         float(np.nanmean(np.abs(stops - r.exponents(MODERATE_M, model))))
@@ -159,7 +159,7 @@ def exponents_near_with_order(r: Reading) -> Values:
     *(at_least(f"at {each:g} Hz", "", 1.0) for each in PAPER_TERMINAL_RESONANCES_HZ),
 )
 def exponents_peak_at_terminal(r: Reading) -> Values:
-    """At 50 µm the exponents have the terminal resonances, 201 and 435 Hz."""
+    """At 50 µm the exponents peak at the terminal resonances, 201 and 435 Hz."""
     curve = r.level(STRONG_M)
     whole = np.nanmean(curve.exponent_per_s)
     near = [np.abs(curve.frequency_hz - middle) <= _AROUND_HZ for middle in PAPER_TERMINAL_RESONANCES_HZ]

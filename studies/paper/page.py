@@ -15,15 +15,15 @@ from .claim import Claim, Expectation, Finding, Judgement, Verdict, judgement
 from .reading import Evidence
 from .settings import DampingScore, claims_by_setting, score_table, scores
 
-_HEADINGS = ("claim", "where", "measured", "wanted", "verdict")
+_HEADINGS = ("claim", "place", "measured", "required", "verdict")
 HEAD = f"| {' | '.join(_HEADINGS)} |"
 _METHOD = """\
-Every claim of Gong et al. (2025) that has a number or a direction, measured on our simulation of
-their specimen. The paper gives hardly any tolerances: the bounds are ours, wide enough for chaos,
-which differs by some per cent from run to run; some were settled after a first look at the numbers.
-Where chance decides how chaos ends, a claim is measured from several starts, a millionth of the gap
-apart, and its spread is given. Where a claim does not hold, options are tried in order until one
-upholds it. DIR/report.html lists all options, how each claim was measured, and the claims by setting.
+The page checks every claim of Gong et al. (2025) that has a number or a direction with a simulation
+of their specimen. The paper gives hardly any tolerances. The bounds are ours, wide enough for chaos,
+which differs by some per cent from run to run; some bounds were set after a first look at the results.
+If chaos ends at random, a claim is measured from several starts, a millionth of the gap apart, and
+the range is given. If a claim does not hold, options are tested in order until it holds.
+DIR/report.html lists all options, how each claim was measured, and the claims by setting.
 `vibench demo` repeats the experiment of Figs. 12 to 14."""
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
@@ -56,7 +56,7 @@ class Reproduction:
             f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults, "
             f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts, "
             f"{self.count(Verdict.HOLDS_UNDER)} under another named option, "
-            f"{self.count(Verdict.FAILS)} under none that was tried."
+            f"{self.count(Verdict.FAILS)} under none of the options tested."
         )
 
 
@@ -101,7 +101,7 @@ def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator
     yield from (found.options, found.made_with, "", found.sentence.replace(", ", ",\n"))
     apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
     if apart:
-        yield from ("", "Where we differ from the paper:", "")
+        yield from ("", "Claims that do not hold under the defaults:", "")
     for each in apart:
         yield f"- **{each.claim.key}**: {each.claim.says} {_upheld(each)}".rstrip()
     for heading, judgements in found.sections.items():
@@ -156,19 +156,19 @@ def wanted_text(claim: Claim) -> str:
 def _difference(result: Judgement) -> str:
     """Return our numbers, the requirements, and the options under which the claim holds."""
     found = _values(result.claim, result.findings[0])
-    return f"We find {found}; wanted {wanted_text(result.claim)}. {_upheld(result)}".strip()
+    return f"We find {found}; required {wanted_text(result.claim)}. {_upheld(result)}".strip()
 
 
 def _upheld(result: Judgement) -> str:
     """Return the options under which a claim holds, with their numbers, and the comment."""
     claim, alternatives = result.claim, result.findings[1:]
     sentences = [
-        f"{'It holds under' if each.is_met else 'Numbers of'} {each.case.name}: {_values(claim, each)}."
+        f"{'It holds under' if each.is_met else 'Values for'} {each.case.name}: {_values(claim, each)}."
         for each in alternatives
         if each.met > 0
     ]
     if alternatives and result.met_under is None:
-        sentences.insert(0, f"None of {len(alternatives)} options tried upholds it{_except(result)}.")
+        sentences.insert(0, f"It holds under none of {len(alternatives)} options tested{_except(result)}.")
     return " ".join([*sentences, claim.remark]).strip()
 
 
@@ -239,12 +239,12 @@ def _card(heading: str, judgements: Sequence[Judgement]) -> Card:
         numbers=tuple((f"claims: {each}", str(verdicts.count(each))) for each in Verdict if each in verdicts),
         folds=(
             Fold(
-                "Claims, what was tried and how it was measured",
+                "Claims, options tested, and methods",
                 tuple(f"{each.claim.key}: {each.claim.says} {_difference(each)}" for each in apart),
                 (
                     ReportTable("Claims", _HEADINGS, tuple(_cells(each) for each in judgements)),
-                    ReportTable("Tried", ("claim", "option: result"), tuple(tried)),
-                    ReportTable("How each was measured", ("claim", "measured by"), tuple(how)),
+                    ReportTable("Options tested", ("claim", "option: result"), tuple(tried)),
+                    ReportTable("Methods", ("claim", "measured by"), tuple(how)),
                 ),
             ),
         ),

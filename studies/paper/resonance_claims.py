@@ -120,7 +120,7 @@ def strong_two_ii(r: Reading) -> Values:
     NO_THIRD,
 )
 def terminal_stay(r: Reading) -> Values:
-    """At larger amplitudes these two resonances stay where they are."""
+    """At larger amplitudes these two resonances do not move."""
     curve = r.curve(100e-6)
     return two_highest(curve.frequency_hz, curve.response_ii)
 

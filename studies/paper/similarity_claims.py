@@ -60,7 +60,7 @@ def rates(r: Reading, model: str, what: str) -> Reals:
     tried=(SEVENTH_COUNTS,),
 )
 def fits(r: Reading) -> Values:
-    """The fitted force comes closer with n; that of the sum lies between those of n = 5 and 7."""
+    """The fitted force approaches Hertz's with n; the force of the sum lies between those of n = 5 and 7."""
     p = np.linspace(0.5 * r.case.gap_m, r.case.gap_m, _CURVE_POINTS)
     cubic, fifth, seventh, total = (
         spring_of(r.specimen(model)).force(p, np.zeros_like(p)) for model in orders(r.case)
@@ -97,7 +97,7 @@ def _fall_and_rise(between: str) -> tuple[Expectation, ...]:
     draws=_DRAWS,
 )
 def cubic_ii(r: Reading) -> Values:
-    """For Response II it falls from 83 % to about 68 % and rises to 78 %."""
+    """For Response II the rate of n = 3 falls from 83 % to about 68 % and rises to 78 %."""
     found = rates(r, CUBIC, SECOND)
     return found[0], found[2], found[-1]
 
@@ -135,7 +135,7 @@ def rates_fall_i(r: Reading) -> Values:
     draws=_DRAWS,
 )
 def rates_fall_steadily_i(r: Reading) -> Values:
-    """They fall from each amplitude to the next."""
+    """The rates of Response I fall from each amplitude to the next."""
     return tuple(np.max(np.diff(each)) for each in _all_rates(r, FIRST))
 
 

@@ -29,7 +29,7 @@ _STEPS = ("5 over 1 µm", "10 over 5 µm", "50 over 10 µm")
     at_least("435 over 500 Hz", "", 1.0),
 )
 def redistributed(r: Reading) -> Values:
-    """At 260 Hz and 5 µm the motion shows at 201 and 435 Hz, and not at 95 and 500 Hz."""
+    """At 260 Hz and 5 µm the spectrum has peaks at 201 and 435 Hz, not at 95 and 500 Hz."""
     signal = _signal(r, MODERATE_M)
     outer = (PAPER_RESONANCES_HZ[0], PAPER_RESONANCES_HZ[-1])
     pairs = zip(PAPER_TERMINAL_RESONANCES_HZ, outer, strict=True)
@@ -58,7 +58,7 @@ def lines_emerge(r: Reading) -> Values:
     *(about(f"near {each:g} Hz", "Hz", each, _NEAR_HZ) for each in PAPER_TERMINAL_RESONANCES_HZ),
 )
 def lines_at_terminal(r: Reading) -> Values:
-    """Those lines approach the terminal resonances, 201 and 435 Hz."""
+    """The two further resonances approach the terminal resonances, 201 and 435 Hz."""
     signal = _signal(r, STRONG_M)
     f = signal.frequency_hz
     width = max(1, round(_HALF_BAND_HZ / float(f[1] - f[0])))
@@ -84,7 +84,7 @@ def transmission_declines(r: Reading) -> Values:
     *(at_least(each.replace("over", "less"), "1/s", 0.0) for each in _STEPS),
 )
 def chaos_escalates(r: Reading) -> Values:
-    """At 260 Hz chaos escalates with drive."""
+    """At 260 Hz the exponent grows with drive."""
     return tuple(np.diff(_by_level(r, "exponent_per_s")))
 
 

@@ -77,7 +77,7 @@ def test_differences_from_the_paper_come_first_with_the_option_that_agrees(found
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
     assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary
-    assert "- **third**: It is so with third. None of 1 options tried upholds it." in summary
+    assert "- **third**: It is so with third. It holds under none of 1 options tested." in summary
 
 
 def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
@@ -91,9 +91,9 @@ def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
         Reproduction({"Synthetic": (found,)}, scored(((), ("chance",))), (), "Defaults: these.", "")
     )
     except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
-    assert f"None of 1 options tried upholds it{except_it}." in page
+    assert f"It holds under none of 1 options tested{except_it}." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
-    assert "Numbers of c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
+    assert "Values for c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
 
 
 def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not(found):
