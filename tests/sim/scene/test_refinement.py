@@ -80,9 +80,27 @@ def test_the_error_of_a_mean_over_starts_contains_that_of_the_runs():
     drive = Harmonic(125.89780847473365, 2.120822403280049e-05)
     found = solve_scene(Scene(specimen, drive, target=Target(error=1e-4, time_s=10.0)))
     assert found.memory is StartMemory.LOST
+    assert (found.motion, found.period) == (MotionKind.PERIODIC, 2)
     duration = FixedDuration(found.duration_s, found.window_s)
     truth = solve_scene(Scene(specimen, drive, accuracy=Accuracy.REFERENCE, duration=duration, budget_s=0.0))
     assert np.all(off(found, truth) <= 1.0)
+
+
+@pytest.mark.parametrize(
+    ("contact", "gap_m", "damping_s", "frequency_hz", "amplitude_m", "is_chaos"),
+    [
+        ("power:3", 11.648e-6, 11.777e-6, 374.7343976969152, 22.324e-6, False),
+        ("rigid:0.6", 7.22e-6, 5.448e-6, 247.9, 5.844e-6, True),
+    ],
+)
+def test_a_mean_over_starts_is_chaotic_only_if_a_small_change_keeps_growing(
+    contact, gap_m, damping_s, frequency_hz, amplitude_m, is_chaos
+):
+    specimen = gong2025(damping_s, gap_m, contact)
+    scene = Scene(specimen, Harmonic(frequency_hz, amplitude_m), target=Target(error=0.03, time_s=5.0))
+    found = solve_scene(scene)
+    assert found.memory is StartMemory.LOST
+    assert (found.motion is MotionKind.CHAOTIC_SO_FAR) is is_chaos
 
 
 def test_answers_improve_until_the_time_is_over():

@@ -39,7 +39,7 @@ from .mean_of_starts import (
 )
 from .plan import LinearMotion, linear_motion, never_touches, plan_of
 from .prediction import Method, MotionKind, ScenePrediction, StartMemory, TargetReport, state_of
-from .repetition import MOST_PERIODS, Pace, Repetition, Sharpness, pace_of
+from .repetition import MOST_PERIODS, Pace, Repetition, Sharpness, growth_of, kind_of, pace_of
 from .scatter import COVERED
 from .scene import PAPER_DURATION_S, Observable, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
@@ -172,8 +172,10 @@ class _Refinement:
         self._orbits: list[_Orbit] = []
         """All periodic motions found."""
         self._size_m = self._spent_s = 0.0
-        self._run_error = math.nan
-        """Relative error of each start's responses by the tolerance of its run; NaN until it is measured."""
+        self._run_error: float | None = None
+        """Relative error of each start's responses by the tolerance of its run; None until it is measured."""
+        self._kind: MotionKind | None = None
+        """Kind of the first start's motion if it does not repeat; None until a small change is followed."""
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
@@ -285,7 +287,9 @@ class _Refinement:
         elif len(near) > 0 and not now < path.distance:
             path.closest = 0.3 * float(changes[near[0]])
             known = self._nearest(recent[-1], KNOWN * size)
-            path.orbit = known or self._newton(path.run, int(near[0]) + 1) or path.orbit
+            # A motion that no longer approaches the nearest known one may be near its mirror image.
+            is_new = known is not None and known is not path.orbit
+            path.orbit = (known if is_new else self._newton(path.run, int(near[0]) + 1)) or path.orbit
             now = self._away_from(path.orbit, recent[-1], size)
         path.distance = now
         if path.orbit is None:
@@ -493,18 +497,21 @@ class _Refinement:
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)
         ends_s = begins_s + windows * window_s
-        if math.isnan(self._run_error):
-            self._run_error = SAFETY * float(np.nan_to_num(error_per_period(starts[0].run, Accuracy.QUICK)))
+        if self._run_error is None:
+            self._run_error = SAFETY * error_per_period(starts[0].run, Accuracy.QUICK)
         errors = error_of(starts) + self._run_error
         found = self._prediction(mean, errors, ends_s, window_s, starts[0].impacts)
-        first = starts[0].repeats if others_of(starts) == 0 else None
-        is_periodic = first is not None and first.distance < self._pace.sharpness.tolerance
+        first = starts[0].repeats
+        is_settled = first is not None and first.distance < self._pace.sharpness.tolerance
+        is_periodic = is_settled and others_of(starts) == 0
+        if self._kind is None and first is None:
+            self._kind = self._kind_of_others(starts[0].run)
         each_observed = f"observed from {begins_s:.4g} to {ends_s:.4g} s"
         if windows > 1:
             each_observed += f", in {windows} windows of {window_s:.4g} s"
         found = replace(
             found,
-            motion=MotionKind.PERIODIC if is_periodic else MotionKind.CHAOTIC_SO_FAR,
+            motion=MotionKind.PERIODIC if is_periodic else self._kind or MotionKind.UNDECIDED,
             period=first.period if first is not None and is_periodic else None,
             ended=f"mean of {len(starts)} starts, each {each_observed}",
             final_state=state_of(starts[0].run.state),
@@ -524,6 +531,22 @@ class _Refinement:
             about_s = max(0.0, self._clock.taken_s + more * per_s * part_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
         return _reported(found, self._target, self._clock, len(starts), needed, windows)
+
+    def _kind_of_others(self, begin: FollowedRun) -> MotionKind:
+        """Return the kind of a motion that does not repeat, by the growth of a small change in one window."""
+        run, seen = begin.apart(), list[Stretch]()
+        run.follow_tangent()
+        until_s = run.time_s + self._window_periods / self._frequency_hz
+        while run.time_s < until_s:
+            part = self._followed(run, min(until_s, self._next_look_s(run)))
+            if part is None:
+                return MotionKind.UNDECIDED
+            seen += part
+            if self._pace.is_chaos(seen):
+                return MotionKind.CHAOTIC_SO_FAR
+        found = kind_of(None, growth_of(seen), self._pace.fading_s)
+        is_torus = found is MotionKind.QUASI_PERIODIC and not self._pace.drifts(seen)
+        return found if is_torus else MotionKind.UNDECIDED
 
     def _lost(self) -> ScenePrediction:
         """Return the result for a motion that could not be followed."""
