@@ -193,6 +193,29 @@ def test_the_exponent_matches_the_motion_reached():
     assert quiet.lyapunov_per_s == pytest.approx(modal_form(gong2025()).rates.real.max())
 
 
+@pytest.mark.parametrize(
+    ("specimen", "drive", "duration"),
+    [
+        (
+            gong2025(6.483827302321825e-6, 27.07246318911318e-6, "power:3"),
+            Harmonic(441.2471126492003, 52.00892322654357e-6),
+            FixedDuration(20.0, 5.0),
+        ),
+        (
+            gong2025(30.90384489081641e-6, 13.596217218777594e-6, "linear_gap:1e6"),
+            Harmonic(163.6355123267624, 7.1261118269347125e-6),
+            FixedDuration(18.690249345786654, 3.0),
+        ),
+    ],
+)
+def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent(specimen, drive, duration):
+    observe = (Observable.RESPONSE, Observable.LYAPUNOV)
+    found = solve_scene(Scene(specimen, drive, duration=duration, observe=observe, budget_s=0.0))
+    assert found.motion is MotionKind.CHAOTIC_SO_FAR
+    assert "chaos ended" in found.ended
+    assert found.lyapunov_per_s is None or found.lyapunov_per_s > 3.0 * found.lyapunov_error_per_s
+
+
 def test_a_diverging_motion_has_an_outcome_without_numbers():
     """A start so far out that the force is more than numbers can hold."""
     begins_far = Given((0.0, 1e300, -1e300, 0.0, 0.0, 0.0))

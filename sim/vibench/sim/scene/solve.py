@@ -399,7 +399,7 @@ class _Begun:
             memory=memory,
             ensemble=ensemble if memory is StartMemory.LOST else None,
         )
-        found = with_errors(found, errors.stated)
+        found = with_errors(found if exponent is None else _supported(found, exponent), errors.stated)
         if is_whole and Observable.POINCARE in scene.observe:
             found = replace(found, section=states_of(window.stretches))
         if is_whole and Observable.SPECTRUM in scene.observe:
@@ -437,6 +437,29 @@ def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionK
             return seen.motion
         case _:
             return lasting(seen.motion, escape)
+
+
+def _supported(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
+    """Return a chaotic prediction with the exponent of its chaos; undecided if that is not above zero."""
+    from ..exponents.lyapunov import ExponentVerdict  # noqa: PLC0415 - as above
+
+    is_chaotic = found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}
+    if not is_chaotic or exponent.verdict is ExponentVerdict.CHAOTIC:
+        return found
+    if exponent.verdict is not ExponentVerdict.REGULAR:
+        return replace(
+            found,
+            motion=MotionKind.UNDECIDED,
+            ended="small changes grew, but the exponent is zero within its error",
+        )
+    chaos = exponent.transient
+    return replace(
+        found,
+        motion=MotionKind.CHAOTIC_SO_FAR,
+        ended=f"chaos ended {exponent.since_s:.3g} s after the window",
+        lyapunov_per_s=None if chaos is None else chaos.exponent_per_s,
+        lyapunov_error_per_s=None if chaos is None else chaos.standard_error_per_s,
+    )
 
 
 def _ending(seen: SceneRun, ensemble: Ensemble | None) -> str:
