@@ -10,29 +10,17 @@ from vibench.acquisition import ConfigurationError, StopSwitch, run_campaign, va
 from vibench.acquisition.campaign import (
     CampaignEventKind,
     ExistingRecordings,
-    JournalPointState,
-    PointOutcome,
     ReconnectingBench,
     estimate_campaign,
-    read_journal,
 )
 from vibench.acquisition.campaign._attempts import LOOK_EVERY_S
-from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.errors import DataLost
-from vibench.acquisition.plan import Campaign, Dwell, Measurement, RetryPolicy, RunState
+from vibench.acquisition.plan import Campaign
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
+from .small_campaigns import campaign, failing_once, outcomes, points, states
+
 REST_S = 12.0
-
-
-def campaign(*names, rest_s=REST_S, **policy):
-    dwell = Dwell(amplitude_vpp=1.0, frequency_hz=260, settle_s=0.1, duration_s=0.2)
-    plans = (Measurement(name=name, excitation=dwell, ramp_s=0.3, ramp_step_s=0.03) for name in names)
-    return Campaign(name="c", rest_s=rest_s, measurements=tuple(plans), retry=RetryPolicy(**policy))
-
-
-def points(folder):
-    return read_journal(journal_path(folder, "c"))
 
 
 def test_the_rig_is_silent_between_recordings(rig, tmp_path):
@@ -51,9 +39,11 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
                     loudest_v.append(abs(world.truth()[-1000:, 1]).max())
 
         begun = monotonic()
-        point_results = run_campaign(kept.bench, campaign("one", "two"), tmp_path, on_event=happened)
+        point_results = run_campaign(
+            kept.bench, campaign("one", "two", rest_s=REST_S), tmp_path, on_event=happened
+        )
         assert monotonic() - begun < REST_S
-    assert [point_result.outcome for point_result in point_results] == [PointOutcome.RECORDED] * 2
+    assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
     assert len(began_s) == 1
     assert max(loudest_v) < 1e-4  # the table's velocity [m/s]: noise of the amplifier
     told = (tmp_path / "c.status").read_text()
@@ -61,7 +51,7 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
 
 
 def test_rests_are_part_of_plan_and_estimate(rig, tmp_path):
-    with_rest, without = campaign("one", "two", "three"), campaign("one", "two", "three", rest_s=0)
+    with_rest, without = campaign("one", "two", "three", rest_s=REST_S), campaign("one", "two", "three")
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
     expected = estimate_campaign(with_rest, rig, tmp_path)
@@ -81,10 +71,10 @@ def test_a_stop_ends_a_rest(bench, tmp_path):
             switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
 
     bench.idle = idle_and_stop
-    point_results = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
+    point_results = run_campaign(bench, campaign("one", "two", rest_s=REST_S), tmp_path, switch=switch)
     assert bench.idled_s == pytest.approx(5.1, abs=0.05)
     assert [point_result.name for point_result in point_results] == ["one"]
-    assert [point.state for point in points(tmp_path)] == [JournalPointState.DONE, JournalPointState.QUEUED]
+    assert states(tmp_path) == ["done", "queued"]
 
 
 def test_a_hold_extends_a_rest_until_it_is_released(bench, tmp_path):
@@ -96,12 +86,9 @@ def test_a_hold_extends_a_rest_until_it_is_released(bench, tmp_path):
         switch.hold() if bench.idled_s < 2 * REST_S else switch.resume()
 
     bench.idle = idle_and_press
-    point_results = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
+    point_results = run_campaign(bench, campaign("one", "two", rest_s=REST_S), tmp_path, switch=switch)
     assert bench.idled_s == pytest.approx(2 * REST_S, abs=0.2)
-    assert [point_result.outcome for point_result in point_results] == [
-        PointOutcome.RECORDED,
-        PointOutcome.RECORDED,
-    ]
+    assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
 
 
 def test_a_campaign_killed_in_a_rest_continues_at_the_next_point(bench, new_bench, rig, tmp_path):
@@ -110,30 +97,21 @@ def test_a_campaign_killed_in_a_rest_continues_at_the_next_point(bench, new_benc
             # What a process leaves that is killed now: the files as they are, the journal's log included.
             shutil.copytree(tmp_path / "out", tmp_path / "killed", dirs_exist_ok=True)
 
-    plan = campaign("one", "two")
+    plan = campaign("one", "two", rest_s=REST_S)
     run_campaign(bench, plan, tmp_path / "out", on_event=as_left_by_a_kill)
     killed = tmp_path / "killed"
-    assert [(point.state, point.attempts) for point in points(killed)] == [
-        (JournalPointState.DONE, 1),
-        (JournalPointState.QUEUED, 0),
-    ]
+    assert [(point.state.value, point.attempts) for point in points(killed)] == [("done", 1), ("queued", 0)]
     fresh = new_bench(rig)
     point_results = run_campaign(fresh, plan, killed, ExistingRecordings.RESUME)
-    assert [point_result.outcome for point_result in point_results] == [
-        PointOutcome.KEPT,
-        PointOutcome.RECORDED,
-    ]
+    assert outcomes(point_results) == [("one", "kept"), ("two", "recorded")]
     assert fresh.idled_s == 0.0  # nothing has been played in this session
 
 
 def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
-    faults = [DataLost("a hole")]
-
-    def watch(progress):
-        if faults and progress.run.state is RunState.RECORDING:
-            bench.world.faults["digitizer.read"] = [faults.pop]
-
-    point_results = run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=watch)
+    fault = failing_once(bench, DataLost("a hole"))
+    point_results = run_campaign(
+        bench, campaign("one", rest_s=REST_S, attempts=2), tmp_path, on_progress=fault
+    )
     assert [point_result.path.name for point_result in point_results] == ["one.2.h5"]
     assert bench.idled_s == pytest.approx(LOOK_EVERY_S + REST_S)
 

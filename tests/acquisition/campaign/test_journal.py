@@ -10,14 +10,11 @@ from vibench.acquisition import RecordingError
 from vibench.acquisition.campaign import JournalPointState, ReasonCode, list_recordings, read_journal
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
 from vibench.acquisition.campaign._journal import Journal, journal_exists, journal_path
-from vibench.acquisition.plan import Campaign, Dwell, Measurement, Point
+from vibench.acquisition.plan import Point
 
+from .small_campaigns import campaign, dwell
 
-def dwell(name):
-    return Measurement(name=name, excitation=Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1))
-
-
-CAMPAIGN = Campaign(name="c", measurements=(dwell("one"), dwell("two"), dwell("three")))
+CAMPAIGN = campaign("one", "two", "three")
 
 
 @pytest.fixture

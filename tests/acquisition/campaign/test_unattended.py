@@ -18,39 +18,14 @@ from vibench.acquisition.campaign import (
     ChangedBench,
     CommandMessenger,
     ExistingRecordings,
-    JournalPointState,
-    PointOutcome,
     ReasonCode,
-    read_journal,
 )
 from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.errors import DataLost
-from vibench.acquisition.plan import Campaign, Dwell, Measurement, Retryable, RetryPolicy, RunState
+from vibench.acquisition.plan import Retryable
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
-
-def dwell(name, frequency_hz=260.0):
-    excitation = Dwell(amplitude_vpp=1.0, frequency_hz=frequency_hz, settle_s=0.1, duration_s=0.2)
-    return Measurement(name=name, excitation=excitation, ramp_s=0.2, ramp_step_s=0.02)
-
-
-def campaign(*names, **policy):
-    return Campaign(name="c", measurements=tuple(dwell(name) for name in names), retry=RetryPolicy(**policy))
-
-
-def failing_once(bench, fault):
-    """Let one read fail while a recording is running."""
-    faults = [fault]
-
-    def watch(progress):
-        if faults and progress.run.state is RunState.RECORDING:
-            bench.world.faults["digitizer.read"] = [faults.pop()]
-
-    return watch
-
-
-def points(folder):
-    return read_journal(journal_path(folder, "c"))
+from .small_campaigns import campaign, dwell, failing_once, outcomes, points, states
 
 
 def log(folder):
@@ -59,37 +34,23 @@ def log(folder):
 
 class TestRetries:
     def test_a_measurement_with_lost_data_is_repeated_in_a_new_file(self, bench, tmp_path):
-        point_results = run_campaign(
-            bench,
-            campaign("one", "two", attempts=2),
-            tmp_path,
-            on_progress=failing_once(bench, lambda: DataLost("a hole")),
-        )
-        assert [(point_result.path.name, point_result.outcome) for point_result in point_results] == [
-            ("one.2.h5", PointOutcome.RECORDED),
-            ("two.h5", PointOutcome.RECORDED),
-        ]
-        assert [(point.state, point.attempts) for point in points(tmp_path)] == [
-            (JournalPointState.DONE, 2),
-            (JournalPointState.DONE, 1),
-        ]
+        fault = failing_once(bench, DataLost("a hole"))
+        point_results = run_campaign(bench, campaign("one", "two", attempts=2), tmp_path, on_progress=fault)
+        assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
+        assert [each.path.name for each in point_results] == ["one.2.h5", "two.h5"]
+        assert states(tmp_path) == ["done", "done"]
+        assert [point.attempts for point in points(tmp_path)] == [2, 1]
         assert [line["why"] for line in log(tmp_path) if line["event"] == "fault"] == ["data_lost"]
 
     def test_faults_outside_the_retry_policy_are_not_retried(self, bench, tmp_path):
+        fault = failing_once(bench, DataLost("a hole"))
         with pytest.raises(DataLost):
             run_campaign(
-                bench,
-                campaign("one", attempts=3, on=[Retryable.CHECK_FAILED]),
-                tmp_path,
-                on_progress=failing_once(bench, lambda: DataLost("a hole")),
+                bench, campaign("one", attempts=3, on=[Retryable.CHECK_FAILED]), tmp_path, on_progress=fault
             )
         (point,) = points(tmp_path)
-        assert (point.state, point.reason_code, point.reason, point.attempts) == (
-            JournalPointState.FAILED,
-            ReasonCode.DATA_LOST,
-            "a hole",
-            1,
-        )
+        assert (point.state.value, point.reason_code, point.attempts) == ("failed", ReasonCode.DATA_LOST, 1)
+        assert point.reason == "a hole"
 
     def test_a_lost_instrument_is_reopened(self, bench, new_bench, rig, tmp_path):
         opened = []
@@ -98,17 +59,11 @@ class TestRetries:
             opened.append(new_bench(rig))
             return opened[-1]
 
+        fault = failing_once(bench, InstrumentLost("gone"))
         point_results = run_campaign(
-            bench,
-            campaign("one", "two", attempts=2),
-            tmp_path,
-            on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
-            reopen=reopen,
+            bench, campaign("one", "two", attempts=2), tmp_path, on_progress=fault, reopen=reopen
         )
-        assert [point_result.outcome for point_result in point_results] == [
-            PointOutcome.RECORDED,
-            PointOutcome.RECORDED,
-        ]
+        assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
         assert len(opened) == 1
         assert any(name == "start" for name, _, _ in opened[0].world.calls)
         assert "bench_reopened" in [line["event"] for line in log(tmp_path)]
@@ -117,31 +72,26 @@ class TestRetries:
         def reopen():
             raise InstrumentLost("still gone")
 
+        fault = failing_once(bench, InstrumentLost("gone"))
         with pytest.raises(InstrumentLost, match="gone") as ended:
             run_campaign(
                 bench,
                 campaign("one", "two", attempts=2, reopen_for_s=0),
                 tmp_path,
                 after_failure=AfterFailure.GO_ON,
-                on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
+                on_progress=fault,
                 reopen=reopen,
             )
         assert any("still gone" in note for note in ended.value.__notes__)
-        assert [point.state for point in points(tmp_path)] == [
-            JournalPointState.FAILED,
-            JournalPointState.QUEUED,
-        ]
+        assert states(tmp_path) == ["failed", "queued"]
 
     def test_a_bench_that_reopens_with_other_instruments_is_not_used(self, bench, new_bench, rig, tmp_path):
         other = new_bench(rig)
         other.identities = {**other.identities, "generator": other_serial(other.identities["generator"])}
+        fault = failing_once(bench, InstrumentLost("gone"))
         with pytest.raises(CheckFailed, match=r"instruments\.generator\.serial was"):
             run_campaign(
-                bench,
-                campaign("one", attempts=2),
-                tmp_path,
-                on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
-                reopen=lambda: other,
+                bench, campaign("one", attempts=2), tmp_path, on_progress=fault, reopen=lambda: other
             )
         assert not any(name == "start" for name, _, _ in other.world.calls)
 
@@ -153,13 +103,9 @@ def other_serial(identity):
 class TestAnotherBench:
     @pytest.fixture
     def begun(self, bench, tmp_path):
+        fault = failing_once(bench, DataLost("a hole"))
         with pytest.raises(DataLost):
-            run_campaign(
-                bench,
-                campaign("one", "two"),
-                tmp_path,
-                on_progress=failing_once(bench, lambda: DataLost("a hole")),
-            )
+            run_campaign(bench, campaign("one", "two"), tmp_path, on_progress=fault)
         return tmp_path
 
     def test_another_bench_is_refused_with_the_differences(self, begun, new_bench, rig):
@@ -175,10 +121,7 @@ class TestAnotherBench:
         point_results = run_campaign(
             bench, campaign("one", "two"), begun, ExistingRecordings.RESUME, changed_bench=ChangedBench.ACCEPT
         )
-        assert [point_result.outcome for point_result in point_results] == [
-            PointOutcome.RECORDED,
-            PointOutcome.RECORDED,
-        ]
+        assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
         run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
 
 
@@ -202,11 +145,7 @@ class TestFurtherMeasurements:
         point_results = run_campaign(
             bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME, after=after
         )
-        assert [(point_result.name, point_result.outcome) for point_result in point_results] == [
-            ("one", PointOutcome.KEPT),
-            ("more", PointOutcome.KEPT),
-            ("two", PointOutcome.RECORDED),
-        ]
+        assert outcomes(point_results) == [("one", "kept"), ("more", "kept"), ("two", "recorded")]
         assert asked == [
             ("one", ["one"], True),
             ("more", ["one", "more"], True),
@@ -219,7 +158,7 @@ class TestFurtherMeasurements:
 
         with pytest.raises(ZeroDivisionError):
             run_campaign(bench, campaign("one"), tmp_path, after=broken)
-        assert points(tmp_path)[0].state is JournalPointState.DONE
+        assert states(tmp_path) == ["done"]
         names = iter([[dwell("more")], []])
         point_results = run_campaign(
             bench,
@@ -228,30 +167,15 @@ class TestFurtherMeasurements:
             ExistingRecordings.RESUME,
             after=lambda finished, recording: next(names),
         )
-        assert [(point_result.name, point_result.outcome) for point_result in point_results] == [
-            ("one", PointOutcome.KEPT),
-            ("more", PointOutcome.RECORDED),
-        ]
+        assert outcomes(point_results) == [("one", "kept"), ("more", "recorded")]
 
 
 class TestResuming:
-    def test_a_removed_recording_is_recorded_again(self, bench, tmp_path):
-        run_campaign(bench, campaign("one", "two"), tmp_path)
-        (tmp_path / "one.h5").unlink()
-        point_results = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
-        assert [point_result.outcome for point_result in point_results] == [
-            PointOutcome.RECORDED,
-            PointOutcome.KEPT,
-        ]
-
     def test_a_lost_journal_is_rebuilt_from_the_recordings(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         journal_path(tmp_path, "c").unlink()
         point_results = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
-        assert [point_result.outcome for point_result in point_results] == [
-            PointOutcome.KEPT,
-            PointOutcome.KEPT,
-        ]
+        assert outcomes(point_results) == [("one", "kept"), ("two", "kept")]
         assert [point.reason_code for point in points(tmp_path)] == [ReasonCode.FOUND, ReasonCode.FOUND]
 
     def test_two_programs_cannot_carry_out_one_campaign(self, bench, tmp_path):
@@ -260,7 +184,7 @@ class TestResuming:
                 run_campaign(bench, campaign("one"), tmp_path, ExistingRecordings.RESUME)
 
         run_campaign(bench, campaign("one"), tmp_path, on_progress=second)
-        assert points(tmp_path)[0].state is JournalPointState.DONE
+        assert states(tmp_path) == ["done"]
 
     def test_a_stop_between_two_points_leaves_the_rest_queued(self, bench, tmp_path):
         stop = StopSwitch()
@@ -272,29 +196,20 @@ class TestResuming:
             switch=stop,
         )
         assert [point_result.name for point_result in point_results] == ["one"]
-        assert [point.state for point in points(tmp_path)] == [
-            JournalPointState.DONE,
-            JournalPointState.QUEUED,
-        ]
+        assert states(tmp_path) == ["done", "queued"]
         assert log(tmp_path)[-1]["text"] == "c was stopped: enough"
 
 
 class TestWatching:
     def test_log_and_status_line_show_the_story(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
-        assert [line["event"] for line in log(tmp_path)] == [
-            "begun",
-            "point_begun",
-            "point_done",
-            "point_begun",
-            "point_done",
-            "ended",
-        ]
+        of_points = ["point_begun", "point_done"]
+        assert [line["event"] for line in log(tmp_path)] == ["begun", *of_points, *of_points, "ended"]
         last = (tmp_path / "c.status").read_text().splitlines()[-1]
         assert "c is through (2 done, about 0:00:00 left)" in last
 
     def test_control_characters_of_instruments_do_not_reach_the_status(self, bench, tmp_path):
-        lost = failing_once(bench, lambda: DataLost("it replied \x1b[2J\udcff\nc is through"))
+        lost = failing_once(bench, DataLost("it replied \x1b[2J\udcff\nc is through"))
         with pytest.raises(DataLost):
             run_campaign(bench, campaign("one", attempts=1), tmp_path, on_progress=lost)
         text = (tmp_path / "c.status").read_text()
@@ -314,13 +229,8 @@ class TestWatching:
             CommandMessenger((sys.executable, "-c", keep, str(told))),
             CommandMessenger(("/no/such/program", "--now")),
         )
-        run_campaign(
-            bench,
-            campaign("one", attempts=2),
-            tmp_path,
-            on_progress=failing_once(bench, lambda: DataLost("a hole")),
-            messengers=messengers,
-        )
+        fault = failing_once(bench, DataLost("a hole"))
+        run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=fault, messengers=messengers)
         fault, end = (json.loads(line) for line in told.read_text().splitlines())
         assert (fault["event"], fault["why"], fault["reason"]) == ("fault", "data_lost", "one: a hole")
         assert (end["event"], end["recorded"], end["campaign"]) == ("ended", 1, "c")
