@@ -1,5 +1,6 @@
 """A generator that takes its time for a setting, while samples are converted."""
 
+from collections import deque
 from contextlib import suppress
 
 import numpy as np
@@ -9,7 +10,6 @@ from vibench.acquisition.errors import ConfigurationError, DriveLate
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.silence_watch import LowLevelCheck
 
 RATE = 5120.0
 DRIVE = 0
@@ -22,15 +22,8 @@ def dwell():
 
 
 def sweep(step_s, **changes):
-    excitation = SineSweep(
-        amplitude_vpp=1.0,
-        start_hz=150.0,
-        stop_hz=250.0,
-        duration_s=4.0,
-        step_s=step_s,
-        settle_s=0.3,
-        **changes,
-    )
+    ends = {"start_hz": 150.0, "stop_hz": 250.0, **changes}
+    excitation = SineSweep(amplitude_vpp=1.0, duration_s=4.0, step_s=step_s, settle_s=0.3, **ends)
     return Measurement(name="sweep", excitation=excitation, **RAMP)
 
 
@@ -40,10 +33,13 @@ def stretch(bench, label):
     return bench.recorder.channel(DRIVE)[found["first"] : found["last"] + 1]
 
 
-def carried_out(bench, plan, tmp_path, check=LowLevelCheck.AT_LOW_LEVEL):
-    with Run(bench, plan, tmp_path / "run.h5", check, bench.recorder.create) as run:
-        for _ in run:
-            pass
+def run_of(bench, plan, tmp_path):
+    return Run(bench, plan, tmp_path / "run.h5", create=bench.recorder.create)
+
+
+def carried_out(bench, plan, tmp_path):
+    with run_of(bench, plan, tmp_path) as run:
+        deque(run, maxlen=0)
     return bench.recorder
 
 
@@ -97,8 +93,7 @@ def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, late
 
 def test_a_ramp_lasts_as_long_as_its_commands(bench, tmp_path):
     bench.world.latency_s = 0.25
-    most = []
-    with Run(bench, dwell(), tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
+    with run_of(bench, dwell(), tmp_path) as run:
         most = [bench.digitizer.waiting_samples / RATE for _ in run]
     assert max(most) <= 3 * 0.25
     up = stretch(bench, "ramp_up")
@@ -109,14 +104,13 @@ def test_a_ramp_lasts_as_long_as_its_commands(bench, tmp_path):
 def test_a_lagging_drive_ends_the_run_with_its_position(bench, tmp_path):
     plan = sweep(0.05)
     bench.world.latency_s = 0.02
-    with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
+    with run_of(bench, plan, tmp_path) as run:
         next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
         bench.world.latency_s = 0.2
         with pytest.raises(
             DriveLate, match=r"^the drive was 1.* s behind its plan at 1.* Hz, .* lasts 0.05 s"
         ):
-            for _ in run:
-                pass
+            deque(run, maxlen=0)
     assert bench.recorder.ending[0] is RecordingState.FAILED
     assert not bench.world.is_on
     late = [text for _, kind, text in bench.recorder.events if kind == "late"]
@@ -127,11 +121,10 @@ def test_a_lagging_drive_ends_the_run_with_its_position(bench, tmp_path):
 def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s):
     bench.world.latency_s = 0.02
     plan = sweep(0.1)
-    with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
+    with run_of(bench, plan, tmp_path) as run:
         next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
         bench.world.convert(round(stall_s * RATE))
-        for _ in run:
-            pass
+        deque(run, maxlen=0)
     assert bench.recorder.ending[0] is RecordingState.COMPLETE
     assert [kind for _, kind, _ in bench.recorder.events].count("late") in range(2, round(stall_s / 0.1) + 5)
     # What the pause lost is made up: the end is as late as the command alone makes it, and that is noted.
@@ -145,13 +138,8 @@ def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s)
 def test_stalls_of_the_computer_request_no_frequency_outside_the_plan(bench, tmp_path, seed):
     """A sweep from 20 Hz to 600 Hz asked its generator for -186 Hz after some stalls, others for 1,451 Hz."""
     chance = np.random.default_rng(seed)
-    plan = sweep(0.1)
-    plan = plan.model_copy(update={"excitation": plan.excitation.model_copy(update={"start_hz": 20.0})})
     bench.world.latency_s = 0.005
-    with (
-        suppress(DriveLate),
-        Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run,
-    ):
+    with suppress(DriveLate), run_of(bench, sweep(0.1, start_hz=20.0), tmp_path) as run:
         for progress in run:
             if progress.frequency_hz is not None and chance.uniform() < 0.1:
                 bench.world.convert(round(chance.uniform(0.05, 1.2) * RATE))

@@ -12,10 +12,12 @@ from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.plan import CHECK_FREQUENCY_HZ, Campaign, Dwell, Measurement, RunState
 from vibench.acquisition.plan._schedule import CHECK_LISTEN_S, CHECK_SETTLE_S
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.rig import CalibrationRule, OutputUse, confirm_simulated, load_rig
+from vibench.acquisition.rig import OutputUse, load_rig
 from vibench.acquisition.run.generator_drive import CHECK_MARGIN_S, GUARD_S
 from vibench.acquisition.run.run import Run
 from vibench.acquisition.stopping.stop import Cause, StopRequest
+
+from .ending_silent import bench_on, upto
 
 DEAD_MAN_S = 0.5
 FREQUENCY_HZ = 263.0
@@ -34,7 +36,7 @@ def guarded(laboratory):
     virtual, connected = laboratory()
     generator = connected.generator.model_copy(update={"dead_man_s": DEAD_MAN_S})
     connected = connected.model_copy(update={"generator": generator})
-    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+    with bench_on(connected) as bench:
         yield virtual, bench
 
 
@@ -47,7 +49,7 @@ def terminal(virtual, duration_s):
 def test_a_stalled_run_is_silent_after_its_burst(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
-        next(progress for progress in run if progress.state is RunState.RECORDING)
+        upto(run, RunState.RECORDING)
         volts = terminal(virtual, 2 * DEAD_MAN_S)
         loud = np.flatnonzero(np.abs(volts) > LOUD_V)
         assert loud.size  # it was playing
@@ -71,12 +73,10 @@ def test_the_check_measures_the_same_with_a_dead_man(laboratory, tmp_path, dead_
     found = []
     for each_s in (None, dead_man_s):
         generator = connected.generator.model_copy(update={"dead_man_s": each_s})
-        with open_bench(
-            connected.model_copy(update={"generator": generator}), confirm_simulated, CalibrationRule.WAIVED
-        ) as bench:
+        with bench_on(connected.model_copy(update={"generator": generator})) as bench:
             path = tmp_path / f"{each_s}.h5"
             with Run(bench, PLAN, path) as run:
-                next(progress for progress in run if progress.state is RunState.RAMPING_UP)
+                upto(run, RunState.RAMPING_UP)
             with open_recording(path) as recording:
                 text = next(each.text for each in recording.events if each.kind == "check")
             found.append(float(text.split()[1]))
@@ -116,7 +116,7 @@ def test_the_bursts_are_whole_periods_with_short_gaps_between(guarded, tmp_path)
 def test_the_generator_can_play_again_after_the_run(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
-        next(progress for progress in run if progress.state is RunState.RECORDING)
+        upto(run, RunState.RECORDING)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "enough"))
         deque(run, maxlen=0)
     bench.generator.load_sine(100.0, 1.0)
@@ -127,29 +127,20 @@ def test_the_generator_can_play_again_after_the_run(guarded, tmp_path):
 
 
 REFUSED = {
-    "sweep": {"kind": "sine_sweep", "amplitude_vpp": 1.0, "start_hz": 100, "stop_hz": 300, "duration_s": 2},
-    "noise": {
-        "kind": "multisine_noise",
-        "amplitude_vpp": 1.0,
-        "band_start_hz": 20,
-        "band_stop_hz": 400,
-    },
+    "sweep": {"kind": "sine_sweep", "start_hz": 100, "stop_hz": 300, "duration_s": 2},
+    "noise": {"kind": "multisine_noise", "band_start_hz": 20, "band_stop_hz": 400},
     "held level": {
-        "kind": "held_dwell",
-        "amplitude_vpp": 1.0,
-        "base_level": {"displacement_m": 1e-7},
-        "frequency_hz": 180,
-        "duration_s": 2,
+        "kind": "held_dwell", "base_level": {"displacement_m": 1e-7}, "frequency_hz": 180, "duration_s": 2,
     },
-    "slow sine": {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 1.5, "duration_s": 2},
-}
+    "slow sine": {"kind": "dwell", "frequency_hz": 1.5, "duration_s": 2},
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", REFUSED)
 def test_kinds_without_dead_man_are_refused_before_the_campaign(kind, guarded, tmp_path):
     virtual, bench = guarded
     before_s = virtual.world.time_s
-    refused = {"name": "second", "excitation": REFUSED[kind]}
+    refused = {"name": "second", "excitation": {"amplitude_vpp": 1.0, **REFUSED[kind]}}
     campaign = Campaign.model_validate({"name": "trial", "measurements": [PLAN.model_dump(), refused]})
     with pytest.raises(ConfigurationError, match="lets only sines of one frequency play"):
         run_campaign(bench, campaign, tmp_path)

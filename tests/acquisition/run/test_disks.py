@@ -11,14 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vibench.acquisition import AcquisitionError, StopLevel, open_bench, open_recording
+from vibench.acquisition import AcquisitionError, StopLevel, open_recording
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import RecordingState, _committer, create_recording, part_of, recover
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run.run import Run
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
-from .test_stop_matrix import PLAN, SILENT_V, terminal_v, upto
+from .ending_silent import bench_on, terminal_v, upto
+from .test_stop_matrix import PLAN, SILENT_V
 
 PAUSE = Event()
 
@@ -80,7 +80,7 @@ DISKS = {
 def test_every_disk_fault_leaves_silence_a_sentence_and_a_recording(laboratory, tmp_path, name):
     virtual, connected = laboratory()
     disk, path, said = BadDisk(DISKS[name]), tmp_path / "run.h5", ""
-    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+    with bench_on(connected) as bench:
         try:
             with Run(bench, PLAN, path, create=disk.create) as run:
                 upto(run, RunState.RECORDING)
@@ -111,7 +111,7 @@ def test_a_clock_jump_changes_time_labels_only(laboratory, tmp_path, monkeypatch
     """Of the calendar; deadlines go by a clock that no one can set."""
     virtual, connected = laboratory()
     now = time.time
-    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+    with bench_on(connected) as bench:
         with Run(bench, PLAN, tmp_path / "run.h5") as run:
             upto(run, RunState.RECORDING)
             # The recording's own look at the clock: gRPC's must agree with that of its core.

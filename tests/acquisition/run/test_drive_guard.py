@@ -5,7 +5,6 @@ from pathlib import Path
 from threading import Event
 from time import monotonic
 
-import numpy as np
 import pytest
 
 from vibench.acquisition import (
@@ -13,14 +12,12 @@ from vibench.acquisition import (
     InstrumentLost,
     StopLevel,
     StopSwitch,
-    open_bench,
     open_recording,
 )
 from vibench.acquisition.errors import RunStalled
 from vibench.acquisition.host.beside import Beside
 from vibench.acquisition.plan import Dwell, Measurement, RunState
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run import silence_watch as drive_guard
 from vibench.acquisition.run.run import Run
 from vibench.acquisition.run.silence_watch import DriveGuard
@@ -33,6 +30,8 @@ from vibench.acquisition.stopping.program import (
 from vibench.acquisition.stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopRequest
 from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import Fate, fate_of, stop_path, taken_path, write_stop_file
+
+from .ending_silent import bench_on, terminal_v, upto
 
 PLAN = Measurement(
     name="run",
@@ -50,21 +49,13 @@ def until(is_so, within_s=20.0):
         pause.wait(0.01)
 
 
-def terminal_v(virtual):
-    virtual.world.advance(0.1)
-    return np.max(np.abs(virtual.generator.render(virtual.world.time_s, 1e-4, 1000)))
-
-
 @pytest.fixture
 def recording(laboratory, tmp_path, monkeypatch):
     """A run in the middle of its dwell, which goes on only when it is asked."""
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "state"))
     virtual, connected = laboratory()
-    with (
-        open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench,
-        Run(bench, PLAN, tmp_path / "run.h5") as run,
-    ):
-        next(progress for progress in run if progress.state is RunState.RECORDING)
+    with bench_on(connected) as bench, Run(bench, PLAN, tmp_path / "run.h5") as run:
+        upto(run, RunState.RECORDING)
         yield virtual, run
 
 

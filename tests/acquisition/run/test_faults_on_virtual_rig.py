@@ -5,7 +5,6 @@ Silence is looked at in the simulated world, at the generator's terminal, not in
 
 import re
 
-import numpy as np
 import pytest
 
 from vibench.acquisition import (
@@ -13,15 +12,15 @@ from vibench.acquisition import (
     CheckFailed,
     InstrumentError,
     InstrumentLost,
-    open_bench,
     open_recording,
     run_measurement,
 )
 from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
+
+from .ending_silent import bench_on, kept_drive, terminal_v, when_recording
 
 DWELL = Measurement(
     name="run",
@@ -32,40 +31,6 @@ DWELL = Measurement(
 SWEEP = DWELL.model_copy(
     update={"excitation": SineSweep(amplitude_vpp=1.5, start_hz=200, stop_hz=230, duration_s=3, settle_s=0.2)}
 )
-
-
-def bench_on(connected):
-    return open_bench(connected, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
-
-
-def terminal_v(virtual, duration_s=0.1):
-    """Largest voltage at the generator's terminal during the next tenth of a second."""
-    start_s = virtual.world.time_s
-    virtual.world.advance(duration_s)
-    interval_s = 1e-4
-    count = round(duration_s / interval_s)
-    return np.max(np.abs(virtual.generator.render(start_s + duration_s, interval_s, count)))
-
-
-def when_recording(act):
-    """Do ``act`` once, at the first block that belongs to the record."""
-    done = []
-
-    def watch(progress):
-        if progress.state is RunState.RECORDING and not done:
-            done.append(True)
-            act()
-
-    return watch
-
-
-def kept(path, state, reason):
-    with open_recording(path) as recording:
-        assert recording.state is state
-        assert re.search(reason, recording.reason, re.IGNORECASE), recording.reason
-        assert recording.samples > 0
-        assert np.max(np.abs(recording.read("drive_voltage"))) > 0
-        return recording.samples
 
 
 @pytest.mark.parametrize(
@@ -86,7 +51,7 @@ def test_a_converter_that_fails_leaves_silence_and_the_record_so_far(laboratory,
         virtual.faults.heal()
         assert terminal_v(virtual) < 1e-2
     assert re.search(said, str(failure.value), re.IGNORECASE), str(failure.value)
-    kept(tmp_path / "run.h5", RecordingState.FAILED, type(failure.value).__name__)
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, type(failure.value).__name__)
 
 
 def test_a_device_used_by_another_program_is_named_before_output(laboratory):
@@ -109,19 +74,10 @@ def test_a_pulled_usb_cable_advises_the_operator_to_switch_the_amplifier_off(lab
         run_measurement(bench, SWEEP, tmp_path / "run.h5", on_progress=pull)
     # Nobody can silence what cannot be reached: it is said, and the next program can.
     assert "MAY STILL BE ON" in "".join([str(failure.value), *getattr(failure.value, "__notes__", [])])
-    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
     virtual.faults.heal()
     with bench_on(connected):
         assert terminal_v(virtual) < 1e-2
-
-
-def test_a_server_that_dies_is_lost_and_the_generator_silent(laboratory, tmp_path):
-    virtual, connected = laboratory()
-    die = when_recording(virtual.faults.lose_daq_server)
-    with pytest.raises(InstrumentLost), bench_on(connected) as bench:
-        run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=die)
-    assert terminal_v(virtual) < 1e-2
-    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
 
 
 def test_a_late_reply_silences_the_drive(laboratory, tmp_path):
@@ -131,7 +87,7 @@ def test_a_late_reply_silences_the_drive(laboratory, tmp_path):
         with pytest.raises(InstrumentError, match="did not answer"):
             run_measurement(bench, SWEEP, tmp_path / "run.h5", on_progress=delay)
         assert terminal_v(virtual) < 1e-2
-    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentError")
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentError")
 
 
 def test_a_silently_replaced_setting_ends_the_run(laboratory, tmp_path):

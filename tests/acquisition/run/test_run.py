@@ -39,6 +39,8 @@ from vibench.acquisition.run.run import Run
 from vibench.acquisition.run.silence_watch import LISTEN_S, SILENT_V, LowLevelCheck, sine_amplitude
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
+from .ending_silent import upto
+
 RATE = 5120.0
 AMPLITUDE_VPP = 1.0
 DWELL = Measurement(
@@ -59,17 +61,16 @@ RECORDED_STATES = [
 every_state = pytest.mark.parametrize("state", RECORDED_STATES)
 
 
+def with_(**changes):
+    return DWELL.model_copy(update=changes)
+
+
 def run_of(bench, tmp_path, measurement=DWELL, check=LowLevelCheck.AT_LOW_LEVEL):
     return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
 
 
-def play(run):
-    return list(run)
-
-
-def upto(run, state):
-    """Iterate until the run yields a block in ``state``."""
-    return next(progress for progress in run if progress.state is state)
+def by_operator(level):
+    return StopRequest(Cause.OPERATOR, level, f"{level} pressed")
 
 
 def run_upto(state, *given, **options):
@@ -99,6 +100,14 @@ def assert_ended_without_a_jump(bench, state=RunState.RECORDING):
     assert settings[-1] <= 2.5e-3 + 1e-12
 
 
+@pytest.fixture(scope="module")
+def played(new_bench, rig, tmp_path_factory):
+    """A bench after a whole run; ``shown`` is the progress."""
+    bench = new_bench(rig)
+    bench.shown = list(run_of(bench, tmp_path_factory.mktemp("run")))
+    return bench
+
+
 class TestThePlanIsCarriedOut:
     def test_a_run_passes_all_states_in_order(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
@@ -109,15 +118,14 @@ class TestThePlanIsCarriedOut:
         assert run.state is RunState.FINISHED
         assert_silent_and_finished(bench, RecordingState.COMPLETE)
 
-    def test_every_segment_has_exactly_its_planned_samples(self, bench, tmp_path):
-        play(run_of(bench, tmp_path))
-        lengths = {each["label"]: each["last"] - each["first"] + 1 for each in bench.recorder.segments}
+    def test_every_segment_has_exactly_its_planned_samples(self, played):
+        lengths = {each["label"]: each["last"] - each["first"] + 1 for each in played.recorder.segments}
         expected = {"check": CHECK_S, "ramp_up": 0.2, "dwell": 0.5, "ramp_down": 0.2}
         assert lengths == {label: round(seconds * RATE) for label, seconds in expected.items()}
-        assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
+        assert played.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
 
-    def test_the_blocks_show_the_progress(self, bench, tmp_path):
-        shown = play(run_of(bench, tmp_path))
+    def test_the_blocks_show_the_progress(self, played):
+        shown = played.shown
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
         assert max(progress.block.volts.shape[1] for progress in shown) <= 0.1 * RATE
@@ -126,20 +134,18 @@ class TestThePlanIsCarriedOut:
         assert settings[RunState.CHECKING] == pytest.approx(0.02 * AMPLITUDE_VPP)
         assert settings[RunState.RECORDING] == AMPLITUDE_VPP
 
-    def test_the_recorded_drive_is_the_planned_sine(self, bench, tmp_path):
-        play(run_of(bench, tmp_path))
-        dwell = bench.recorder.segments[2]
+    def test_the_recorded_drive_is_the_planned_sine(self, played):
+        dwell = played.recorder.segments[2]
         volts = (
-            bench.recorder.channel(0)[dwell["first"] : dwell["last"] + 1] * bench.channels[0].units_per_volt
+            played.recorder.channel(0)[dwell["first"] : dwell["last"] + 1] * played.channels[0].units_per_volt
         )
-        expected = AMPLITUDE_VPP / 2 * bench.rig.generator.terminal_factor()
+        expected = AMPLITUDE_VPP / 2 * played.rig.generator.terminal_factor()
         assert sine_amplitude(volts, 260.0, RATE) == pytest.approx(expected, rel=1e-9)
 
-    def test_the_ramp_follows_a_half_cosine_in_steps(self, bench, tmp_path):
-        play(run_of(bench, tmp_path))
-        ramp = next(each for each in bench.recorder.segments if each["label"] == "ramp_up")
+    def test_the_ramp_follows_a_half_cosine_in_steps(self, played):
+        ramp = next(each for each in played.recorder.segments if each["label"] == "ramp_up")
         stairs = [
-            (at - ramp["first"], value) for at, value in bench.world.amplitudes() if ramp["first"] <= at
+            (at - ramp["first"], value) for at, value in played.world.amplitudes() if ramp["first"] <= at
         ]
         begins = np.array([at for at, _ in stairs[1:11]])
         values = np.array([value for _, value in stairs[1:11]])
@@ -149,11 +155,10 @@ class TestThePlanIsCarriedOut:
         np.testing.assert_allclose(begins, np.round(np.arange(10) * 0.02 * RATE), atol=1)
         assert stairs[0] == (0, pytest.approx(quiet))
 
-    def test_the_output_is_turned_on_at_the_quiet_amplitude_only(self, bench, tmp_path):
-        play(run_of(bench, tmp_path))
+    def test_the_output_is_turned_on_at_the_quiet_amplitude_only(self, played):
         amplitude = None
         at_start = []
-        for name, value, _ in bench.world.calls:
+        for name, value, _ in played.world.calls:
             if name == "amplitude":
                 amplitude = value
             if name == "start":
@@ -161,20 +166,19 @@ class TestThePlanIsCarriedOut:
         assert at_start == [pytest.approx(0.02 * AMPLITUDE_VPP), pytest.approx(2.5e-3)]
 
     def test_a_checked_bench_is_not_checked_again(self, bench, tmp_path):
-        play(run_of(bench, tmp_path, check=LowLevelCheck.RECENTLY_PASSED))
+        list(run_of(bench, tmp_path, check=LowLevelCheck.RECENTLY_PASSED))
         assert [each["label"] for each in bench.recorder.segments] == ["ramp_up", "dwell", "ramp_down"]
         events = [event[1:] for event in bench.recorder.events]
         assert ("check", "left out: the bench was checked shortly before") in events
         assert ("player", "function generator") in events
 
-    def test_the_header_holds_plan_bench_and_confirmations(self, bench, tmp_path):
-        play(run_of(bench, tmp_path))
-        header = bench.recorder.header
+    def test_the_header_holds_plan_bench_and_confirmations(self, played):
+        header = played.recorder.header
         assert Measurement.model_validate_json(header.plan_json) == DWELL
-        assert type(bench.rig).model_validate_json(header.bench_json) == bench.rig
+        assert type(played.rig).model_validate_json(header.bench_json) == played.rig
         assert header.confirmations["Bruel & Kjaer 2706 gain"] == "10 dB"
         assert header.instruments["generator"].model == "GENERATOR"
-        assert header.expected_samples == bench.recorder.samples
+        assert header.expected_samples == played.recorder.samples
 
 
 class TestSweepsAndSteps:
@@ -182,8 +186,8 @@ class TestSweepsAndSteps:
         sweep = SineSweep(
             amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=1, step_s=0.0123, settle_s=0.2
         )
-        plan = DWELL.model_copy(update={"excitation": sweep})
-        play(run_of(bench, tmp_path, plan))
+        plan = with_(excitation=sweep)
+        list(run_of(bench, tmp_path, plan))
         segments = [each for each in bench.recorder.segments if each["label"] == "sweep"]
         assert len(segments) == 1
         assert segments[0]["last"] - segments[0]["first"] + 1 == round(RATE)
@@ -194,14 +198,14 @@ class TestSweepsAndSteps:
 
     def test_a_sweep_never_jumps_in_phase_or_amplitude(self, bench, tmp_path):
         sweep = SineSweep(amplitude_vpp=2, start_hz=50, stop_hz=80, duration_s=1, step_s=0.01, settle_s=0.1)
-        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": sweep})))
+        list(run_of(bench, tmp_path, with_(excitation=sweep)))
         segment = next(each for each in bench.recorder.segments if each["label"] == "sweep")
         volts = bench.recorder.channel(0)[segment["first"] : segment["last"] + 1]
         assert np.max(np.abs(np.diff(volts * bench.channels[0].units_per_volt))) <= 2 * np.pi * 80 / RATE
 
     def test_stepped_sine_settles_at_every_frequency(self, bench, tmp_path):
         steps = SteppedSine(amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=0.13, record_s=0.2)
-        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": steps})))
+        list(run_of(bench, tmp_path, with_(excitation=steps)))
         segments = [each for each in bench.recorder.segments if each["label"] == "step"]
         assert [each["numbers"]["frequency_hz"] for each in segments] == [100, 150, 260]
         gaps = [b["first"] - a["last"] - 1 for a, b in pairwise(segments)]
@@ -209,16 +213,9 @@ class TestSweepsAndSteps:
         assert bench.recorder.states().count("ramping_up") == 1
 
     def test_a_new_waveform_is_loaded_only_when_the_drive_is_quiet(self, bench, tmp_path):
-        noise = WhiteNoise(
-            amplitude_vpp=2,
-            band_start_hz=20,
-            band_stop_hz=800,
-            realisations=3,
-            periods=1,
-            settle_s=0.1,
-            repetition_hz=2,
-        )
-        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": noise})))
+        band = {"band_start_hz": 20, "band_stop_hz": 800, "repetition_hz": 2}
+        noise = WhiteNoise(amplitude_vpp=2, realisations=3, periods=1, settle_s=0.1, **band)
+        list(run_of(bench, tmp_path, with_(excitation=noise)))
         amplitude, before, after = None, [], []
         for name, value, _ in bench.world.calls:
             if name == "load_waveform":
@@ -242,7 +239,7 @@ class TestSweepsAndSteps:
         steps = SteppedSine(
             amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=settle_s, record_s=record_s
         )
-        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": steps})))
+        list(run_of(bench, tmp_path, with_(excitation=steps)))
         total_s = CHECK_S + 0.4 + 3 * (settle_s + record_s)
         assert abs(bench.recorder.samples - total_s * RATE) <= 0.5 + 1e-6
 
@@ -252,7 +249,7 @@ class TestEveryWayOut:
     def test_a_cancel_ramps_down(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         run.cancel("the operator pressed stop")
-        play(run)
+        list(run)
         assert run.outcome.state is run.state is RunState.STOPPED
         assert bench.recorder.ending == (RecordingState.STOPPED, "the operator pressed stop")
         assert_silent_and_finished(bench, RecordingState.STOPPED)
@@ -262,27 +259,27 @@ class TestEveryWayOut:
         run = run_of(bench, tmp_path)
         shown = upto(run, RunState.RECORDING)
         run.cancel()
-        rest = play(run)
+        rest = list(run)
         assert all(progress.state is RunState.RAMPING_DOWN for progress in rest)
         assert rest[-1].elapsed_s - shown.elapsed_s == pytest.approx(DWELL.ramp_s + LISTEN_S, abs=1e-3)
 
     def test_a_cancelled_segment_stays_incomplete(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.cancel()
-        play(run)
+        list(run)
         assert bench.recorder.segments[-1]["label"] == "dwell"
         assert bench.recorder.segments[-1]["last"] is None
 
     def test_a_run_cancelled_before_it_begins_plays_nothing(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         run.cancel()
-        play(run)
+        list(run)
         assert run.state is RunState.STOPPED
         assert "start" not in [name for name, _, _ in bench.world.calls]
 
     def test_cancelling_a_run_that_has_ended_changes_nothing(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
-        play(run)
+        list(run)
         run.cancel()
         assert run.outcome.state is RunState.FINISHED
 
@@ -291,7 +288,7 @@ class TestEveryWayOut:
         run = run_upto(state, bench, tmp_path)
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
-            play(run)
+            list(run)
         assert run.state is RunState.FAILED
         assert "base acceleration" in bench.recorder.ending[1]
         assert_silent_and_finished(bench, RecordingState.FAILED)
@@ -311,7 +308,7 @@ class TestEveryWayOut:
         run = run_upto(state, bench, tmp_path)
         bench.world.faults[call] = [lambda: fault("it broke")]
         with pytest.raises(fault, match="it broke"):
-            play(run)
+            list(run)
         assert run.state is RunState.FAILED
         assert "it broke" in bench.recorder.ending[1]
         assert_silent_and_finished(bench, RecordingState.FAILED)
@@ -323,7 +320,7 @@ class TestEveryWayOut:
         for name in ("set_amplitude", "set_frequency", "load_sine"):
             bench.world.permanent[name] = lambda: InstrumentLost("no answer")
         with pytest.raises(InstrumentLost, match="no answer"):
-            play(run)
+            list(run)
         assert_silent_and_finished(bench, RecordingState.FAILED)
 
     @every_state
@@ -331,7 +328,7 @@ class TestEveryWayOut:
         run = run_upto(state, bench, tmp_path)
         bench.world.permanent["stop"] = lambda: InstrumentLost("THE OUTPUT MAY STILL BE ON")
         with pytest.raises(InstrumentLost, match="MAY STILL BE ON"):
-            play(run)
+            list(run)
         assert run.state is RunState.FAILED
         assert "MAY STILL BE ON" in bench.recorder.ending[1]
         assert not bench.world.is_sampling
@@ -342,7 +339,7 @@ class TestEveryWayOut:
         run = run_upto(state, bench, tmp_path)
         bench.world.faults[call] = [KeyboardInterrupt]
         with pytest.raises(KeyboardInterrupt):
-            play(run)
+            list(run)
         assert bench.recorder.ending == (RecordingState.STOPPED, "interrupted from the keyboard")
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
@@ -370,7 +367,7 @@ class TestEveryWayOut:
         bench.world.permanent["recorder.finish"] = lambda: RecordingError("disk full")
         run = run_of(bench, tmp_path)
         with pytest.raises(RecordingError, match="disk full"):
-            play(run)
+            list(run)
         assert not bench.world.is_on
         assert run.outcome.state is RunState.FAILED
 
@@ -379,16 +376,20 @@ class TestEveryWayOut:
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         bench.world.faults["digitizer.read"] = [lambda: DataLost("a hole")]
         with pytest.raises(DataLost, match="a hole"):
-            play(run)
+            list(run)
         assert bench.recorder.ending[1] == "DataLost: a hole; then: cannot stop"
 
     def test_a_limit_passed_while_ramping_down_does_not_stop_the_ramp(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.cancel()
         bench.world.background_m_per_s2 = 1000.0
-        play(run)
+        list(run)
         assert run.state is RunState.STOPPED
         assert_ended_without_a_jump(bench)
+
+
+def text_of_silence(bench):
+    return next(text for _, kind, text in bench.recorder.events if kind == "silence")
 
 
 class TestStopLevels:
@@ -397,9 +398,9 @@ class TestStopLevels:
         run = run_upto(RunState.RECORDING, bench, tmp_path, SLOW)
         shown = []
         for level in levels:
-            run.switch.ask(StopRequest(Cause.OPERATOR, level, f"{level} pressed"))
+            run.switch.ask(by_operator(level))
             shown += [progress for progress in [next(iter(run), None)] if progress is not None]
-        return run, [*shown, *play(run)]
+        return run, [*shown, *list(run)]
 
     def test_a_ramp_takes_as_long_as_planned(self, bench, tmp_path):
         run, shown = self.ended(bench, tmp_path, StopLevel.RAMP)
@@ -417,9 +418,9 @@ class TestStopLevels:
 
     def test_off_switches_the_output_off_before_the_next_read(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
-        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
+        run.switch.ask(by_operator(StopLevel.OFF))
         before = len(bench.world.calls)
-        play(run)
+        list(run)
         assert bench.world.calls[before][0] == "stop"
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
@@ -434,25 +435,24 @@ class TestStopLevels:
     def test_a_gentler_stop_does_not_replace_a_harder_one(self):
         switch = StopSwitch()
         switch.ask(StopRequest(Cause.EMERGENCY, StopLevel.ABORT, "first"))
-        switch.ask(StopRequest(Cause.OPERATOR, StopLevel.RAMP, "second"))
+        switch.ask(by_operator(StopLevel.RAMP))
         assert switch.request.reason == "first"
 
     def test_the_time_to_silence_is_recorded(self, bench, tmp_path):
         self.ended(bench, tmp_path, StopLevel.ABORT)
-        said = next(event[2] for event in bench.recorder.events if event[1] == "silence")
+        said = text_of_silence(bench)
         took_s = float(said.removeprefix("abort: ").partition(" ")[0])
         # The last stair of the ramp lies below what counts as silence.
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "measured silence" in said
 
     def test_off_switches_the_output_off_before_the_converter_is_asked(self, bench, tmp_path, monkeypatch):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         was_on = []
         waiting = property(lambda _: was_on.append(bench.world.is_on) or 0)
         monkeypatch.setattr(type(bench.digitizer), "waiting_samples", waiting)
-        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
-        play(run)
+        run.switch.ask(by_operator(StopLevel.OFF))
+        list(run)
         assert was_on
         assert not any(was_on)
 
@@ -469,8 +469,8 @@ class TestStopLevels:
             return read(samples)
 
         monkeypatch.setattr(bench.digitizer, "read", read_slowly)
-        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
-        play(run)
+        run.switch.ask(by_operator(StopLevel.ABORT))
+        list(run)
         loud = np.flatnonzero(np.abs(bench.recorder.channel(0)) > SILENT_V)
         took_s = (loud[-1] - stopped) / bench.digitizer.sample_rate_hz
         # The block in which the stop is seen, then the ramp.
@@ -490,8 +490,8 @@ class TestStopLevels:
 
         monkeypatch.setattr(bench.digitizer, "read", read_slowly)
         began, stopped = len(bench.world.amplitudes()), bench.world.samples
-        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.RAMP, "ramp"))
-        play(run)
+        run.switch.ask(by_operator(StopLevel.RAMP))
+        list(run)
         loud = np.flatnonzero(np.abs(bench.recorder.channel(0)) > SILENT_V)
         took_s = (loud[-1] - stopped) / rate_hz
         assert took_s <= BLOCK_S + reading_s + max(DWELL.ramp_s + reading_s, FEWEST_STAIRS * reading_s)
@@ -502,20 +502,18 @@ class TestStopLevels:
     def test_a_drive_that_stays_on_is_recorded_and_raises_an_alarm(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         bench.world.stays_on = True
-        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
+        run.switch.ask(by_operator(StopLevel.OFF))
         with pytest.raises(InstrumentError, match="THE OUTPUT MAY STILL BE ON"):
-            play(run)
-        assert "not silent" in next(event[2] for event in bench.recorder.events if event[1] == "silence")
+            list(run)
+        assert "not silent" in text_of_silence(bench)
         assert bench.recorder.ending[0] is RecordingState.FAILED
 
     def test_mains_hum_does_not_count_as_drive(self, bench, tmp_path):
         bench.world.hum_v = 0.012
-        run = run_upto(RunState.RECORDING, bench, tmp_path, DWELL.model_copy(update={"excitation": LOUD}))
-        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
-        play(run)
-        assert "measured silence" in next(
-            event[2] for event in bench.recorder.events if event[1] == "silence"
-        )
+        run = run_upto(RunState.RECORDING, bench, tmp_path, with_(excitation=LOUD))
+        run.switch.ask(by_operator(StopLevel.ABORT))
+        list(run)
+        assert "measured silence" in text_of_silence(bench)
 
     @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
     def test_a_held_run_keeps_its_state_and_continues_there(self, bench, tmp_path, state):
@@ -526,7 +524,7 @@ class TestStopLevels:
         assert {progress.state for progress in held} == {RunState.HELD}
         assert {progress.amplitude_vpp for progress in held} == {before.amplitude_vpp}
         run.switch.resume()
-        after = play(run)
+        after = list(run)
         assert after[0].state is state
         assert run.state is RunState.FINISHED
         assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2 + 0.3) * RATE)
@@ -537,7 +535,7 @@ class TestStopLevels:
         next(iter(run))
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded):
-            play(run)
+            list(run)
         assert_silent_and_finished(bench, RecordingState.FAILED)
 
     def test_a_stop_ends_a_hold(self, bench, tmp_path):
@@ -545,7 +543,7 @@ class TestStopLevels:
         run.switch.hold()
         next(iter(run))
         run.cancel("enough")
-        play(run)
+        list(run)
         assert bench.recorder.ending == (RecordingState.STOPPED, "enough")
         assert_ended_without_a_jump(bench)
 
@@ -553,7 +551,7 @@ class TestStopLevels:
     def test_a_hold_ends_after_its_longest_time(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.hold()
-        play(run)
+        list(run)
         assert run.outcome.state is RunState.STOPPED
         assert f"held for {HOLD_LONGEST_S:g} s" in run.outcome.reason
 
@@ -562,7 +560,7 @@ class TestRefusals:
     def refused(self, bench, tmp_path, measurement, error):
         run = run_of(bench, tmp_path, measurement)
         with pytest.raises(error) as caught:
-            play(run)
+            list(run)
         assert run.state is RunState.FAILED
         assert "start" not in [name for name, _, _ in bench.world.calls]
         assert bench.recorder.path is None
@@ -570,14 +568,12 @@ class TestRefusals:
 
     def test_a_plan_beyond_a_limit_is_refused_before_output(self, bench, tmp_path):
         hard = Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)
-        text = self.refused(bench, tmp_path, DWELL.model_copy(update={"excitation": hard}), LimitExceeded)
+        text = self.refused(bench, tmp_path, with_(excitation=hard), LimitExceeded)
         assert "the stroke (at 20 Hz, peak) would be" in text
 
     def test_streamed_noise_needs_an_analogue_output(self, bench, tmp_path):
         noise = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=800, duration_s=1)
-        text = self.refused(
-            bench, tmp_path, DWELL.model_copy(update={"excitation": noise}), ConfigurationError
-        )
+        text = self.refused(bench, tmp_path, with_(excitation=noise), ConfigurationError)
         assert "use white_noise with more realisations" in text
 
     def test_a_bench_without_a_recorded_drive_is_refused(self, bench, tmp_path):
@@ -602,7 +598,7 @@ class TestTheBenchCheck:
             setattr(bench.world, name, value)
         run = run_of(bench, tmp_path)
         with pytest.raises(CheckFailed, match=sentence):
-            play(run)
+            list(run)
         assert_silent_and_finished(bench, RecordingState.FAILED)
         loudest = max(value for _, value in bench.world.amplitudes())
         assert loudest == pytest.approx(0.02 * AMPLITUDE_VPP)
@@ -612,7 +608,7 @@ class TestTheBenchCheck:
         for name, value in fault.items():
             setattr(bench.world, name, value)
         run = run_of(bench, tmp_path)
-        play(run)
+        list(run)
         assert run.state is RunState.FINISHED
 
     @given(
@@ -632,16 +628,16 @@ class TestOverloads:
     def test_an_overload_is_recorded_and_the_run_continues(self, bench, tmp_path):
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         run = run_of(bench, tmp_path)
-        play(run)
+        list(run)
         assert run.state is RunState.FINISHED
         assert bench.recorder.blocks[0].overloads == bench.world.overloads
 
     def test_an_overload_ends_the_run_when_the_plan_says_so(self, bench, tmp_path):
-        strict = DWELL.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
+        strict = with_(limits=InRunLimits(on_overload=OnOverload.STOP))
         run = run_upto(RunState.RECORDING, bench, tmp_path, strict)
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
-            play(run)
+            list(run)
         assert_ended_without_a_jump(bench)
 
     @pytest.mark.parametrize(
@@ -653,7 +649,7 @@ class TestOverloads:
         ],
     )
     def test_a_plan_may_set_tighter_limits_than_the_rig(self, bench, tmp_path, limits, named):
-        run = run_of(bench, tmp_path, DWELL.model_copy(update={"limits": limits}))
+        run = run_of(bench, tmp_path, with_(limits=limits))
         with pytest.raises(LimitExceeded, match=named):
-            play(run)
+            list(run)
         assert_silent_and_finished(bench, RecordingState.FAILED)

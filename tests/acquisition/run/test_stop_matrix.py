@@ -29,10 +29,11 @@ from vibench.acquisition import (
 )
 from vibench.acquisition.plan import Dwell, Measurement, RunState, shortest_ramp_s
 from vibench.acquisition.recording import RecordingState, create_recording, recover
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run.acquisition_loop import BLOCK_S
 from vibench.acquisition.run.run import Run
 from vibench.acquisition.stopping.stop import Cause, StopRequest
+
+from .ending_silent import bench_on, terminal_v, upto
 
 RAMP_S = 0.3
 PLAN = Measurement(
@@ -135,19 +136,11 @@ class FullDisk:
         return writer
 
 
-def terminal_v(virtual):
-    """Largest voltage at the generator's terminal during the next tenth of a second."""
-    start_s = virtual.world.time_s
-    virtual.world.advance(0.1)
-    return np.max(np.abs(virtual.generator.render(start_s + 0.1, 1e-4, 1000)))
-
-
-def upto(run, state):
-    wanted = RunState.RECORDING if state is RunState.HELD else state
-    next(progress for progress in run if progress.state is wanted)
+def brought_to(run, state):
+    upto(run, RunState.RECORDING if state is RunState.HELD else state)
     if state is RunState.HELD:
         run.switch.hold()
-        next(progress for progress in run if progress.state is state)
+        upto(run, state)
 
 
 def pressed(stop, run):
@@ -176,10 +169,10 @@ def carried_out(laboratory, tmp_path, state, stop, fault_name):
     disk = FullDisk()
     run, error, cause_s, end_s = None, None, 0.0, 0.0
     try:
-        with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+        with bench_on(connected) as bench:
             run = Run(bench, PLAN, tmp_path / "run.h5", create=disk.create)
             with stop_on_signal(run.switch), run:
-                upto(run, state)
+                brought_to(run, state)
                 fault.happens(virtual.faults)
                 disk.is_full = fault_name == "disk full"
                 cause_s = virtual.world.time_s
@@ -273,7 +266,7 @@ def test_a_vanished_folder_leaves_silence_and_a_sentence(laboratory, tmp_path, s
     virtual, connected = laboratory()
     folder = tmp_path / "recordings"
     folder.mkdir()
-    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+    with bench_on(connected) as bench:
         run = Run(bench, PLAN, folder / "run.h5")
         upto(run, state)
         shutil.rmtree(folder) if what == "removed" else folder.rename(tmp_path / "elsewhere")
@@ -299,7 +292,7 @@ LOST_WITHIN_S, ABORTED_WITHIN_S = 1.1, 1.17
 def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tmp_path):
     """Its ramp has a setting for each of 20 stairs: two seconds."""
     virtual, connected = laboratory()
-    with open_bench(slow(connected), confirm_simulated, CalibrationRule.WAIVED) as bench:
+    with bench_on(slow(connected)) as bench:
         stop, off_s = bench.generator.stop, []
         bench.generator.stop = lambda: (stop(), off_s.append(monotonic()))
         with Run(bench, PLAN.model_copy(update={"ramp_step_s": 0.015}), tmp_path / "run.h5") as run:

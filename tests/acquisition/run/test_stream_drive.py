@@ -19,6 +19,8 @@ from vibench.acquisition.run.run import Run
 from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
+from .ending_silent import upto
+
 RATE = 5120.0
 AHEAD = 2560
 RAMP = 1024
@@ -37,14 +39,6 @@ heard_state = pytest.mark.parametrize("state", HEARD_STATES)
 
 def run_of(bench, tmp_path, measurement=NOISE, check=LowLevelCheck.AT_LOW_LEVEL):
     return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
-
-
-def play(run):
-    return list(run)
-
-
-def upto(run, state):
-    return next(progress for progress in run if progress.state is state)
 
 
 def run_upto(state, *given, **options):
@@ -101,8 +95,12 @@ def assert_faded_without_a_step(bench, ramp=RAMP):
 
 class TestThePlanIsCarriedOut:
     @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_the_drive_is_the_planned_noise_with_half_cosine_ramps(self, streaming_bench, tmp_path, check):
-        play(run_of(streaming_bench, tmp_path, check=check))
+    def test_the_drive_is_the_planned_noise_in_segments_of_known_length(
+        self, streaming_bench, tmp_path, check
+    ):
+        shown = list(run_of(streaming_bench, tmp_path, check=check))
+        assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
+        assert streaming_bench.recorder.header.expected_samples == streaming_bench.recorder.samples
         begin = round(CHECK_S * RATE) + AHEAD if check is LowLevelCheck.AT_LOW_LEVEL else 0
         hold = round(1.35 * RATE)
         level = np.concatenate([half_cosine(RAMP), np.ones(hold), 1 - half_cosine(RAMP)])
@@ -110,53 +108,39 @@ class TestThePlanIsCarriedOut:
             drive(streaming_bench)[begin:], level * planned(streaming_bench, level.size), atol=1e-12
         )
 
-    @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_segments_are_recorded_where_they_are_played(self, streaming_bench, tmp_path, check):
-        play(run_of(streaming_bench, tmp_path, check=check))
-        begin = round(CHECK_S * RATE) + AHEAD if check is LowLevelCheck.AT_LOW_LEVEL else 0
         found = {
             each["label"]: (each["first"], each["last"] + 1) for each in streaming_bench.recorder.segments
         }
         found.pop("check", None)
         noise = begin + RAMP + round(0.35 * RATE)
         end = noise + round(RATE)
-        assert found == {
-            "ramp_up": (begin, begin + RAMP),
-            "noise": (noise, end),
-            "ramp_down": (end, end + RAMP),
-        }
+        ramps = {"ramp_up": (begin, begin + RAMP), "ramp_down": (end, end + RAMP)}
+        assert found == {**ramps, "noise": (noise, end)}
 
-    @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_the_length_of_a_streamed_run_is_known_before_it_starts(self, streaming_bench, tmp_path, check):
-        shown = play(run_of(streaming_bench, tmp_path, check=check))
-        assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
-        assert streaming_bench.recorder.header.expected_samples == streaming_bench.recorder.samples
-
-    def test_the_states_match_a_generators_run(self, streaming_bench, tmp_path):
+    def test_states_and_settings_match_a_generators_run(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
-        seen = list(dict.fromkeys(progress.state for progress in run))
+        settings = {progress.state: progress.amplitude_vpp for progress in run}
+        seen = list(settings)
         # With an output, to be armed takes the time of what is written ahead.
         assert seen == [RunState.CHECKING, RunState.ARMED, *HEARD_STATES]
         assert streaming_bench.recorder.states() == ["armed", *(state.value for state in HEARD_STATES)]
         assert run.state is RunState.FINISHED
         assert_silent_and_finished(streaming_bench, RecordingState.COMPLETE)
+        assert settings[RunState.CHECKING] == pytest.approx(0.02)
+        assert settings[RunState.RECORDING] == 1.0
+        assert settings[RunState.RAMPING_DOWN] == pytest.approx(0.0, abs=1e-12)
+        calls = {name for name, _, _ in streaming_bench.world.calls}
+        assert calls.isdisjoint({"load_sine", "load_waveform", "start", "set_amplitude"})
 
     def test_only_the_check_level_is_written_before_the_check_passes(self, streaming_bench, tmp_path):
         run = run_upto(RunState.ARMED, streaming_bench, tmp_path)
         assert np.max(np.abs(streaming_bench.world.streamed)) <= 0.5 * 0.02
         run.close()
 
-    def test_the_shown_setting_matches_the_output(self, streaming_bench, tmp_path):
-        shown = play(run_of(streaming_bench, tmp_path))
-        settings = {progress.state: progress.amplitude_vpp for progress in shown}
-        assert settings[RunState.CHECKING] == pytest.approx(0.02)
-        assert settings[RunState.RECORDING] == 1.0
-        assert settings[RunState.RAMPING_DOWN] == pytest.approx(0.0, abs=1e-12)
-
     def test_an_unarmed_output_plays_nothing(self, streaming_bench, tmp_path):
         streaming_bench.world.permanent["arm"] = lambda: InstrumentLost("no answer")
         with pytest.raises(InstrumentLost, match="no answer"):
-            play(run_of(streaming_bench, tmp_path))
+            list(run_of(streaming_bench, tmp_path))
         assert "digitizer.start" not in [name for name, _, _ in streaming_bench.world.calls]
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
 
@@ -167,7 +151,7 @@ class TestEveryWayOut:
         run = run_of(streaming_bench, tmp_path)
         shown = upto(run, state)
         run.cancel("the operator pressed stop")
-        rest = play(run)
+        rest = list(run)
         assert run.outcome.state is RunState.STOPPED
         assert streaming_bench.recorder.ending == (RecordingState.STOPPED, "the operator pressed stop")
         assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
@@ -190,7 +174,7 @@ class TestEveryWayOut:
         run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.base_factor, streaming_bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
-            play(run)
+            list(run)
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
         if state is not RunState.CHECKING:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
@@ -198,7 +182,7 @@ class TestEveryWayOut:
     def test_a_hold_ramps_a_stream_down_with_a_reason(self, streaming_bench, tmp_path):
         run = run_upto(RunState.RECORDING, streaming_bench, tmp_path)
         run.switch.hold()
-        play(run)
+        list(run)
         assert run.outcome.state is RunState.STOPPED
         assert "cannot be held" in run.outcome.reason
         assert_faded_without_a_step(streaming_bench)
@@ -207,7 +191,7 @@ class TestEveryWayOut:
     def test_off_discards_written_samples(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
-        (listened,) = play(run)  # to what is there after the cut: silence
+        (listened,) = list(run)  # to what is there after the cut: silence
         assert listened.amplitude_vpp == 0.0
         assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
 
@@ -216,7 +200,7 @@ class TestEveryWayOut:
         run = run_upto(RunState.RECORDING, streaming_bench, tmp_path, strict)
         streaming_bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
-            play(run)
+            list(run)
         assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     @heard_state
@@ -235,7 +219,7 @@ class TestEveryWayOut:
         run = run_upto(state, streaming_bench, tmp_path)
         world.faults[call] = [lambda: fault("it broke")]
         with pytest.raises(fault, match="it broke"):
-            play(run)
+            list(run)
         assert_silent_and_finished(
             streaming_bench,
             RecordingState.STOPPED if fault is KeyboardInterrupt else RecordingState.FAILED,
@@ -256,7 +240,7 @@ class TestEveryWayOut:
         run = run_upto(state, streaming_bench, tmp_path)
         world.permanent["write"] = lambda: DataLost("the output ran out of samples")
         with pytest.raises(DataLost, match="ran out"):
-            play(run)
+            list(run)
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
 
     @heard_state
@@ -264,12 +248,7 @@ class TestEveryWayOut:
         run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.permanent["output.stop"] = lambda: InstrumentLost("MAY STILL BE PLAYING")
         with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING"):
-            play(run)
+            list(run)
         assert run.state is RunState.FAILED
         assert "MAY STILL BE PLAYING" in streaming_bench.recorder.ending[1]
         assert not streaming_bench.world.is_sampling
-
-    def test_a_streamed_run_does_not_command_the_generator(self, streaming_bench, tmp_path):
-        play(run_of(streaming_bench, tmp_path))
-        calls = {name for name, _, _ in streaming_bench.world.calls}
-        assert calls.isdisjoint({"load_sine", "load_waveform", "start", "set_amplitude"})

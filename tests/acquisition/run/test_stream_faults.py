@@ -16,15 +16,16 @@ from vibench.acquisition import (
     InstrumentLost,
     LimitExceeded,
     RecordingError,
-    open_bench,
     open_recording,
     run_measurement,
 )
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import InRunLimits, Measurement, RunState, StreamedNoise
 from vibench.acquisition.recording import RecordingState, create_recording
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated, load_rig
+from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig.world.wiring import Coupling, Input
+
+from .ending_silent import bench_on, kept_drive, when_recording
 
 try:
     import resource
@@ -52,10 +53,6 @@ def rig():
     return load_rig(STREAMING)
 
 
-def bench_on(connected):
-    return open_bench(connected, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
-
-
 def passes(virtual, duration_s):
     """Let rig time pass, with everything that still runs."""
     rig = virtual._running_state.daq._rig
@@ -71,27 +68,6 @@ def at_the_amplifier_v(virtual, duration_s=0.1):
     probe.close()
     # The converter's filter looks back: its first samples show what was before.
     return float(np.max(np.abs(heard[0, 100:])))
-
-
-def when_recording(act):
-    """Do ``act`` once, at the first block that belongs to the record."""
-    done = []
-
-    def watch(progress):
-        if progress.state is RunState.RECORDING and not done:
-            done.append(True)
-            act()
-
-    return watch
-
-
-def kept(path, state, reason):
-    with open_recording(path) as recording:
-        assert recording.state is state
-        assert re.search(reason, recording.reason), recording.reason
-        drive = recording.read("drive_voltage")
-    assert np.max(np.abs(drive)) > 0.1
-    return drive
 
 
 def one_sentence(failure):
@@ -110,7 +86,7 @@ def test_a_limit_passed_while_streaming_fades_out_and_is_named(laboratory, tmp_p
             run_measurement(bench, tight, tmp_path / "run.h5")
         assert at_the_amplifier_v(virtual) < SILENT_V
     assert re.search(r"base acceleration reached .* allowed is 36\.8 m/s2", one_sentence(failure))
-    drive = kept(tmp_path / "run.h5", RecordingState.FAILED, "base acceleration reached")
+    drive = kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "base acceleration reached")
     # What was written ahead was still heard, then a ramp to nothing.
     assert np.max(np.abs(drive[-200:])) < 0.01
 
@@ -125,7 +101,7 @@ def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
         virtual.faults.heal()
         assert at_the_amplifier_v(virtual) < SILENT_V
     one_sentence(failure)
-    kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
 def test_a_computer_that_pauses_for_too_long_underflows_and_ends_silent(laboratory, tmp_path):
@@ -135,7 +111,7 @@ def test_a_computer_that_pauses_for_too_long_underflows_and_ends_silent(laborato
         with pytest.raises(DataLost, match="ran out of samples"):
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=pause)
         assert at_the_amplifier_v(virtual) < SILENT_V
-    kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
 def test_a_dead_server_plays_at_most_the_written_samples(laboratory, tmp_path):
@@ -149,7 +125,7 @@ def test_a_dead_server_plays_at_most_the_written_samples(laboratory, tmp_path):
     assert at_the_amplifier_v(virtual) > 0.1
     passes(virtual, 0.5)
     assert at_the_amplifier_v(virtual) < SILENT_V
-    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost.*MAY STILL BE PLAYING")
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost.*MAY STILL BE PLAYING")
 
 
 @pytest.mark.parametrize(
@@ -164,7 +140,7 @@ def test_failing_inputs_fade_the_output_out(laboratory, tmp_path, code, kind):
         virtual.faults.heal()
         assert at_the_amplifier_v(virtual) < SILENT_V
     one_sentence(failure)
-    kept(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
+    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
 
 
 def test_ctrl_c_fades_out_after_written_samples_and_a_ramp(laboratory, tmp_path):
@@ -180,7 +156,7 @@ def test_ctrl_c_fades_out_after_written_samples_and_a_ramp(laboratory, tmp_path)
         outcome = run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=watch)
         assert at_the_amplifier_v(virtual) < SILENT_V
     assert outcome.state is RunState.STOPPED
-    drive = kept(tmp_path / "run.h5", RecordingState.STOPPED, "^SIGINT: stopped")
+    drive = kept_drive(tmp_path / "run.h5", RecordingState.STOPPED, "^SIGINT: stopped")
     assert drive.size / RATE_HZ - elapsed_s[0] <= 0.5 + 0.3 + 0.1 + 1e-3
     assert np.max(np.abs(drive[-200:])) < 0.01
 
@@ -192,7 +168,7 @@ def test_a_second_ctrl_c_does_not_wait_for_the_ramp_and_ends_silent(laboratory, 
         with pytest.raises(KeyboardInterrupt):
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=insist)
         assert at_the_amplifier_v(virtual) < SILENT_V
-    kept(tmp_path / "run.h5", RecordingState.STOPPED, "left it|keyboard")
+    kept_drive(tmp_path / "run.h5", RecordingState.STOPPED, "left it|keyboard")
 
 
 class FillingDisk:
