@@ -4,7 +4,8 @@ import pytest
 from PySide6.QtCore import Qt
 
 from vibench.gui.page.app_context import AppContext, Settings
-from vibench.gui.widgets.notice import RIG, TEST
+from vibench.gui.page.page import PageParts
+from vibench.gui.widgets.notice import FILES, RIG, TEST
 from vibench.gui.widgets.theme import DARK
 from vibench.gui.window.window import PAGES, Window
 
@@ -21,18 +22,29 @@ def test_pages_are_in_the_order_of_the_job(window):
     assert names[:3] == ["Rig", "Test", "Run"]
 
 
+def parts_of(window, page):
+    """The two parts of a page."""
+    return window.pages[page].findChild(PageParts)
+
+
 @pytest.mark.thorough
 def test_a_restart_restores_theme_page_and_test_without_arming(window, qapp, own_state, tmp_path):
     window.context.choose_theme(DARK)
     window.show_page(TEST)
     form = window.pages[TEST].form.form
     form.show_content({**form.content(), "name": "kept"})
+    for page in (FILES, TEST):
+        window.show_page(page)
+        parts_of(window, page).setSizes([300, 500])
+        parts_of(window, page).splitterMoved.emit(300, 1)
+    divided = {page: parts_of(window, page).saveState() for page in (FILES, TEST)}
     window.close()
     again = Window(AppContext(Settings(tmp_path / "window.ini")), PAGES)
     assert again.context.theme is DARK
     assert again.page is again.pages[TEST]
     assert again.context.selection.measurement.name == "kept"
     assert again.banner.indicator.word == "NO BENCH"
+    assert {page: parts_of(again, page).saveState() for page in divided} == divided
     again.close()
     again.deleteLater()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Generic, Protocol, TypeVar, cast
 
 from PySide6.QtCore import QEvent, Qt, QTimer
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QHideEvent, QResizeEvent
 from PySide6.QtWidgets import QLayout, QSplitter, QWidget
 
 from vibench.acquisition import ConfigurationError, RecordingError, open_recording
@@ -137,8 +137,38 @@ class Page(QWidget):
         """Store the user's input; called when another page is shown and when the window closes."""
 
 
-class SideAndPicture(QSplitter):
-    """A page in two scrolling parts; the position of the divider is stored.
+class PageParts(QSplitter):
+    """Two parts of a page; the division of the space is stored when they are hidden."""
+
+    def __init__(self, context: AppContext, page: str, orientation: Qt.Orientation) -> None:
+        super().__init__(orientation)
+        self._settings, self._page = context.settings, page
+        self._was_moved = False
+        self.setChildrenCollapsible(False)
+
+    def show_parts(self, first: QWidget, second: QWidget, sizes: tuple[int, int] = (0, 0)) -> None:
+        """Add the parts, divided as the user left them, else by ``sizes``; zeros for natural sizes."""
+        self.addWidget(first)
+        self.addWidget(second)
+        if any(sizes):
+            self.setSizes(sizes)
+        self.setStretchFactor(1, 1)
+        self.splitterMoved.connect(self._move)
+        kept = self._settings.state(SettingKey.SPLITTERS, self._page)
+        self._was_moved = not kept.isEmpty() and self.restoreState(kept)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Store the position of the divider if the user has moved it."""
+        super().hideEvent(event)
+        if self._was_moved:
+            self._settings.keep_state(SettingKey.SPLITTERS, self.saveState(), self._page)
+
+    def _move(self, *_: object) -> None:
+        self._was_moved = True
+
+
+class SideAndPicture(PageParts):
+    """A page in two scrolling parts.
 
     Parameters
     ----------
@@ -165,24 +195,12 @@ class SideAndPicture(QSplitter):
         picture: QWidget,
         foot: QWidget | QLayout | None = None,
     ) -> None:
-        super().__init__(Qt.Orientation.Horizontal)
-        self._settings, self._page = context.settings, page
-        self._was_moved = False
+        super().__init__(context, page, Qt.Orientation.Horizontal)
         self.setAccessibleName(f"Parts of the {page} page")
         self.side = ScrollArea(f"Choices of the {page} page", side)
         feet = () if foot is None else (foot,)
-        self.addWidget(column(title_of(page), (self.side, 1), *feet))
-        self.addWidget(ScrollArea(f"Pictures of the {page} page", picture))
-        self.setStretchFactor(1, 1)
-        self.setChildrenCollapsible(False)
-        self.splitterMoved.connect(self._move)
-        kept = self._settings.state(SettingKey.SPLITTERS, page)
-        self._was_moved = not kept.isEmpty() and self.restoreState(kept)
-
-    def keep(self) -> None:
-        """Store the position of the divider if the user has moved it."""
-        if self._was_moved:
-            self._settings.keep_state(SettingKey.SPLITTERS, self.saveState(), self._page)
+        pictures = ScrollArea(f"Pictures of the {page} page", picture)
+        self.show_parts(column(title_of(page), (self.side, 1), *feet), pictures)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Set the left part to its natural width, unless the user has moved the divider."""
@@ -195,9 +213,6 @@ class SideAndPicture(QSplitter):
             # Deferred, because the child widgets receive the change later.
             QTimer.singleShot(0, self, self._divide)
         return super().event(event)
-
-    def _move(self, *_: object) -> None:
-        self._was_moved = True
 
     def _divide(self) -> None:
         if not self._was_moved:

@@ -104,7 +104,7 @@ class ComparePage(Page):
         self._recordings: dict[Path, ComparedRecording | None] = {}
         self._jobs: list[Job] = []
         self._total = 0
-        self._build()
+        fill_box(QVBoxLayout(self), SideAndPicture(context, COMPARE, self._side(), self._picture()))
         self.curves.changed.connect(self._draw)
         self.pair_box.changed.connect(self._draw)
         self.plots.markers_moved.connect(self._read)
@@ -127,10 +127,6 @@ class ComparePage(Page):
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
         """Function that opens files of branches."""
         return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
-
-    def left(self) -> None:
-        """Store the position of the divider."""
-        self._parts.keep()
 
     def add_recordings(self, paths: tuple[Path, ...]) -> None:
         """Analyse recordings in the background and overlay their curves."""
@@ -252,10 +248,6 @@ class ComparePage(Page):
         wish = self.context.folder / ("comparison.html" if filters == REPORT else "comparison.svg")
         if (path := new_path(self, "Export", wish, filters)) is not None:
             self.export_to(path)
-
-    def _build(self) -> None:
-        self._parts = SideAndPicture(self.context, COMPARE, self._side(), self._picture())
-        fill_box(QVBoxLayout(self), self._parts)
 
     def _side(self) -> QWidget:
         add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)

@@ -6,7 +6,7 @@ from pathlib import Path
 from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QFileDialog, QInputDialog, QLabel, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLabel, QVBoxLayout, QWidget
 
 from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.campaign import VerifiedRecording
@@ -16,8 +16,8 @@ from vibench.sim.background import Job
 
 from ...background.background import LatestRequest, in_next_pass
 from ...forms.quantity_edit import LineField
-from ...page.app_context import AppContext, SettingKey
-from ...page.page import DisplayedResult, FileKind, Page
+from ...page.app_context import AppContext
+from ...page.page import DisplayedResult, FileKind, Page, PageParts
 from ...widgets.boxes import ElidedLabel, ScrollArea, column, fill_box, new_path, push_button, row
 from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind
 from ...widgets.units import SentenceLabel
@@ -101,10 +101,6 @@ class FilesPage(Page):
             self._looked_s = now_s
             if not all(each.path.exists() for each in self.table.recordings.entries):
                 self.list_folder()
-
-    def left(self) -> None:
-        """Store the position of the divider."""
-        self.context.settings.keep_state(SettingKey.SPLITTERS, self._splitter.saveState(), FILES)
 
     def list_folder(self) -> None:
         """List the files of the folder, in the background."""
@@ -282,17 +278,11 @@ class FilesPage(Page):
             self.context.page_requested.emit(COMPARE)
 
     def _build(self) -> None:
-        self._splitter = QSplitter(Qt.Orientation.Vertical)
-        self._splitter.setAccessibleName("List and recording")
-        for name, part in (("List of recordings", self._browser()), ("Recording in sight", self._viewer())):
-            self._splitter.addWidget(ScrollArea(name, part))
-        self._splitter.setSizes([200, 600])
-        self._splitter.setStretchFactor(1, 1)
-        self._splitter.setChildrenCollapsible(False)
-        fill_box(QVBoxLayout(self), self._splitter)
-        kept = self.context.settings.state(SettingKey.SPLITTERS, FILES)
-        if not kept.isEmpty():
-            self._splitter.restoreState(kept)
+        parts = PageParts(self.context, FILES, Qt.Orientation.Vertical)
+        parts.setAccessibleName("List and recording")
+        browser = ScrollArea("List of recordings", self._browser())
+        parts.show_parts(browser, ScrollArea("Recording in sight", self._viewer()), (200, 600))
+        fill_box(QVBoxLayout(self), parts)
         self.time_histories.range_changed.connect(self._say_view)
         self.time_histories.markers_moved.connect(self._say_view)
 

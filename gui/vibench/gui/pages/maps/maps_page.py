@@ -206,7 +206,9 @@ class MapsPage(Page):
         self._motion_of: MotionRequest | None = None
         self._levels: list[RecordedLevel] = []
         self._is_stale = False
-        self._build()
+        side = titled_box("Map", self.form)
+        parts = SideAndPicture(context, MAPS, side, self._answer(), self._buttons())
+        fill_box(QVBoxLayout(self), parts)
         self.form.changed.connect(self._validate)
         self.map.picked.connect(self.pick)
         context.comparison_requested.connect(self.add_recordings)
@@ -248,10 +250,6 @@ class MapsPage(Page):
         if self._is_stale and self.picture is not None:
             self._is_stale = False
             self.map.show_picture(self.picture, self.quantity.currentText())
-
-    def left(self) -> None:
-        """Store the position of the divider."""
-        self._parts.keep()
 
     def begin(self) -> None:
         """Compute the map of the form."""
@@ -356,12 +354,6 @@ class MapsPage(Page):
         if self._point is not None:
             self.context.scene_requested.emit(*self._point)
             self.context.page_requested.emit(SIMULATE)
-
-    def _build(self) -> None:
-        self._parts = SideAndPicture(
-            self.context, MAPS, titled_box("Map", self.form), self._answer(), self._buttons()
-        )
-        QVBoxLayout(self).addWidget(self._parts)
 
     def _buttons(self) -> QLayout:
         self._begin = push_button("&Map", "Compute the request of the form in another process", self.begin)

@@ -229,8 +229,7 @@ class QueuePage(Page):
         return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 
     def left(self) -> None:
-        """Store the campaign and the position of the divider."""
-        self._parts.keep()
+        """Store the campaign."""
         campaign = self.context.selection.campaign
         self.context.settings.keep_text(SettingKey.CAMPAIGN, "" if campaign is None else toml_text(campaign))
 
@@ -404,5 +403,4 @@ class QueuePage(Page):
             self.progress,
             (titled_box("Recordings", self.rows), 1),
         )
-        self._parts = SideAndPicture(self.context, QUEUE, left, right)
-        fill_box(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), SideAndPicture(self.context, QUEUE, left, right))

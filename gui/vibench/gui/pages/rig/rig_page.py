@@ -286,10 +286,6 @@ class RigPage(Page):
         if self.open_button.isEnabled():
             self.open_button.setFocus()
 
-    def left(self) -> None:
-        """Store the position of the divider."""
-        self._parts.keep()
-
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
         """Function that opens hardware configurations; it refuses while a bench is open."""
@@ -389,5 +385,4 @@ class RigPage(Page):
             (titled_box("Instruments", self.instruments), 1),
             (titled_box("Check", self.verdict, self.findings), 3),
         )
-        self._parts = SideAndPicture(self.context, RIG, side, right)
-        fill_box(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), SideAndPicture(self.context, RIG, side, right))

@@ -351,10 +351,6 @@ class RunPage(Page):
         self._connect()
         self._show_channels()
 
-    def left(self) -> None:
-        """Store the position of the divider."""
-        self._parts.keep()
-
     @property
     def is_done(self) -> bool:
         """Whether something was recorded since the window opened."""

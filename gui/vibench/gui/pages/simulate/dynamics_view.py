@@ -27,7 +27,7 @@ from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext
 from ...page.page import DisplayedResult, SideAndPicture
 from ...page.simulator import Simulator
-from ...widgets.boxes import column, push_button, row, titled_box
+from ...widgets.boxes import column, fill_box, push_button, row, titled_box
 from ...widgets.notice import COMPARE, Notice, NoticeKind
 from ...widgets.units import SentenceLabel
 
@@ -85,7 +85,9 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self.answer: Answer | None = None
         self._course: _Course | None = None
         self._is_stale = False
-        self._build()
+        name = kind.name.capitalize()
+        parts = SideAndPicture(context, name, self._side(), self._right(), self._buttons())
+        fill_box(QVBoxLayout(self), parts)
         self.form.changed.connect(self._validate)
         self._validate()
 
@@ -105,10 +107,6 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         if self._is_stale and self.answer is not None:
             self._is_stale = False
             self.picture.show_answer(self.answer)
-
-    def left(self) -> None:
-        """Store the position of the divider."""
-        self._parts.keep()
 
     def begin(self) -> None:
         """Compute the request of the form."""
@@ -172,12 +170,6 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         if self.answer is not None:
             self.context.prediction_made.emit(self.kind.curves(self.answer))
             self.context.page_requested.emit(COMPARE)
-
-    def _build(self) -> None:
-        self._parts = SideAndPicture(
-            self.context, self.kind.name.capitalize(), self._side(), self._right(), self._buttons()
-        )
-        QVBoxLayout(self).addWidget(self._parts)
 
     def _side(self) -> QWidget:
         scene, before = titled_box("Scene", self.form), SentenceLabel(self.kind.before, rank="second")

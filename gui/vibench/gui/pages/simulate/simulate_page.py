@@ -78,12 +78,8 @@ class SimulatePage(Page):
             view.refresh()
 
     def left(self) -> None:
-        """Store the position of the divider."""
-        self._parts.keep()
-        kept = self.form.form.content()
-        self.context.settings.keep_text(SettingKey.SCENES, json.dumps(kept))
-        for view in self._views:
-            view.left()
+        """Store the scene."""
+        self.context.settings.keep_text(SettingKey.SCENES, json.dumps(self.form.form.content()))
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:

@@ -406,8 +406,7 @@ class TestPage(Page):
         return nameless, self.context.selection.rig
 
     def left(self) -> None:
-        """Store the test and the position of the divider."""
-        self._parts.keep()
+        """Store the test."""
         measurement = self.form.value
         if measurement is not None:
             self.context.settings.keep_text(SettingKey.TEST, toml_text(measurement))
@@ -572,8 +571,7 @@ class TestPage(Page):
         for table in (self.limits, self.prediction):
             # Ignore the preferred heights, so that the preview gets enough height.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        self._parts = SideAndPicture(self.context, TEST, left, grid, self.arm_button)
-        fill_box(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), SideAndPicture(self.context, TEST, left, grid, self.arm_button))
 
 
 def _stored_test(text: str) -> Measurement | None:
