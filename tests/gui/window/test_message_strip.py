@@ -56,7 +56,7 @@ def test_a_message_disappears_after_success_and_remains_in_details(qtbot):
     for kind in NoticeKind:
         strip.say(Notice(kind, "Nothing is armed."))
         assert strip.is_said
-        strip.give_way()
+        strip.dismiss()
         assert not strip.is_said
     assert len(strip.notices) == 3
 

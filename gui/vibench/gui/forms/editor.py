@@ -1,7 +1,7 @@
 """One editor for each type of value in a plan."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
@@ -72,9 +72,11 @@ class Choice(QComboBox):
 
     LETTERS = 10
 
-    def __init__(self, name: str = "") -> None:
+    def __init__(self, name: str = "", tip: str = "", items: Iterable[str] = ()) -> None:
         super().__init__()
         self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self.addItems(list(items))
         self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(self.LETTERS)
 

@@ -9,7 +9,9 @@ from typing import TypeVar
 from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
+    QAbstractItemView,
     QBoxLayout,
+    QCheckBox,
     QFileDialog,
     QGroupBox,
     QHBoxLayout,
@@ -18,6 +20,7 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QPushButton,
     QScrollArea,
+    QSplitter,
     QStyle,
     QStyleOption,
     QVBoxLayout,
@@ -122,6 +125,46 @@ def push_button(text: str, tip: str, act: Callable[[], object], rank: str = "") 
     return button
 
 
+def tick_box(text: str, tip: str, act: Callable[[bool], object]) -> QCheckBox:
+    """Return a check box; ``act`` is called with its new state."""
+    box = QCheckBox(text)
+    box.setToolTip(tip)
+    box.toggled.connect(act)
+    return box
+
+
+def label_for(text: str, field: QWidget, name: str = "") -> QLabel:
+    """Return the label of a field, whose shortcut moves the focus there; ``name`` is for screen readers."""
+    label = QLabel(text)
+    label.setBuddy(field)
+    field.setAccessibleName(name or text.replace("&", ""))
+    return label
+
+
+def splitter(name: str, first: QWidget, second: QWidget, sizes: tuple[int, int]) -> QSplitter:
+    """Return two parts below each other with a movable divider."""
+    parts = QSplitter(Qt.Orientation.Vertical)
+    parts.setAccessibleName(name)
+    parts.addWidget(first)
+    parts.addWidget(second)
+    parts.setSizes(sizes)
+    return parts
+
+
+def keep_space(widget: QWidget) -> None:
+    """Keep the space of a widget while it is hidden, so that nothing moves."""
+    policy = widget.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    widget.setSizePolicy(policy)
+
+
+def set_tone(widget: QWidget, tone: str) -> None:
+    """Give a widget the colours of a tone; an empty text for none."""
+    if (widget.property("tone") or "") != tone:
+        widget.setProperty("tone", tone)
+        widget.style().polish(widget)
+
+
 def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | None:
     """Ask for the path of a new file; a missing suffix is taken from the selected filter."""
     options = QFileDialog.Option.DontConfirmOverwrite
@@ -134,6 +177,12 @@ def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | No
 
 _WIDEST = 0.8
 """Largest width of a hint, as a share of its area."""
+
+
+def hint_in_list(view: QAbstractItemView, text: str) -> None:
+    """Draw a hint in an empty list or table."""
+    colour = view.palette().placeholderText().color()
+    paint_hint(QPainter(view.viewport()), view.viewport().rect(), text, colour)
 
 
 def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) -> None:

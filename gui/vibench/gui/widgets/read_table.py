@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterable, Sequence
 
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt, QTimer
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QTableWidget, QTableWidgetItem
 
-from .boxes import paint_hint, plain_lines, plain_tip
+from .boxes import hint_in_list, plain_lines, plain_tip
 from .units import UNITS
 
 Cell = QModelIndex | QPersistentModelIndex
@@ -131,12 +131,7 @@ class ReadTable(QTableWidget):
         """Draw the hint in an empty table."""
         super().paintEvent(event)
         if self._hint and self.rowCount() == 0:
-            paint_hint(
-                QPainter(self.viewport()),
-                self.viewport().rect(),
-                self._hint,
-                self.palette().placeholderText().color(),
-            )
+            hint_in_list(self, self._hint)
 
     def _fit(self) -> None:
         header, wide = self.horizontalHeader(), self._wide

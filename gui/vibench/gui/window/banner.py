@@ -1,6 +1,6 @@
 """State of the rig by symbol, word and colour, with the STOP button; visible on every page."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPlainTextEdit, QPush
 
 from vibench.acquisition.engine import EngineState, EngineStatus, RunStatus
 
-from ..widgets.boxes import ElidedLabel, fill_box
+from ..widgets.boxes import ElidedLabel, fill_box, keep_space, push_button, set_tone
 from ..widgets.notice import Notice, NoticeKind, clock
 from ..widgets.theme import Tone
 from ..widgets.units import SentenceLabel
@@ -88,9 +88,7 @@ class StatusLine(QFrame):
                 label.setText(shown)
                 if field is not StatusField.FRAMES:
                     label.setToolTip(shown)
-            if (label.property("tone") or "") != tone:
-                label.setProperty("tone", tone)
-                label.style().polish(label)
+            set_tone(label, tone)
 
 
 @dataclass(frozen=True)
@@ -171,9 +169,7 @@ class Banner(QFrame):
         self._label.setAccessibleName(f"State: {indicator.word}")
         self._detail.setText(indicator.detail)
         self._stop.setText(AT_ONCE_TEXT if indicator.is_ramping else STOP_TEXT)
-        if self._label.property("tone") != indicator.tone.value:
-            self._label.setProperty("tone", indicator.tone.value)
-            self._label.style().polish(self._label)
+        set_tone(self._label, indicator.tone.value)
 
 
 OPENING = StateIndicator("◌", "OPENING", Tone.CALM, "Looking for the instruments")
@@ -303,22 +299,18 @@ class MessageStrip(QFrame):
         self._details.setReadOnly(True)
         self._details.setAccessibleName("All messages")
         self._details.hide()
-        self._more = self._button("Details", "Show details and earlier messages")
+        self._more = self._button("Details", "Show details and earlier messages", lambda: None)
         self._more.setCheckable(True)
         self._more.toggled.connect(self._show_details)
-        copy = self._button("Copy", "Copy the message")
-        copy.clicked.connect(self._copy)
-        self._close = self._button("Dismiss", "Dismiss the message")
-        self._close.clicked.connect(self.dismiss)
+        copy = self._button("Copy", "Copy the message", self._copy)
+        close = self._button("Dismiss", "Dismiss the message", self.dismiss)
         line = QHBoxLayout(self)
         line.setContentsMargins(10, 2, 10, 2)
         line.addWidget(self._text, 1)
-        self._buttons = (self._more, copy, self._close)
+        self._buttons = (self._more, copy, close)
         for button in self._buttons:
             line.addWidget(button)
-            policy = button.sizePolicy()
-            policy.setRetainSizeWhenHidden(True)
-            button.setSizePolicy(policy)
+            keep_space(button)
         self._fit()
         self.dismiss()
 
@@ -343,10 +335,6 @@ class MessageStrip(QFrame):
             self._hint = text
             if not self.is_said:
                 self._text.setText(text)
-
-    def give_way(self) -> None:
-        """Remove a message that a completed step made obsolete; it stays in Details."""
-        self.dismiss()
 
     def dismiss(self) -> None:
         """Remove the message; it stays in Details."""
@@ -374,9 +362,7 @@ class MessageStrip(QFrame):
     def _show(self, text: str, tone: str) -> None:
         self._text.setText(text)
         for widget in (self, self._text):
-            if (widget.property("tone") or "") != tone:
-                widget.setProperty("tone", tone)
-                widget.style().polish(widget)
+            set_tone(widget, tone)
         for button in self._buttons:
             button.setVisible(self.is_said or (button is self._more and bool(self._notices)))
 
@@ -394,8 +380,7 @@ class MessageStrip(QFrame):
         if self._notices:
             QGuiApplication.clipboard().setText(self._notices[-1].text)
 
-    def _button(self, label: str, name: str) -> QPushButton:
-        button = QPushButton(label)
+    def _button(self, label: str, name: str, act: Callable[[], object]) -> QPushButton:
+        button = push_button(label, name, act)
         button.setAccessibleName(name)
-        button.setToolTip(name)
         return button

@@ -280,7 +280,7 @@ class Window(QMainWindow):
         self.banner.stop_requested.connect(self.user_actions.stop)
         self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))
         self.context.bridge.adopted.connect(self._show_adopted)
-        self.context.bridge.advanced.connect(self.strip.give_way)
+        self.context.bridge.advanced.connect(self.strip.dismiss)
 
     def _restore(self) -> None:
         self.resize(1280, 800)

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QGroupBox, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import copy_sentence, first_copies
 from vibench.analysis import AnalysisOptions, ComparedRecording, Curve, compare_recording
@@ -15,7 +15,7 @@ from vibench.sim.background import Job
 from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext
 from ...page.page import FileKind, Page, SideAndPicture
-from ...widgets.boxes import TimedBar, column, fill_box, new_path, push_button, row
+from ...widgets.boxes import TimedBar, column, fill_box, keep_space, new_path, push_button, row, splitter
 from ...widgets.notice import COMPARE, Notice, NoticeKind
 from .curve_plots import (
     PEAK_HEADINGS,
@@ -52,21 +52,15 @@ class AnalysisPanel(QGroupBox):
     def __init__(self) -> None:
         super().__init__("Analysis")
         self.form = ValidatedForm(AnalysisOptions, "analysis")
-        self._again = QPushButton("Anal&yse again")
-        self._again.setAccessibleName("Analyse again")
-        self._again.setToolTip("Analyse all recordings with these options")
-        self._again.clicked.connect(lambda _checked=False: self.wanted.emit())
+        self._again = push_button(
+            "Anal&yse again", "Analyse all recordings with these options", self.wanted.emit
+        )
         self._bar = TimedBar("Recordings analysed", "analysed")
-        self._cancel = QPushButton("Cance&l")
+        self._cancel = push_button("Cance&l", "Cancel the remaining analyses", self.cancelled.emit)
         self._cancel.setAccessibleName("Cancel the analysis")
-        self._cancel.setToolTip("Cancel the remaining analyses")
-        self._cancel.clicked.connect(lambda _checked=False: self.cancelled.emit())
         fill_box(QVBoxLayout(self), self.form, row(self._again, (self._bar, 1), self._cancel))
         for widget in (self._bar, self._cancel):
-            # Keep their space while hidden, so that nothing moves when an analysis starts or ends.
-            policy = widget.sizePolicy()
-            policy.setRetainSizeWhenHidden(True)
-            widget.setSizePolicy(policy)
+            keep_space(widget)
         self.form.changed.connect(self._validate)
         self.show_progress(0, 0)
 
@@ -263,11 +257,7 @@ class ComparePage(Page):
         tabs.setAccessibleName("Numbers")
         tabs.addTab(self.peaks, "&Peaks")
         tabs.addTab(self.readings, "At the mar&kers")
-        vertical = QSplitter(Qt.Orientation.Vertical)
-        vertical.setAccessibleName("Picture and numbers")
-        vertical.addWidget(self.plots)
-        vertical.addWidget(tabs)
-        vertical.setSizes([560, 170])
+        vertical = splitter("Picture and numbers", self.plots, tabs, (560, 170))
         vertical.setStretchFactor(0, 1)
         self._markers = push_button("&Markers", "Show two markers to read the curves at", lambda: None)
         self._markers.setCheckable(True)

@@ -12,10 +12,8 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QFormLayout,
     QGroupBox,
-    QLabel,
     QListWidget,
     QListWidgetItem,
-    QSplitter,
     QTableWidgetItem,
     QVBoxLayout,
     QWidget,
@@ -37,7 +35,7 @@ from ...forms.editor import Choice
 from ...plots.axis import LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import GUIDE, Dash, LineStyle, curve_style, dashed_pen
 from ...plots.plot import Plot
-from ...widgets.boxes import fill_box, paint_hint, plain_tip
+from ...widgets.boxes import fill_box, hint_in_list, label_for, plain_tip, splitter
 from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
 from ...widgets.units import UNITS, SentenceLabel
@@ -66,12 +64,8 @@ class CurvePlots(QWidget):
         self.differences.always_numbered().setXLink(self.magnitudes)
         # The lower plot labels the frequency axis of both.
         self.magnitudes.across.show_nothing()
-        splitter = QSplitter(Qt.Orientation.Vertical)
-        splitter.setAccessibleName("Curves and their difference")
-        splitter.addWidget(self.magnitudes)
-        splitter.addWidget(self.differences)
-        splitter.setSizes([500, 170])
-        fill_box(QVBoxLayout(self), splitter, margin=0)
+        parts = splitter("Curves and their difference", self.magnitudes, self.differences, (500, 170))
+        fill_box(QVBoxLayout(self), parts, margin=0)
         self._marker_hz: list[float] = [100.0, 300.0]
         self._are_marked = False
         self._lines: list[tuple[pg.InfiniteLine, pg.InfiniteLine]] = []
@@ -264,8 +258,7 @@ class CurveList(QListWidget):
         """Draw a hint while the list is empty."""
         super().paintEvent(event)
         if not self._curves:
-            words = "No curves yet: add recordings, or overlay a simulation."
-            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
+            hint_in_list(self, "No curves yet: add recordings, or overlay a simulation.")
 
     def line_style(self, curve: Curve) -> LineStyle:
         """Return the line style of a curve: the colour of its source, the dash of its kind."""
@@ -377,12 +370,9 @@ class PairBox(QGroupBox):
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for text, choice in (("C&urve", self._curve), ("Ov&er", self._reference)):
-            label = QLabel(text)
-            label.setBuddy(choice)
-            choice.setAccessibleName(f"Difference: {text.replace('&', '').lower()}")
             choice.setMinimumContentsLength(16)
             choice.currentIndexChanged.connect(lambda _index: self.changed.emit())
-            form.addRow(label, choice)
+            form.addRow(label_for(text, choice, f"Difference: {text.replace('&', '').lower()}"), choice)
         form.addRow(self._summary)
 
     @property

@@ -6,7 +6,7 @@ from pathlib import Path
 from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QFileDialog, QInputDialog, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QVBoxLayout, QWidget
 
 from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.campaign import VerifiedRecording
@@ -18,7 +18,7 @@ from ...background.background import LatestRequest, in_next_pass
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
 from ...page.page import DisplayedResult, FileKind, Page, PageParts
-from ...widgets.boxes import ElidedLabel, ScrollArea, column, fill_box, new_path, push_button, row
+from ...widgets.boxes import ElidedLabel, ScrollArea, column, fill_box, label_for, new_path, push_button, row
 from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind
 from ...widgets.units import SentenceLabel
 from .recording_table import (
@@ -287,18 +287,12 @@ class FilesPage(Page):
         self.time_histories.markers_moved.connect(self._say_view)
 
     def _browser(self) -> QWidget:
-        label = QLabel("F&older")
         self._folder_line = LineField(str(self._folder))
-        self._folder_line.setAccessibleName("Folder of the recordings")
         self._folder_line.editingFinished.connect(self._typed_folder)
-        label.setBuddy(self._folder_line)
-        search_label = QLabel("Sea&rch")
         search = LineField()
-        search.setAccessibleName("Search in the list")
         search.setPlaceholderText("name, state, excitation…")
         search.setClearButtonEnabled(True)
         search.textChanged.connect(self.table.search)
-        search_label.setBuddy(search)
         self._goes_to = ElidedLabel(rank="second")
         self._count = ElidedLabel(rank="second")
         self._compare = push_button(
@@ -309,11 +303,11 @@ class FilesPage(Page):
         for button in (self._compare, self._export, self._note):
             button.setEnabled(False)
         bar = row(
-            label,
+            label_for("F&older", self._folder_line, "Folder of the recordings"),
             (self._folder_line, 3),
             push_button("&Choose…", "Choose another folder", self._choose_folder),
             (self.campaigns, 1),
-            search_label,
+            label_for("Sea&rch", search, "Search in the list"),
             (search, 1),
             self._count,
             self._compare,

@@ -40,7 +40,7 @@ from vibench.acquisition.recording import (
 from vibench.analysis.live import THUMBNAIL_COLUMNS, OverviewLevel, Thumbnail, overview_levels, thumbnail
 
 from ...forms.editor import Choice
-from ...widgets.boxes import paint_hint, plain_tip
+from ...widgets.boxes import hint_in_list, plain_tip
 from ...widgets.notice import clock, moment_text, outcome_text
 from ...widgets.read_table import offer_copies
 from ...widgets.theme import Theme
@@ -436,8 +436,7 @@ class RecordingTable(QTableView):
                 if self.is_listing
                 else "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
             )
-            colour = self.palette().placeholderText().color()
-            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, colour)
+            hint_in_list(self, words)
 
     def retheme(self, theme: Theme) -> None:
         """Redraw the thumbnails in other colours."""

@@ -7,7 +7,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import Recording
 from vibench.analysis.hidden_motion import LONGEST_VIEW_S, HiddenView, HiddenViewRequest, Numbers, hidden_view
@@ -27,7 +27,7 @@ from ...page.page import DisplayedResult
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis
 from ...plots.line_style import LIMIT, Dash, curve_style
 from ...plots.plot import Plot
-from ...widgets.boxes import ElidedLabel, fill_box, row
+from ...widgets.boxes import ElidedLabel, fill_box, label_for, row, tick_box
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel, plain_unit
 from .recording_table import role_text
@@ -51,18 +51,20 @@ class HiddenMotionView(QWidget):
         self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
         self.caption = SentenceLabel(rank="second")
-        self.specimen = Choice(name="Specimen of the hidden motion")
-        self.specimen.setToolTip("Specimen whose springs, masses and stops are used for the estimate")
+        self.specimen = Choice(
+            "Specimen of the hidden motion",
+            "Specimen whose springs, masses and stops are used for the estimate",
+        )
         self.specimen.addItem("as the recording describes it", "")
         for name in shipped_specimens():
             self.specimen.addItem(name, name)
         self.specimen.addItem(_ANOTHER, "")
         self.specimen.activated.connect(self._choose_specimen)
-        self.find_numbers = QCheckBox("Find its numbers")
-        self.find_numbers.setToolTip(
-            "Estimate gaps, m1, springs, dampers and contact law from the visible collisions"
+        self.find_numbers = tick_box(
+            "Find its numbers",
+            "Estimate gaps, m1, springs, dampers and contact law from the visible collisions",
+            lambda _is_on: self._ask(),
         )
-        self.find_numbers.toggled.connect(lambda _is_on: self._ask())
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
         self._request: HiddenViewRequest | None = None
@@ -172,11 +174,8 @@ class SpectrogramView(QWidget):
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
         self.setAccessibleName("Spectrogram")
-        self.channel, self.spacing, self.highest = Choice(), Choice(), Choice()
-        for spacing in RowSpacing:
-            self.spacing.addItem(spacing.value)
-        for highest_hz in _HIGHEST_HZ:
-            self.highest.addItem(f"{highest_hz:g} Hz")
+        self.channel, self.spacing = Choice(), Choice(items=RowSpacing)
+        self.highest = Choice(items=(f"{highest_hz:g} Hz" for highest_hz in _HIGHEST_HZ))
         self.highest.setCurrentIndex(_USUAL)
         self.line_width = Choice()
         for width_hz in _WIDTHS_HZ:
@@ -305,11 +304,8 @@ class SpectrogramView(QWidget):
             ("up to", self.highest, "Upper end of the vertical axis"),
             ("lines", self.line_width, "Line width: narrow lines resolve frequency, wide lines resolve time"),
         ):
-            label = QLabel(text)
-            label.setBuddy(choice)
-            choice.setAccessibleName(f"Spectrogram: {text.lower()}")
             choice.setToolTip(tip)
-            fill_box(bar, label, choice)
+            fill_box(bar, label_for(text, choice, f"Spectrogram: {text.lower()}"), choice)
         bar.addWidget(self.caption, 1)
         plots = ((plot, 1) for plot in self._plots.values())
         fill_box(QVBoxLayout(self), bar, *plots).setContentsMargins(0, 4, 0, 0)

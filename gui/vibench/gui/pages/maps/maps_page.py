@@ -10,7 +10,7 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from pyqtgraph.GraphicsScene.mouseEvents import MouseClickEvent
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtWidgets import QLabel, QLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QLayout, QVBoxLayout, QWidget
 
 from vibench.analysis import recorded_response
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
@@ -33,7 +33,7 @@ from ...page.simulator import Simulator
 from ...plots.axis import FREQUENCY, TIME, PlotAxis, Scale
 from ...plots.line_style import LineStyle, curve_style
 from ...plots.plot import Plot
-from ...widgets.boxes import column, fill_box, push_button, row, titled_box
+from ...widgets.boxes import column, fill_box, push_button, row, splitter, titled_box
 from ...widgets.notice import MAPS, SIMULATE, Notice, NoticeKind
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel
@@ -356,17 +356,16 @@ class MapsPage(Page):
             self.context.page_requested.emit(SIMULATE)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button("&Map", "Compute the request of the form in another process", self.begin)
-        self._begin.setProperty("rank", "first")
+        self._begin = push_button(
+            "&Map", "Compute the request of the form in another process", self.begin, "first"
+        )
         self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
         self._cancel = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
         self._cancel.setEnabled(False)
         return row((self._begin, 1), (self._finer, 1), (self._cancel, 1))
 
     def _answer(self) -> QWidget:
-        self.quantity = Choice()
-        self.quantity.addItems(list(COLOURINGS))
-        self.quantity.setAccessibleName("Quantity shown by the colours of the map")
+        self.quantity = Choice("Quantity shown by the colours of the map", items=COLOURINGS)
         self.quantity.currentIndexChanged.connect(self._recolour)
         self._state = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
         self._open = push_button(
@@ -379,11 +378,8 @@ class MapsPage(Page):
         legend.setWordWrap(True)
         legend.setAccessibleName("Colours of the kinds of motion")
         below = row(self.quantity, (self._state, 1), self._open)
-        answer = QSplitter(Qt.Orientation.Vertical)
-        answer.setAccessibleName("Map and motion")
-        answer.addWidget(column(legend, (self.map, 1), below))
-        answer.addWidget(self.motion)
-        answer.setSizes([MAP_SHARE, 1000 - MAP_SHARE])
+        shares = (MAP_SHARE, 1000 - MAP_SHARE)
+        answer = splitter("Map and motion", column(legend, (self.map, 1), below), self.motion, shares)
         answer.setChildrenCollapsible(False)
         return answer
 

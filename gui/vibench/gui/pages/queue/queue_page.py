@@ -13,8 +13,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGridLayout,
     QGroupBox,
-    QLabel,
-    QPushButton,
     QVBoxLayout,
 )
 
@@ -38,7 +36,7 @@ from ...forms.quantity_edit import QuantityEdit
 from ...page.app_context import AppContext, SettingKey
 from ...page.page import DisplayedResult, FileKind, History, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import ProgressBar, column, fill_box, push_button, row, titled_box
+from ...widgets.boxes import ProgressBar, column, fill_box, label_for, push_button, row, titled_box
 from ...widgets.notice import QUEUE, clock, notice_of
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel
@@ -67,11 +65,8 @@ class SweepForm(QGroupBox):
 
     def __init__(self) -> None:
         super().__init__("Sweep the test over")
-        self.axis, self.spacing = Choice(), Choice()
-        for name, _unit, _low, _high in _AXES.values():
-            self.axis.addItem(name)
-        for spacing in RangeSpacing:
-            self.spacing.addItem(spacing.value)
+        self.axis = Choice(items=(name for name, *_ in _AXES.values()))
+        self.spacing = Choice(items=RangeSpacing)
         self.start, self.stop = QuantityEdit("Vpp", float), QuantityEdit("Vpp", float)
         self.count = QuantityEdit("", int)
         self.count.set_value(5)
@@ -83,14 +78,8 @@ class SweepForm(QGroupBox):
             ("Points", self.count),
             ("Distances", self.spacing),
         ):
-            label = QLabel(text)
-            label.setBuddy(widget)
-            widget.setAccessibleName(f"{text} of the sweep")
-            layout.addRow(label, widget)
-        add = QPushButton("Add &sweep")
-        add.setToolTip("Add a sweep of the test on the Test page")
-        add.clicked.connect(self._add)
-        layout.addRow(add)
+            layout.addRow(label_for(text, widget, f"{text} of the sweep"), widget)
+        layout.addRow(push_button("Add &sweep", "Add a sweep of the test on the Test page", self._add))
         self.axis.currentIndexChanged.connect(self._turn)
         self._turn()
 
@@ -163,8 +152,9 @@ class QueuePage(Page):
         self.progress.setAccessibleName("Progress of the campaign")
         self.progress.setRange(0, 1000)
         self.progress.setFormat("not running")
-        self.arm_button = push_button("Arm the ca&mpaign…", "Describe in words what will happen", self._arm)
-        self.arm_button.setProperty("rank", "first")
+        self.arm_button = push_button(
+            "Arm the ca&mpaign…", "Describe in words what will happen", self._arm, "first"
+        )
         self.resume_button = push_button(
             "Resume: arm what is missin&g…",
             "Keep complete recordings in the folder and record the rest",
@@ -176,7 +166,9 @@ class QueuePage(Page):
             "from a terminal.\nUnticked, the drive ramps down when the window does not answer."
         )
         self.unattended.setChecked(True)
-        self.hold_button = push_button("Hold (drive on)", "Hold the run; the drive stays on", self._hold)
+        self.hold_button = push_button(
+            "Hold (drive on)", "Hold the run; the drive stays on", self._actions.hold_or_resume
+        )
         self._looking = LatestRequest(
             context.looks, preview_campaign, self._looked, context.fail, LOOK_MS, self
         )
@@ -329,9 +321,6 @@ class QueuePage(Page):
     @property
     def _attendance(self) -> Supervision:
         return Supervision.UNATTENDED if self.unattended.isChecked() else Supervision.ATTENDED
-
-    def _hold(self) -> None:
-        self._actions.hold_or_resume()
 
     def _open(self) -> None:
         given, _ = QFileDialog.getOpenFileName(

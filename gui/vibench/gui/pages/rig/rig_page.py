@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QLabel,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -39,7 +38,7 @@ from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext, SettingKey
 from ...page.page import FileKind, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import column, fill_box, plain_tip, push_button, titled_box
+from ...widgets.boxes import column, fill_box, label_for, plain_tip, push_button, tick_box, titled_box
 from ...widgets.notice import RIG, moment_text
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, prefixed_unit
@@ -60,25 +59,14 @@ class RigChoice(QWidget):
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
         """Why the selected file cannot be used, and what to check in it; each empty if there is nothing."""
-        self._box = Choice(name="Hardware configuration")
+        self._box, self.pace = Choice(), Choice(items=PACES.values())
         self._box.setToolTip("Instruments connected to this computer; a simulated rig runs anywhere")
-        own = QPushButton("Own file…")
-        own.setToolTip("Open a hardware configuration of your own")
-        own.clicked.connect(self._ask)
-        self.pace = Choice(name="Pace of the simulated rig")
         self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
-        for words in PACES.values():
-            self.pace.addItem(words)
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
-        for text, line, buddy in (
-            ("Configuration", self._box, self._box),
-            ("Runs", self.pace, self.pace),
-        ):
-            label = QLabel(text)
-            label.setBuddy(buddy)
-            self._form.addRow(label, line)
-        self._form.addRow(own)
+        self._form.addRow(label_for("Configuration", self._box, "Hardware configuration"), self._box)
+        self._form.addRow(label_for("Runs", self.pace, "Pace of the simulated rig"), self.pace)
+        self._form.addRow(push_button("Own file…", "Open a hardware configuration of your own", self._ask))
         for path in sorted(all_shipped("hardware_configs"), key=lambda each: "virtual" not in each.stem):
             self._add(path)
         self._box.currentIndexChanged.connect(self._load)
@@ -145,16 +133,13 @@ class KnobSheetForm(QGroupBox):
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")
         self.operator_field = LineField()
-        self.operator_field.setAccessibleName("Who has looked")
         self.operator_field.setToolTip("Your name; it goes into every recording")
         self.operator_field.textChanged.connect(self.changed)
-        label = QLabel("Seen by")
-        label.setBuddy(self.operator_field)
         self._ticks: dict[Knob, QCheckBox] = {}
         self._layout = QVBoxLayout(self)
         self._layout.addWidget(self._note)
         form = QFormLayout()
-        form.addRow(label, self.operator_field)
+        form.addRow(label_for("Seen by", self.operator_field, "Who has looked"), self.operator_field)
         self._layout.addLayout(form)
 
     @property
@@ -179,10 +164,9 @@ class KnobSheetForm(QGroupBox):
         return KnobSheet(operator=operator, confirmed=datetime.now(UTC), knobs=tuple(self._ticks))
 
     def _tick(self, knob: Knob) -> QCheckBox:
-        tick = QCheckBox(f"{knob.instrument}: {knob.setting} at {knob.value}")
+        text = f"{knob.instrument}: {knob.setting} at {knob.value}"
+        tick = tick_box(text, "Ticked: somebody has checked this setting", lambda _: self.changed.emit())
         tick.setAccessibleName(f"{knob.instrument}: {knob.setting} is at {knob.value}")
-        tick.setToolTip("Ticked: somebody has checked this setting")
-        tick.toggled.connect(self.changed)
         # Insert between the note and the name.
         self._layout.insertWidget(self._layout.count() - 1, tick)
         return tick

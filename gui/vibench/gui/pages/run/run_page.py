@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QLabel,
-    QPushButton,
     QSizePolicy,
     QSplitter,
     QTabWidget,
@@ -33,7 +32,7 @@ from ...page.app_context import AppContext
 from ...page.kind_views import KIND_VIEWS, OF_A_BAND, LivePicture
 from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import ProgressBar, column, fill_box, paint_hint, push_button, row
+from ...widgets.boxes import ProgressBar, column, fill_box, label_for, paint_hint, push_button, row
 from ...widgets.notice import FILES, RUN, clock, outcome_text
 from ...widgets.theme import Theme, Tone
 from ...widgets.units import SentenceLabel
@@ -144,11 +143,8 @@ class WatchCard(QGroupBox):
         self.impacts.setProperty("rank", "title")
         self.impacts.setToolTip("Jumps in the acceleration of m0, derived from its sensor")
         self.meters = LevelMeters(theme)
-        self.span = Choice()
-        for span_s in SPANS_S:
-            self.span.addItem(f"{span_s:g} s")
+        self.span = Choice(tip="Seconds in a time history", items=(f"{span_s:g} s" for span_s in SPANS_S))
         self.span.setCurrentIndex(SPANS_S.index(USUAL_SPAN_S))
-        self.span.setToolTip("Seconds in a time history")
         self.freeze = QCheckBox("Freeze the picture  (Space)")
         self.freeze.setToolTip("Only the picture stops; the recording continues")
         self.twin = QCheckBox("Live twin")
@@ -167,9 +163,9 @@ class WatchCard(QGroupBox):
         )
         self.mark = LineField("event")
         self.mark.setToolTip("Text of the mark in the recording")
-        self.mark_button = QPushButton("Mark  (M)")
-        self.mark_button.setToolTip("Put the mark at the next sample of the recording")
-        self.mark_button.clicked.connect(self.wish_mark)
+        self.mark_button = push_button(
+            "Mark  (M)", "Put the mark at the next sample of the recording", self.wish_mark
+        )
         self._lay_out()
 
     @property
@@ -214,10 +210,7 @@ class WatchCard(QGroupBox):
             ("Averages", self.averages, averages),
             ("Histories show", self.span, self.span),
         ):
-            label = QLabel(text)
-            label.setBuddy(widget)
-            widget.setAccessibleName(text)
-            form.addRow(label, field)
+            form.addRow(label_for(text, widget), field)
         self.mark.setAccessibleName("Text of the mark")
         marks = row((self.mark, 1), self.mark_button)
         fill_box(QVBoxLayout(self), self.progress, form, self.meters, self.freeze, self.twin, marks)
@@ -344,8 +337,9 @@ class RunPage(Page):
         self.portrait = PortraitPlot(theme)
         self.hidden_motion = HiddenMotionPlot(theme)
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
-        self.look_button = QPushButton("Look at the recording")
-        self.look_button.setToolTip("Show the last recording on the Files page")
+        self.look_button = push_button(
+            "Look at the recording", "Show the last recording on the Files page", self._look
+        )
         self.summary = SentenceLabel(name="How the last run ended")
         self._lay_out()
         self._connect()
@@ -517,7 +511,6 @@ class RunPage(Page):
         # Until the next tick, the pictures of a finished run would look like those of this run.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_requested.connect(self._turn_twin)
-        self.look_button.clicked.connect(self._look)
         self.context.recording_made.connect(self._recorded)
         self.context.selection.rig_changed.connect(self._show_channels)
 

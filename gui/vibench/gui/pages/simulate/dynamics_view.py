@@ -176,8 +176,9 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return column(scene, before, 1)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button("Find", "Compute the request of the form in another process", self.begin)
-        self._begin.setProperty("rank", "first")
+        self._begin = push_button(
+            "Find", "Compute the request of the form in another process", self.begin, "first"
+        )
         self._cancel = push_button("Cancel", "Stop; the results so far stay", self.cancel)
         self._cancel.setEnabled(False)
         return row((self._begin, 1), self._cancel)

@@ -190,9 +190,8 @@ class SimulatePage(Page):
 
     def _buttons(self) -> QLayout:
         self._begin = push_button(
-            "&Simulate", "Compute the request of the form in another process", self.begin
+            "&Simulate", "Compute the request of the form in another process", self.begin, "first"
         )
-        self._begin.setProperty("rank", "first")
         self._cancel = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
         return row((self._begin, 1), self._cancel)
 

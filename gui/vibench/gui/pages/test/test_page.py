@@ -348,8 +348,8 @@ class TestPage(Page):
             "A&rm the test…  (Ctrl+Return)",
             "Show in words what will happen; nothing plays before Start",
             self._actions.arm_test,
+            "first",
         )
-        self.arm_button.setProperty("rank", "first")
         self._looking = LatestRequest(
             context.looks, preview_test, self._looked, self._look_failed, LOOK_MS, self
         )
