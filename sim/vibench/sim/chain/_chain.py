@@ -6,14 +6,12 @@ the base. The far end is free. Displacements are in the order x1, y1, z1, x2, y2
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict
 
 from ..specimen.specimen import Matrix, Specimen, Triple
-from ..specimen.stops import STRICT
+from ..specimen.stops import Strict
 
 MASSES_PER_CELL = 3
 """m0, m1, m2: a cell's displacements x, y, z."""
@@ -22,10 +20,8 @@ MOST_CELLS = 1000
 
 
 @dataclass(frozen=True)
-class Chain:
+class Chain(Strict):
     """Cells from the driven base to the free end; they may differ in all parameters."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     cells: tuple[Specimen, ...]
     """Cell 0 is coupled to the base through its (k0, c0), cell i to cell i - 1."""

@@ -185,19 +185,16 @@ class Engine:
 
         Raises ValueError when the engine refuses a number of the scene.
         """
-        size = int(self._library.vibench_size_of_tables(int(scene["specimen"]["law"])))
-        tables = np.zeros(size // 8, np.float64)
-        if self._library.vibench_prepare(scene.ctypes.data, tables.ctypes.data) != 0:
-            raise ValueError(
-                "This scene is not allowed: numbers must be finite, masses and springs positive."
-            )
-        return tables
+        return self._prepare("tables", "prepare", scene)
 
     def prepare_cubics(self, scene: Structure) -> Tables:
         """Create the tables of a scene with cubic base motion; see `prepare`."""
-        size = int(self._library.vibench_size_of_cubic_tables(int(scene["specimen"]["law"])))
+        return self._prepare("cubic_tables", "prepare_cubics", scene)
+
+    def _prepare(self, sized: str, prepare: str, scene: Structure) -> Tables:
+        size = getattr(self._library, f"vibench_size_of_{sized}")(int(scene["specimen"]["law"]))
         tables = np.zeros(size // 8, np.float64)
-        if self._library.vibench_prepare_cubics(scene.ctypes.data, tables.ctypes.data) != 0:
+        if getattr(self._library, f"vibench_{prepare}")(scene.ctypes.data, tables.ctypes.data) != 0:
             raise ValueError(
                 "This scene is not allowed: numbers must be finite, masses and springs positive."
             )

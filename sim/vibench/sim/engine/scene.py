@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..specimen.drive import Harmonic
 from ..specimen.hertz import Hertz
 from ..specimen.linear_gap import LinearGap
-from ..specimen.modes import PULL, RATE, ROW, SHAPE, bound_motion, harmonic_motion, modal_form
+from ..specimen.modes import ModalForm, bound_motion, harmonic_motion, modal_form
 from ..specimen.no_contact import NoContact
 from ..specimen.power_law import PowerLaw
 from ..specimen.rigid_stops import RigidStops
@@ -166,17 +166,16 @@ def _fill_power(target: Structure, law: PowerLaw) -> None:
 
 
 def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
-    modes = modal_form(specimen)
     steady, _ = harmonic_motion(specimen, omega, amplitude_m)
-    _fill_motion(target, modes.rates, modes.shapes, modes.rows, steady)
+    _fill_motion(target, modal_form(specimen), steady)
 
 
 def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
     """Fill the case of m1 held on a rigid stop, which can only push."""
     bound = bound_motion(specimen, omega, amplitude_m)
-    _fill_motion(target["motion"], bound[:-1, RATE], bound[:-1, SHAPE], bound[:-1, ROW], bound[-1, SHAPE])
+    _fill_motion(target["motion"], bound.modes, bound.steady)
     m1, m2 = specimen.masses[1:]
-    target["pulls"][: len(bound)] = bound[:, PULL] / m2
+    target["pulls"][: len(bound.pulls)] = bound.pulls / m2
     target["let_go"], target["rests"] = specimen.stiffnesses[1] * (1.0 / m1 + 1.0 / m2), 1.0
 
 
@@ -200,9 +199,8 @@ def _fill_springs(
     held["let_go"], held["rests"] = k1 / (k1 + stop), stop / (k1 + stop)
 
 
-def _fill_motion(target: Structure, rates: Phasors, shapes: Phasors, rows: Phasors, steady: Phasors) -> None:
-    target["modes"] = len(rates)
-    target["rates"][: len(rates)] = rates
-    target["shapes"][: len(rates)] = shapes
-    target["rows"][: len(rates)] = rows
+def _fill_motion(target: Structure, modes: ModalForm, steady: Phasors) -> None:
+    target["modes"] = count = len(modes.rates)
+    for name, values in modes._asdict().items():
+        target[name][:count] = values
     target["steady"] = steady

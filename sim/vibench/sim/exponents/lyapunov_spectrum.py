@@ -118,17 +118,7 @@ def lyapunov_spectrum(
     )
     length = interval.length_s
     if run.outcome is not Outcome.REACHED_END:
-        nothing = np.full(DIRECTIONS, math.nan)
-        parts = _Taken(
-            nothing,
-            nothing,
-            ONE_BLOCK,
-            math.nan,
-            ExponentVerdict.UNKNOWN,
-            Source.AVERAGE,
-            FinalMotion.THROUGHOUT,
-            0,
-        )
+        parts = _Taken()
     else:
         parts = _exponents_of_run(specimen, drive, run, skipped)
     since = parts.since
@@ -153,19 +143,20 @@ def lyapunov_spectrum(
 
 
 ONE_BLOCK = np.ones(DIRECTIONS, dtype=np.int64)
+UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
 class _Taken(NamedTuple):
-    """Exponents derived from a run."""
+    """Exponents derived from a run; by default those of a lost run."""
 
-    exponents: Floats
-    errors: Floats
-    blocks: NDArray[np.int64]
-    dimension_error: float
-    verdict: ExponentVerdict
-    source: Source
-    motion: FinalMotion
-    since: int
+    exponents: Floats = UNKNOWN
+    errors: Floats = UNKNOWN
+    blocks: NDArray[np.int64] = ONE_BLOCK
+    dimension_error: float = math.nan
+    verdict: ExponentVerdict = ExponentVerdict.UNKNOWN
+    source: Source = Source.AVERAGE
+    motion: FinalMotion = FinalMotion.THROUGHOUT
+    since: int = 0
 
 
 def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _Taken:

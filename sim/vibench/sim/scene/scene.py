@@ -3,14 +3,12 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import ClassVar, Literal
-
-from pydantic import ConfigDict
+from typing import Literal
 
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import WHOLE, Harmonic
 from ..specimen.specimen import Specimen
-from ..specimen.stops import STRICT, chosen, require_positive
+from ..specimen.stops import Strict, chosen, require_positive
 from .prediction import State
 
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
@@ -42,10 +40,8 @@ MOST_PERIODS = 1e12
 
 
 @dataclass(frozen=True)
-class FixedDuration:
+class FixedDuration(Strict):
     """Follow the motion for a given time and observe its end."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     duration_s: float = PAPER_DURATION_S
     window_s: float = PAPER_WINDOW_S
@@ -67,10 +63,8 @@ class FixedDuration:
 
 
 @dataclass(frozen=True)
-class AutomaticDuration:
+class AutomaticDuration(Strict):
     """Follow the motion until it has settled, then observe one period, or a window if it never repeats."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
@@ -83,10 +77,8 @@ class AutomaticDuration:
 
 
 @dataclass(frozen=True)
-class Target:
+class Target(Strict):
     """Requested error or time, or both."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     error: float | None = None
     """Relative error of each response; absent: as small as the time allows."""
@@ -105,10 +97,8 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Rest:
+class Rest(Strict):
     """Start from rest."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     kind: Literal["rest"] = "rest"
 
@@ -124,10 +114,8 @@ class Rest:
 
 
 @dataclass(frozen=True)
-class Given:
+class Given(Strict):
     """Start from a given state."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     state: State
     """x, y, z, vx, vy, vz, absolute [m, m/s]."""
@@ -142,10 +130,8 @@ class Given:
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Strict):
     """Request for one simulation."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     specimen: Specimen
     drive: Harmonic

@@ -2,13 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict
 
-from .stops import STRICT, require_positive
+from .stops import Strict, require_positive
 
 FEWEST_SAMPLES = 4
 """A not-a-knot cubic spline needs four points."""
@@ -19,10 +17,8 @@ LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
 
 
 @dataclass(frozen=True)
-class Harmonic:
+class Harmonic(Strict):
     """U = amplitude_m * sin(2 pi frequency_hz t + phase_rad)."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     frequency_hz: float
     amplitude_m: float
@@ -36,10 +32,8 @@ class Harmonic:
 
 
 @dataclass(frozen=True)
-class _Sweep:
+class _Sweep(Strict):
     """A sine of constant displacement amplitude and rising or falling frequency; starts at phase zero."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     start_hz: float
     stop_hz: float

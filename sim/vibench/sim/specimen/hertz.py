@@ -4,18 +4,14 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from pydantic import ConfigDict
-
-from .stops import STRICT, LawWord, Reference, Stops, require_nothing, require_positive
+from .stops import LawWord, Reference, Stops, Strict, require_nothing, require_positive
 
 
 @dataclass(frozen=True)
-class Hertz:
+class Hertz(Strict):
     """Elastic sphere on a plane: F = stiffness * penetration^(3/2), without loss."""
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5"}
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     stiffness: float
     """k_contact [N/m^1.5]."""

@@ -4,13 +4,11 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from pydantic import ConfigDict
-
-from .stops import STRICT, LawWord, Reference, Stops, number_in, require_positive
+from .stops import LawWord, Reference, Stops, Strict, number_in, require_positive
 
 
 @dataclass(frozen=True)
-class HuntCrossley:
+class HuntCrossley(Strict):
     """Hertz contact that loses energy: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
 
     Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. Without other
@@ -19,8 +17,6 @@ class HuntCrossley:
     """
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     stiffness: float
     """[N/m^1.5]."""

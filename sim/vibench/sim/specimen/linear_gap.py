@@ -4,18 +4,14 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from pydantic import ConfigDict
-
-from .stops import PAPER_INDENTATION_M, STRICT, LawWord, Reference, Stops, number_in, require_positive
+from .stops import PAPER_INDENTATION_M, LawWord, Reference, Stops, Strict, number_in, require_positive
 
 
 @dataclass(frozen=True)
-class LinearGap:
+class LinearGap(Strict):
     """Stops that are springs: F = stiffness * penetration, without loss."""
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1"}
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     stiffness: float
     """[N/m]."""

@@ -236,25 +236,25 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
 # While m1 sticks to a stop, m1 and m2 move as one: y = z + side * gap, and the spring and damper between
 # them are inside a rigid body. The motion of x and z is linear, as long as the stop pushes. The native
 # engine follows the motion and finds the instant at which the stop would have to pull.
-#
-# The motion is stored in one table with a row for each term: modes first, the drive last.
-
-RATE = 0
-"""Column of the rates [1/s]."""
-SHAPE = slice(1, 7)
-"""Columns of x, y, z, vx, vy, vz for a unit phasor; y without the constant gap."""
-ROW = slice(7, 13)
-"""Columns of the left eigenvector, nonzero only at x, z, vx, vz; zero for the drive."""
-PULL = 13
-"""Column of the force k2 (z - x) + c2 (vz - vx) by which m2 pulls m0, for a unit phasor [N]."""
-COLUMNS = 14
 
 PLACES = [X, Z, VX, VZ]
 """Indices of the four unknowns of the bound motion in a state."""
 
 
-def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> Complex:
-    """Diagonalise the bound motion under U = amplitude sin(omega t): shape (n+1, COLUMNS), n is 2 to 4.
+class BoundMotion(NamedTuple):
+    """Motion with m1 held on m2: n modes, 2 to 4, and the steady part; y without the constant gap."""
+
+    modes: ModalForm
+    """Of the state x, y, z, vx, vy, vz; rows are nonzero only at x, z, vx, vz."""
+    steady: Complex
+    """Phasors of the steady motion, shape (6,)."""
+    pulls: Complex
+    """Force k2 (z - x) + c2 (vz - vx) by which m2 pulls m0, for a unit phasor of each mode and for the steady
+    motion, shape (n + 1,) [N]."""
+
+
+def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> BoundMotion:
+    """Diagonalise the bound motion under U = amplitude sin(omega t).
 
     Raises ValueError when two bound modes coincide.
     """
@@ -263,12 +263,11 @@ def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> Comple
     dynamic = stiffness - omega**2 * mass + 1j * omega * damping
     base = -1j * amplitude_m * (specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0])
     displacement = np.linalg.solve(dynamic, np.array([base, 0.0]))
-    spread = np.zeros((4, 6))
+    spread = np.zeros((4, 6), dtype=np.complex128)
     spread[:2, :3], spread[2:, 3:] = JOIN.T, JOIN.T
-    table = np.zeros((len(modes.rates) + 1, COLUMNS), dtype=np.complex128)
-    table[:, RATE] = np.append(modes.rates, 1j * omega)
-    table[:, SHAPE] = np.vstack([modes.shapes, [*displacement, *(1j * omega * displacement)]]) @ spread
-    table[:-1, ROW][:, PLACES] = modes.rows
-    x, z, vx, vz = table[:, SHAPE][:, PLACES].T
-    table[:, PULL] = specimen.stiffnesses[2] * (z - x) + specimen.dampings[2] * (vz - vx)
-    return table
+    shapes = np.vstack([modes.shapes, [*displacement, *(1j * omega * displacement)]]) @ spread
+    rows = np.zeros((len(modes.rates), 6), dtype=np.complex128)
+    rows[:, PLACES] = modes.rows
+    x, z, vx, vz = shapes[:, PLACES].T
+    pulls = specimen.stiffnesses[2] * (z - x) + specimen.dampings[2] * (vz - vx)
+    return BoundMotion(ModalForm(modes.rates, shapes[:-1], rows), shapes[-1], pulls)

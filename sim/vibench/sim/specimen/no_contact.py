@@ -1,18 +1,14 @@
 """No stops: the linear specimen. SI units."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
-from pydantic import ConfigDict
-
-from .stops import STRICT, LawWord, Reference, Stops, require_nothing
+from .stops import LawWord, Reference, Stops, Strict, require_nothing
 
 
 @dataclass(frozen=True)
-class NoContact:
+class NoContact(Strict):
     """No stops: the linear specimen. Its gap is ignored."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     kind: Literal["linear"] = "linear"
 

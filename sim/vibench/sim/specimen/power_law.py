@@ -5,15 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from pydantic import ConfigDict
-
 from .stops import (
     HERTZ_EXPONENT,
     PAPER_INDENTATION_M,
-    STRICT,
     LawWord,
     Reference,
     Stops,
+    Strict,
     UnreadableLawError,
     number_in,
     require_positive,
@@ -25,7 +23,7 @@ HIGHEST_EXPONENT = 1001
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class PowerLaw(Strict):
     """The continuous substitute of stops: F = sum force_i (p / reference)^exponent_i, at every p.
 
     Forces are stated at a reference displacement, because the coefficient of p^47 in SI units is 1e204.
@@ -33,8 +31,6 @@ class PowerLaw:
     """
 
     OWN_UNITS: ClassVar = {"reference": "m"}
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     reference: float
     """Displacement p at which the terms have the forces given [m]."""

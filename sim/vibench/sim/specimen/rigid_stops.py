@@ -1,18 +1,14 @@
 """Rigid stops with a coefficient of restitution. SI units."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
-from pydantic import ConfigDict
-
-from .stops import STRICT, LawWord, Reference, Stops, number_in
+from .stops import LawWord, Reference, Stops, Strict, number_in
 
 
 @dataclass(frozen=True)
-class RigidStops:
+class RigidStops(Strict):
     """Rigid stops: m1 and m2 separate with ``restitution`` times the speed of approach (Newton)."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     restitution: float
     """Coefficient of restitution: 0 (the masses stay together) to 1 (no energy is lost)."""

@@ -11,13 +11,12 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict
 
 from .contact_law import ContactLaw, law_by_name
 from .drive import Harmonic
 from .hertz import Elasticity, hertz_stiffness
 from .state import Floats
-from .stops import STRICT
+from .stops import Strict
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
@@ -26,7 +25,7 @@ Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Specimen:
+class Specimen(Strict):
     """The specimen on the shaker. Index i of a triple belongs to m_i, k_i, c_i of the paper."""
 
     OWN_UNITS: ClassVar = {
@@ -38,8 +37,6 @@ class Specimen:
         "damping_matrix": "N s m-1",
     }
     """Units of values whose names do not state one."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     masses: Triple
     """m0, m1, m2 [kg]."""

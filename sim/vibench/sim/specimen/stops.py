@@ -4,16 +4,21 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Generic, NamedTuple, TypeVar
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 from pydantic import ConfigDict
 
 Law_co = TypeVar("Law_co", covariant=True)
-STRICT = ConfigDict(extra="forbid")
 HERTZ_EXPONENT = 1.5
 """Exponent of the indentation, for a sphere on a plane."""
 PAPER_INDENTATION_M = 1e-6
 """The paper fits its continuous models where the contact is pressed in by 1 um (its section 2)."""
+
+
+class Strict:
+    """Base of dataclasses that refuse unknown keys when pydantic reads them from a file."""
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
 
 class Stops(NamedTuple):
