@@ -1,7 +1,9 @@
 """The pictures of a recording: time histories, spectrogram and hidden-state estimate of the visible range."""
 
+from collections.abc import Callable
 from math import log10, nan
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 import pyqtgraph as pg
@@ -33,49 +35,33 @@ from ...widgets.units import SentenceLabel, plain_unit
 from .recording_table import role_text
 from .time_histories import RecordingTimeHistories
 
-_MOTION_WAIT_MS = 250
+_WAIT_MS = 250
 """Delay between the last change of the view and the computation [ms]."""
-_RELATIVE = PlotAxis("p = y - z", "m", short="p")
-_ANOTHER = "another file…"
 CHOOSE = "Choose a recording in the list above."
+Request = TypeVar("Request", bound=HiddenViewRequest | SpectrogramRequest)
+Found = TypeVar("Found", bound=HiddenView | DensityPicture)
 
 
-class HiddenMotionView(QWidget):
-    """Estimated motion of m1 between its stops, with and without a contact model."""
+class _RangePicture(QWidget, Generic[Request, Found]):
+    """A picture of the visible range, computed while its tab is visible.
 
-    def __init__(self, theme: Theme, background: Background) -> None:
+    A subclass names the request for a time range, or why there is none, draws a picture, and erases it.
+    """
+
+    plot: Plot
+    caption: QLabel
+
+    def __init__(self, name: str, background: Background, compute: Callable[[Request], Found]) -> None:
         super().__init__()
-        self.setAccessibleName("Hidden motion")
-        self.plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
-        self.tracked = self.plot.curve(curve_style(0), "tracked")
-        self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
-        self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
-        self.caption = SentenceLabel(rank="second")
-        self.specimen = Choice(
-            "Specimen of the hidden motion",
-            "Specimen whose springs, masses and stops are used for the estimate",
-        )
-        self.specimen.addItem("as the recording describes it", "")
-        for name in shipped_specimens():
-            self.specimen.addItem(name, name)
-        self.specimen.addItem(_ANOTHER, "")
-        self.specimen.activated.connect(self._choose_specimen)
-        self.find_numbers = tick_box(
-            "Find its numbers",
-            "Estimate gaps, m1, springs, dampers and contact law from the visible collisions",
-            lambda _is_on: self._ask(),
-        )
+        self.setAccessibleName(name)
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
-        self._request: HiddenViewRequest | None = None
-        self._of: HiddenViewRequest | None = None
+        self._request: object = None
+        self._of: object = None
         """Inputs of the displayed picture; None without a picture."""
-        self._latest_request = LatestRequest(
-            background, hidden_view, self._show, self._fail, _MOTION_WAIT_MS, self
+        self._latest_request: LatestRequest[Request, Found] = LatestRequest(
+            background, compute, self._show, lambda error: self._clear(str(error)), _WAIT_MS, self
         )
-        chosen = row(QLabel("Specimen"), self.specimen, self.find_numbers, 1)
-        fill_box(QVBoxLayout(self), chosen, self.caption, (self.plot, 1)).setContentsMargins(0, 4, 0, 0)
-        self._clear(CHOOSE)
 
     @property
     def is_busy(self) -> bool:
@@ -107,16 +93,77 @@ class HiddenMotionView(QWidget):
         low_s, high_s = self._view_s
         if not self.isVisible() or self._recording is None or not high_s > low_s:
             return
-        if high_s - low_s > LONGEST_VIEW_S:
+        request = self._request_for(self._recording, low_s, high_s)
+        if isinstance(request, str):
             self._latest_request.drop()
-            self._clear(f"Zoom in to {LONGEST_VIEW_S:g} s or less: p swings a thousand times a second.")
+            self._clear(request)
             return
+        self._request = request
+        self.plot.setEnabled(self._of in (None, request))
         self.caption.setText("working it out…")
+        self._latest_request.ask(request)
+
+    def _show(self, found: Found) -> None:
+        self._of = found.request
+        self.plot.setEnabled(self._of == self._request)
+        self._draw(found)
+
+    def _clear(self, hint: str) -> None:
+        self._of = None
+        self.plot.setEnabled(True)
+        self.caption.setText("")
+        self._erase(hint)
+
+    def _request_for(self, recording: Recording, low_s: float, high_s: float) -> Request | str:
+        """Return the request for a time range, or why there is none."""
+        raise NotImplementedError
+
+    def _draw(self, found: Found) -> None:
+        """Draw a picture."""
+        raise NotImplementedError
+
+    def _erase(self, hint: str) -> None:
+        """Show a hint instead of a picture."""
+        raise NotImplementedError
+
+
+_RELATIVE = PlotAxis("p = y - z", "m", short="p")
+_ANOTHER = "another file…"
+
+
+class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
+    """Estimated motion of m1 between its stops, with and without a contact model."""
+
+    def __init__(self, theme: Theme, background: Background) -> None:
+        super().__init__("Hidden motion", background, hidden_view)
+        self.plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
+        self.tracked = self.plot.curve(curve_style(0), "tracked")
+        self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
+        self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
+        self.caption = SentenceLabel(rank="second")
+        self.specimen = Choice(
+            "Specimen of the hidden motion",
+            "Specimen whose springs, masses and stops are used for the estimate",
+        )
+        self.specimen.addItem("as the recording describes it", "")
+        for name in shipped_specimens():
+            self.specimen.addItem(name, name)
+        self.specimen.addItem(_ANOTHER, "")
+        self.specimen.activated.connect(self._choose_specimen)
+        self.find_numbers = tick_box(
+            "Find its numbers",
+            "Estimate gaps, m1, springs, dampers and contact law from the visible collisions",
+            lambda _is_on: self._ask(),
+        )
+        chosen = row(QLabel("Specimen"), self.specimen, self.find_numbers, 1)
+        fill_box(QVBoxLayout(self), chosen, self.caption, (self.plot, 1)).setContentsMargins(0, 4, 0, 0)
+        self._clear(CHOOSE)
+
+    def _request_for(self, recording: Recording, low_s: float, high_s: float) -> HiddenViewRequest | str:
+        if high_s - low_s > LONGEST_VIEW_S:
+            return f"Zoom in to {LONGEST_VIEW_S:g} s or less: p swings a thousand times a second."
         numbers = Numbers.FOUND if self.find_numbers.isChecked() else Numbers.AS_DESCRIBED
-        specimen = self.specimen.currentData()
-        self._request = HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
-        self.plot.setEnabled(self._of in (None, self._request))
-        self._latest_request.ask(self._request)
+        return HiddenViewRequest(Path(recording.path), low_s, high_s, self.specimen.currentData(), numbers)
 
     def _choose_specimen(self, place: int) -> None:
         """Select another specimen; the last entry opens a file dialog and adds the chosen file."""
@@ -127,9 +174,7 @@ class HiddenMotionView(QWidget):
             self.specimen.setCurrentIndex(place if given else 0)
         self._ask()
 
-    def _show(self, found: HiddenView) -> None:
-        self._of = found.request
-        self.plot.setEnabled(self._of == self._request)
+    def _draw(self, found: HiddenView) -> None:
         self.plot.with_hint("")
         self.tracked.setData(found.time_s, found.p, connect="finite")
         self.free.setData(found.time_s, found.free_p, connect="finite")
@@ -138,23 +183,15 @@ class HiddenMotionView(QWidget):
         self.caption.setText(found.sentence)
         self.plot.setXRange(found.request.low_s, found.request.high_s, padding=0.0)
 
-    def _fail(self, error: BaseException) -> None:
-        self._clear(str(error))
-
-    def _clear(self, hint: str) -> None:
-        self._of = None
-        self.plot.setEnabled(True)
+    def _erase(self, hint: str) -> None:
         for curve in (self.tracked, self.free):
             curve.setData([], [])
         for line in self._stops:
             self.plot.move_level(line, nan)
-        self.caption.setText("")
         self.plot.with_hint(hint)
         self.plot.viewport().update()
 
 
-_WAIT_MS = 250
-"""Delay between the last change of the view and the computation [ms]."""
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -165,15 +202,14 @@ _SHOWN_DB = 80.0
 """Range of colours below the strongest line [dB]."""
 
 
-class SpectrogramView(QWidget):
+class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
     """Frequency over time; colours show the power spectral density in dB."""
 
     zoomed = Signal(float, float)
     """Time range after a zoom by wheel or mouse [s]."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
-        super().__init__()
-        self.setAccessibleName("Spectrogram")
+        super().__init__("Spectrogram", background, recording_spectrogram)
         self.channel, self.spacing = Choice(), Choice(items=RowSpacing)
         self.highest = Choice(items=(f"{highest_hz:g} Hz" for highest_hz in _HIGHEST_HZ))
         self.highest.setCurrentIndex(_USUAL)
@@ -181,14 +217,6 @@ class SpectrogramView(QWidget):
         for width_hz in _WIDTHS_HZ:
             self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
         self.caption = ElidedLabel(rank="second")
-        self._theme = theme
-        self._view_s = (0.0, 0.0)
-        self._recording: Recording | None = None
-        self._request: SpectrogramRequest | None = None
-        self._of: SpectrogramRequest | None = None
-        self._latest_request = LatestRequest(
-            background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
-        )
         self._plots = {
             RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
             RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
@@ -201,12 +229,7 @@ class SpectrogramView(QWidget):
             choice.currentIndexChanged.connect(lambda _index: self._ask())
 
     @property
-    def is_busy(self) -> bool:
-        """Whether a picture is being computed."""
-        return self._latest_request.is_busy
-
-    @property
-    def plot(self) -> Plot:
+    def plot(self) -> Plot:  # type: ignore[override] # the spacing selects one of two
         """Plot with the selected frequency scale."""
         return self._plots[self._spacing]
 
@@ -215,18 +238,9 @@ class SpectrogramView(QWidget):
         """Image with the selected frequency scale."""
         return self._images[self._spacing]
 
-    @property
-    def displayed_results(self) -> DisplayedResult:
-        """The picture, with the selected options as inputs."""
-        return DisplayedResult(self.plot, self._of, self._request)
-
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Select another recording or none; the hint is shown until a picture exists."""
-        self._recording = recording
-        self._latest_request.drop()
-        self._request = self._of = None
-        for image in self._images.values():
-            image.clear(hint)
+        """Select another recording or none, and offer its channels."""
+        super().show_recording(recording, hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
             blocked = self.channel.blockSignals(True)
@@ -236,20 +250,10 @@ class SpectrogramView(QWidget):
             self.channel.setCurrentIndex(roles.index(RESPONSE) if RESPONSE in roles else len(roles) - 1)
             self.channel.blockSignals(blocked)
 
-    def show_view(self, low_s: float, high_s: float) -> None:
-        """Compute the visible range."""
-        self._view_s = (low_s, high_s)
-        self._ask()
-
     def retheme(self, theme: Theme) -> None:
         """Change the colours of the scales."""
         for image in self._images.values():
             image.retheme(theme)
-
-    def showEvent(self, event: QShowEvent) -> None:
-        """Start a computation that was not needed while the tab was hidden."""
-        super().showEvent(event)
-        self._ask()
 
     def _zoom(self, *_: object) -> None:
         low_s, high_s = self.plot.getViewBox().viewRange()[0]
@@ -262,12 +266,12 @@ class SpectrogramView(QWidget):
     def _ask(self) -> None:
         for spacing, plot in self._plots.items():
             plot.setVisible(spacing is self._spacing)
-        recording = self._recording
-        low_s, high_s = self._view_s
-        if not self.isVisible() or recording is None or not high_s > low_s or self.channel.count() == 0:
-            return
+        if self.channel.count():
+            super()._ask()
+
+    def _request_for(self, recording: Recording, low_s: float, high_s: float) -> SpectrogramRequest | str:
         rate_hz = recording.sample_rate_hz
-        request = SpectrogramRequest(
+        return SpectrogramRequest(
             path=Path(recording.path),
             role=str(self.channel.currentData()),
             start=int(low_s * rate_hz),
@@ -276,25 +280,17 @@ class SpectrogramView(QWidget):
             spacing=self._spacing,
             resolution_hz=self.line_width.currentData(),
         )
-        self._request = request
-        self.plot.setEnabled(self._of in (None, request))
-        self.caption.setText("working it out…")
-        self._latest_request.ask(request)
 
-    def _show(self, found: DensityPicture) -> None:
-        self._of = found.request
-        self.plot.setEnabled(self._of == self._request)
+    def _draw(self, found: DensityPicture) -> None:
         self._images[found.request.spacing].show_picture(found)
         self.caption.setText(
             f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "
             f"every sample used"
         )
 
-    def _fail(self, error: BaseException) -> None:
-        self._of = None
-        self.plot.setEnabled(True)
-        self.image.clear(str(error))
-        self.caption.setText("")
+    def _erase(self, hint: str) -> None:
+        for image in self._images.values():
+            image.clear(hint)
 
     def _lay_out(self) -> None:
         bar = QHBoxLayout()
