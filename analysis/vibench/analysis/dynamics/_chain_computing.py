@@ -264,7 +264,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     else:
         found = chain_response(chain, drive, request.accuracy, whole_s, observed_s)
     if found.outcome is not Outcome.REACHED_END:
-        return _lost_run(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
+        return _bare_run(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
     after_s = min(observed_s, ENERGY_S, ENERGY_SHARE * whole_s if request.has_target else math.inf)
     after_s = max(1.0, math.floor(after_s * drive.frequency_hz)) / drive.frequency_hz
     run = integrate_chain(
@@ -272,7 +272,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         _rate_hz(chain, drive.frequency_hz, after_s), start_time_s=whole_s,
     )  # fmt: skip
     if run.outcome is not Outcome.REACHED_END:
-        return _lost_run(chain, run.outcome, found.impacts, whole_s, drive.frequency_hz)
+        return _bare_run(chain, run.outcome, found.impacts, whole_s, drive.frequency_hz)
     exponent = error = math.nan
     if request.exponent_s > 0.0:
         growth = chain_lyapunov_exponent(
@@ -283,15 +283,11 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     shown = run.time_s >= run.end_time_s - SHOWN_PERIODS / drive.frequency_hz
     energy, energy_error = mean_energies(chain, run.states, base)
     struck = run.impacts.times_s >= run.time_s[shown][0] if shown.any() else np.zeros(0, np.bool_)
-    return ChainRun(
-        cells=chain.size,
-        frequency_hz=drive.frequency_hz,
-        over_hz=np.array([drive.frequency_hz]),
+    return replace(
+        _bare_run(chain, run.outcome, found.impacts, observed_s, drive.frequency_hz),
         transmission=found.response_ii[None, :, X],
         transmission_error=relative_error,
         largest_m=found.largest_m[:, -1],
-        impacts=found.impacts,
-        observed_s=observed_s,
         energy_j=energy,
         energy_error_j=energy_error,
         exponent_per_s=exponent,
@@ -300,7 +296,6 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         motion_m=run.states[shown, :, X],
         impact_time_s=run.impacts.times_s[struck],
         impact_cell=run.impacts.cells[struck],
-        outcome=run.outcome.text,
     )
 
 
@@ -310,7 +305,7 @@ def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
         sample_rate_hz=_rate_hz(chain, drive.highest_hz, drive.duration_s),
     )  # fmt: skip
     if run.outcome is not Outcome.REACHED_END:
-        return _lost_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
+        return _bare_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
     base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.turns(run.time_s))
     over_hz, ratio = _component_over_time(run, drive)
     return _whole_run(chain, run, base, over_hz, ratio)
@@ -323,7 +318,7 @@ def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) ->
         chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded_rate(rate, chain, duration_s)
     )
     if run.outcome is not Outcome.REACHED_END:
-        return _lost_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
+        return _bare_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
     base = drive.displacement_m[: len(run.time_s)]
     segment = max(16, len(run.time_s) // SEGMENTS)
     found = [
@@ -336,14 +331,14 @@ def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) ->
     return _whole_run(chain, run, base, found[0].frequency_hz[is_shown], ratio[is_shown])
 
 
-def _lost_run(
+def _bare_run(
     chain: Chain,
     outcome: Outcome,
     impacts: NDArray[np.int64],
     observed_s: float,
     frequency_hz: float = math.nan,
 ) -> ChainRun:
-    """Describe an incomplete run: how it ended and its impacts until then."""
+    """Return a run with its outcome and impacts only, as for one that did not reach its end."""
     unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
     return ChainRun(
         cells=chain.size,
@@ -370,22 +365,17 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
     stretches = np.array_split(np.arange(len(run.time_s)), min(STRETCHES, max(1, len(run.time_s))))
     sizes = [np.sqrt(np.mean(run.states[each, :, X] ** 2, axis=0)) for each in stretches]
     p = run.states[..., 1] - run.states[..., 2]
-    return ChainRun(
-        cells=chain.size,
-        frequency_hz=math.nan,
+    return replace(
+        _bare_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s),
         over_hz=over_hz,
         transmission=ratio,
-        transmission_error=np.full(chain.size, math.nan),
         largest_m=np.max(np.abs(p), axis=0),
-        impacts=run.impacts.per_cell,
-        observed_s=run.end_time_s,
         energy_j=energy,
         energy_error_j=error,
         time_s=np.array([run.time_s[each].mean() for each in stretches]),
         motion_m=np.array(sizes),
         impact_time_s=run.impacts.times_s,
         impact_cell=run.impacts.cells,
-        outcome=run.outcome.text,
     )
 
 

@@ -1,6 +1,6 @@
 """HDF5 files of branches, spectra and chains, with units and the request."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
@@ -89,10 +89,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
             group = file.create_group(f"branch_{number:03d}")
-            for name in _WORDS:
-                group.attrs[name] = getattr(line, name)
-            for name, units in _UNITS.items():
-                group.create_dataset(name, data=getattr(line, name)).attrs["units"] = units
+            _write(group, line, _WORDS, _UNITS)
             group.create_dataset("is_stable", data=line.is_stable.astype(np.int8))
             events = group.create_group("events")
             for name in _EVENT_COLUMNS:
@@ -171,15 +168,18 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
     Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
-        for name, units in _LINEAR_UNITS.items():
-            file.create_dataset(name, data=np.asarray(getattr(found, name))).attrs["units"] = units
+        _write(file, found, (), _LINEAR_UNITS)
         for number, run in enumerate(found.runs):
-            group = file.create_group(f"run_{number:05d}")
-            for name in _RUN_WORDS:
-                group.attrs[name] = getattr(run, name)
-            for name, units in _CHAIN_UNITS.items():
-                group.create_dataset(name, data=getattr(run, name)).attrs["units"] = units
+            _write(file.create_group(f"run_{number:05d}"), run, _RUN_WORDS, _CHAIN_UNITS)
     return path
+
+
+def _write(group: h5py.Group, source: object, words: Sequence[str], units: Mapping[str, str]) -> None:
+    """Write fields of an object: words as attributes, arrays as datasets with their units."""
+    for name in words:
+        group.attrs[name] = getattr(source, name)
+    for name, unit in units.items():
+        group.create_dataset(name, data=np.asarray(getattr(source, name))).attrs["units"] = unit
 
 
 @contextmanager
