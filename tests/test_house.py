@@ -20,7 +20,7 @@ LINES_AT_MOST = {
     "native": 6_625,
     "sim": 20_542,
     "studies": 3_182,
-    "virtual_rig": 7_577,
+    "virtual_rig": 7_571,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

@@ -9,7 +9,8 @@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,6 +36,14 @@ _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
 
 
+@dataclass(frozen=True)
+class PlayedFault:
+    """A fault that has started."""
+
+    fault: str
+    began_s: float
+
+
 def nothing_to_heal() -> None:
     """Do nothing, because the fault ends by itself."""
 
@@ -54,6 +63,19 @@ class RigFaults:
         self._daq = daq
         self._disk = disk
         self._heals: list[Heal] = []
+        self.played: list[PlayedFault] = []
+        """Faults of scripts that have started."""
+
+    def play(self, script: "FaultScript") -> None:
+        """Schedule every fault of a script at its rig time."""
+        for fault in script.faults:
+            self._world.at(fault.at_s, partial(self._start, fault))
+
+    def _start(self, fault: "FaultKind") -> None:
+        heal = fault.begin(self)
+        self.played.append(PlayedFault(fault.fault, self._world.time_s))
+        if fault.for_s is not None:
+            self._world.at(fault.at_s + fault.for_s, heal)
 
     def heal(self) -> None:
         """End every fault that has not ended."""
@@ -294,31 +316,3 @@ def load_fault_script(path: Path | str) -> FaultScript:
     Raises ConfigurationError with file, key, what was given and what is allowed.
     """
     return load_toml(named(path, "hardware_configs/faults"), FaultScript)
-
-
-@dataclass(frozen=True)
-class PlayedFault:
-    """A fault that has started."""
-
-    fault: str
-    began_s: float
-
-
-@dataclass
-class FaultPlay:
-    """Player of a script, which starts each fault at its rig time."""
-
-    world: World
-    rig: RigFaults
-    played: list[PlayedFault] = field(default_factory=list)
-
-    def begin(self, script: FaultScript) -> None:
-        """Schedule every fault of the script."""
-        for fault in script.faults:
-            self.world.at(fault.at_s, lambda fault=fault: self._start(fault))  # type: ignore[misc]
-
-    def _start(self, fault: FaultKind) -> None:
-        heal = fault.begin(self.rig)
-        self.played.append(PlayedFault(fault.fault, self.world.time_s))
-        if fault.for_s is not None:
-            self.world.at(fault.at_s + fault.for_s, heal)

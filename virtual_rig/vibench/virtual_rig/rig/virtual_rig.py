@@ -23,7 +23,7 @@ from ..usb.bus import plug_in, unplug, usb_service
 from ..usb.usbtmc import UsbTmcInstrument
 from ..world.time_grid import FULL_BAND_HZ, relative_clock_ppm
 from ..world.world import World, virtual_section
-from .fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, RigFaults, load_fault_script
+from .fault_script import DISK_FAULTS, FaultScript, PlayedFault, RigFaults, load_fault_script
 
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0
@@ -121,12 +121,12 @@ class VirtualRig:
     @property
     def faults(self) -> RigFaults:
         """Faults on demand."""
-        return self._running_state.play.rig
+        return self._running_state.faults
 
     @property
     def played_faults(self) -> tuple[PlayedFault, ...]:
         """Faults of the configuration's script that have started."""
-        return tuple(self._running_state.play.played)
+        return tuple(self._running_state.faults.played)
 
     def let_pass(self, duration_s: float) -> None:
         """Advance rig time without sampling; a rig in real time advances by itself."""
@@ -146,9 +146,9 @@ class VirtualRig:
             )
             disk = DiskTrouble(lambda: self.let_pass(REFUSED_S))
             starting.enter_context(troubled_disks(disk))
-            play = FaultPlay(self.world, RigFaults(self.world, self.generator, self._usb, daq, disk))
-            play.begin(self._script)
-            self._running = _Running(daq, socket, controller, play, starting.pop_all())
+            faults = RigFaults(self.world, self.generator, self._usb, daq, disk)
+            faults.play(self._script)
+            self._running = _Running(daq, socket, controller, faults, starting.pop_all())
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -188,7 +188,7 @@ class _Running:
     daq: DaqServer
     socket: ScpiSocket
     controller: ScpiSocket | None
-    play: FaultPlay
+    faults: RigFaults
     closing: ExitStack
 
 
