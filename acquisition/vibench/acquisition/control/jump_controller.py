@@ -91,15 +91,15 @@ class JumpLocator:
     """Locates one jump of a pass."""
 
     def __init__(
-        self, settling_controller: SettlingController, plan: SettledSine, direction: str, number: int
+        self, controller: SettlingController, plan: SettledSine, direction: str, number: int
     ) -> None:
         assert plan.jumps is not None
-        self._settling_controller = settling_controller
+        self._controller = controller
         self._plan = plan
         self._rule = plan.jumps
         self._direction = direction
         self._number = number
-        self._until_s = settling_controller.loop.elapsed_s + plan.search_s
+        self._until_s = controller.loop.elapsed_s + plan.search_s
 
     def localise(
         self, points: Sequence[SettledPoint], after: SettledPoint
@@ -196,14 +196,14 @@ class JumpLocator:
 
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
         """Stop the motion at the branch's first frequency: a branch that began from rest is reached again."""
-        yield from decay_motion(self._settling_controller.loop)
-        found = yield from self._settling_controller.settled()
+        yield from decay_motion(self._controller.loop)
+        found = yield from self._controller.settled()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
 
     def _move_to(self, frequency_hz: float) -> Controller[SettledState]:
         plan = self._plan
-        yield from glide(self._settling_controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
-        return (yield from self._settling_controller.settled())
+        yield from glide(self._controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
+        return (yield from self._controller.settled())
 
     def _search_at(self, frequency_hz: float) -> Controller[SettledPoint]:
         found = yield from self._move_to(frequency_hz)
@@ -216,16 +216,16 @@ class JumpLocator:
                 **found.note.numbers,
             },
         )
-        yield from record_settled(self._settling_controller, found, segment, self._plan.record_s)
+        yield from record_settled(self._controller, found, segment, self._plan.record_s)
         return found.point
 
     def _is_late(self) -> bool:
         """Whether the time left is too short for one more step and the way to the end."""
         step_s = self._plan.settling.longest_wait_s
-        return self._settling_controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
+        return self._controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 
     def _say(self, found: LocatedJump, how: JumpSearchEnd, arrived: JumpSide) -> None:
-        self._settling_controller.loop.note(
+        self._controller.loop.note(
             JumpNote(
                 direction=self._direction,
                 pass_number=self._number,
@@ -242,12 +242,12 @@ class JumpLocator:
 
 def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
     """Carry out all passes, from the first ramp up to the last ramp down."""
-    settling_controller = SettlingController(loop, plan.settling, plan.base_level)
+    controller = SettlingController(loop, plan.settling, plan.base_level)
     passes = tuple(plan.passes())
     yield from start(loop, passes[0][1][0], plan.base_level)
     came_from = "rest"
     for number, (direction, frequencies_hz) in enumerate(passes, start=1):
-        stepping = Pass(settling_controller, plan, number, direction)
+        stepping = Pass(controller, plan, number, direction)
         yield from stepping.carry_out(frequencies_hz, came_from)
         came_from = f"{direction} pass {number}, {frequencies_hz[-1]:g} Hz"
     yield from loop.ramp_down()
@@ -257,9 +257,9 @@ class Pass:
     """One pass through the frequencies, and its branch."""
 
     def __init__(
-        self, settling_controller: SettlingController, plan: SettledSine, number: int, direction: str
+        self, controller: SettlingController, plan: SettledSine, number: int, direction: str
     ) -> None:
-        self._settling_controller = settling_controller
+        self._controller = controller
         self._plan = plan
         self._number = number
         self._direction = direction
@@ -276,7 +276,7 @@ class Pass:
             has_jumped = search is not None and points and ratio(points[-1], point) > search.factor
             if search is not None and has_jumped and searched < search.most_searches:
                 searched += 1
-                locator = JumpLocator(self._settling_controller, self._plan, self._direction, self._number)
+                locator = JumpLocator(self._controller, self._plan, self._direction, self._number)
                 point, is_on_next_branch = yield from locator.localise(points, point)
                 if is_on_next_branch:
                     self._branch += 1
@@ -285,11 +285,9 @@ class Pass:
             came_from = f"{frequency_hz:g} Hz"
 
     def _step_to(self, frequency_hz: float, came_from: str) -> Controller[SettledPoint]:
-        settling_controller = self._settling_controller
-        yield from glide(
-            settling_controller.loop, frequency_hz, self._plan.base_level, self._plan.glide_step_hz
-        )
-        found = yield from settling_controller.settled()
+        controller = self._controller
+        yield from glide(controller.loop, frequency_hz, self._plan.base_level, self._plan.glide_step_hz)
+        found = yield from controller.settled()
         segment = Segment(
             SegmentLabel.STEP,
             {
@@ -301,5 +299,5 @@ class Pass:
                 **found.note.numbers,
             },
         )
-        yield from record_settled(settling_controller, found, segment, self._plan.record_s)
+        yield from record_settled(controller, found, segment, self._plan.record_s)
         return found.point

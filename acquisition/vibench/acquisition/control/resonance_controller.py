@@ -193,13 +193,13 @@ def _search(
         # Such a motion settles slowly: unsettled tries would give a wrong slope of the phase.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
-    settling_controller = SettlingController(loop, rule, level)
+    controller = SettlingController(loop, rule, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz, is_mode=plan.is_fundamental)
     states: list[SettledState] = []
     frequency_hz, lock = last.frequency_hz, LockResult.LOST
     for _ in range(plan.most_tries):
         move(loop, frequency_hz, level)
-        states.append((yield from settling_controller.settled()))
+        states.append((yield from controller.settled()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
         # Where a harmonic is noise its phase is random, and while it settles the phase changes.
@@ -226,14 +226,12 @@ def _search(
     resonance = search.resonance(_open_phase_deg(plan, found))
     mode = None
     if lock is LockResult.LOCKED and plan.is_fundamental:
-        flanks = yield from _flanks(settling_controller, plan, resonance)
+        flanks = yield from _flanks(controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
         # Back from the flanks before the recording: the next level begins where this one ends.
         move(loop, found.frequency_hz, level)
-        found = yield from settling_controller.settled()
-    yield from record_settled(
-        settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s
-    )
+        found = yield from controller.settled()
+    yield from record_settled(controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
     periods = round(sum(each.waited_s * each.drive_hz for each in states))
     _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries), periods))
     if lock is not LockResult.LOCKED:
@@ -259,7 +257,7 @@ class Tracked:
 
 
 def _flanks(
-    settling_controller: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance
+    controller: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance
 ) -> Controller[list[SettledState]]:
     """Measure on both sides, up to one and a half half-widths away."""
     found: list[SettledState] = []
@@ -267,8 +265,8 @@ def _flanks(
     for place in (*range(-pairs, 0), *range(1, pairs + 1)):
         frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
         if plan.low_hz <= frequency_hz <= plan.high_hz:
-            move(settling_controller.loop, frequency_hz, settling_controller.level)
-            found.append((yield from settling_controller.settled()))
+            move(controller.loop, frequency_hz, controller.level)
+            found.append((yield from controller.settled()))
     return found
 
 

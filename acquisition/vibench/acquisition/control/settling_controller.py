@@ -272,9 +272,9 @@ class SettlingController:
 
 def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     """Ramp up to the level, settle, record, ramp down."""
-    settling_controller = SettlingController(loop, plan.settling, plan.base_level)
+    controller = SettlingController(loop, plan.settling, plan.base_level)
     yield from start(loop, plan.frequency_hz, plan.base_level)
-    yield from settling_controller.settled()
+    yield from controller.settled()
     control = LevelControl(plan.base_level, loop.most_vpp, loop.least_vpp)
     target = plan.base_level.acceleration_at(plan.frequency_hz)
     pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
@@ -286,7 +286,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
         yield from loop.listen(RunState.RECORDING, piece_s, plan.segment)
         measured = measured_level(loop.periods.base)
         require_answer(loop.rig, plan.frequency_hz, loop.setting.setting_vpp, measured.amplitude)
-        held = settling_controller.held(measured)
+        held = controller.held(measured)
         outside += held is Held.OUTSIDE
         loop.note(
             LevelNote(
@@ -306,34 +306,32 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
 
 
 def record_settled(
-    settling_controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
+    controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
 ) -> Controller[None]:
     """Record a settled motion as a segment, and note its level."""
-    yield from _record_held(settling_controller, segment, duration_s)
-    _note(settling_controller, found, segment)
+    yield from _record_held(controller, segment, duration_s)
+    _note(controller, found, segment)
 
 
 def record_and_judge(
-    settling_controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
+    controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
 ) -> Controller[SettledState]:
     """Record a motion as a segment that is long enough to judge it."""
-    shortest_s = (settling_controller.rule.periods + 2) / settling_controller.loop.motion_hz
+    shortest_s = (controller.rule.periods + 2) / controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
-    yield from _record_held(settling_controller, segment, duration_s)
-    found = settling_controller.found(waited_s)
-    _note(settling_controller, found, segment)
+    yield from _record_held(controller, segment, duration_s)
+    found = controller.found(waited_s)
+    _note(controller, found, segment)
     return found
 
 
-def _record_held(
-    settling_controller: SettlingController, segment: Segment, duration_s: float
-) -> Controller[None]:
-    settling_controller.loop.forget()
-    yield from settling_controller.loop.listen(RunState.RECORDING, duration_s, segment)
+def _record_held(controller: SettlingController, segment: Segment, duration_s: float) -> Controller[None]:
+    controller.loop.forget()
+    yield from controller.loop.listen(RunState.RECORDING, duration_s, segment)
 
 
-def _note(settling_controller: SettlingController, found: SettledState, segment: Segment) -> None:
-    loop = settling_controller.loop
+def _note(controller: SettlingController, found: SettledState, segment: Segment) -> None:
+    loop = controller.loop
     measured = measured_level(loop.periods.base)
     loop.note(
         SegmentNote(
@@ -342,7 +340,7 @@ def _note(settling_controller: SettlingController, found: SettledState, segment:
             drive_hz=loop.drive_hz,
             base_m_per_s2=measured.amplitude,
             base_u=measured.uncertainty,
-            level=settling_controller.held(measured),
+            level=controller.held(measured),
             response_ii=found.response,
             motion=found.judgement.steadiness,
             period=found.judgement.period,
