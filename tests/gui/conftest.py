@@ -101,12 +101,28 @@ def own_state(tmp_path_factory):
 @pytest.fixture
 def window(context, own_state, tmp_path, qapp):
     """The complete window, without a bench."""
-    context.choose_folder(tmp_path / "recordings")
+    window = opened(context, tmp_path)
+    yield window
+    end(window, qapp)
+
+
+@pytest.fixture(scope="module")
+def lasting_window(own_state, tmp_path_factory, qapp):
+    """One window for all tests of a module: they look at it, or set first what they depend on."""
+    folder = tmp_path_factory.mktemp("window")
+    context = AppContext(Settings(folder / "window.ini"))
+    window = opened(context, folder)
+    yield window
+    end(window, qapp)
+    context.background.close()
+
+
+def opened(context, folder):
+    context.choose_folder(folder / "recordings")
     window = Window(context, PAGES)
     window.resize(1280, 720)
     window.show()
-    yield window
-    end(window, qapp)
+    return window
 
 
 def end(window, qapp):

@@ -49,19 +49,19 @@ def focusable(window):
             yield widget
 
 
-def test_every_focusable_widget_has_an_accessible_name(window):
+def test_every_focusable_widget_has_an_accessible_name(lasting_window):
     nameless = []
-    for widget in focusable(window):
+    for widget in focusable(lasting_window):
         text = widget.text() if isinstance(widget, NAMED_BY_TEXT) else ""
         if not (widget.accessibleName() or text) and type(widget).__name__ not in ("QTabBar", "QScrollArea"):
             nameless.append((type(widget).__name__, widget.parentWidget().accessibleName()))
     assert nameless == []
 
 
-def test_every_page_and_tab_has_an_accessible_name(window):
-    for name, page in window.pages.items():
+def test_every_page_and_tab_has_an_accessible_name(lasting_window):
+    for name, page in lasting_window.pages.items():
         assert page.accessibleName() == f"{name} page"
-    for tabs in window.findChildren(QTabWidget):
+    for tabs in lasting_window.findChildren(QTabWidget):
         for number in range(tabs.count()):
             assert tabs.tabText(number)
             assert tabs.widget(number).accessibleName()
@@ -72,21 +72,21 @@ def mnemonic(text):
     return found[1].upper() if found else None
 
 
-def test_mnemonics_are_unique_in_each_menu_and_on_each_page(window):
-    bar = [mnemonic(action.text()) for action in window.menuBar().actions()]
-    for name, page in window.pages.items():
+def test_mnemonics_are_unique_in_each_menu_and_on_each_page(lasting_window):
+    bar = [mnemonic(action.text()) for action in lasting_window.menuBar().actions()]
+    for name, page in lasting_window.pages.items():
         on_page = [mnemonic(button.text()) for button in page.findChildren(QAbstractButton)]
         twice = [key for key, count in Counter(filter(None, (*bar, *on_page))).items() if count > 1]
         assert twice == [], name
-    for menu in window.menuBar().findChildren(QMenu):
+    for menu in lasting_window.menuBar().findChildren(QMenu):
         keys = Counter(filter(None, (mnemonic(action.text()) for action in menu.actions())))
         assert max(keys.values(), default=1) == 1, menu.title()
 
 
-def test_keyboard_shortcuts_are_unique(window):
+def test_keyboard_shortcuts_are_unique(lasting_window):
     keys = [
         action.shortcut().toString()
-        for menu in window.menuBar().findChildren(QMenu)
+        for menu in lasting_window.menuBar().findChildren(QMenu)
         for action in menu.actions()
         if not action.shortcut().isEmpty()
     ]
@@ -118,15 +118,15 @@ def scrolled_sideways(page):
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
-def test_every_field_has_a_visible_edge(window, qapp, qtbot, contrast, theme):
+def test_every_field_has_a_visible_edge(lasting_window, qapp, qtbot, contrast, theme):
     """WCAG 2.1, section 1.4.11: contrast of at least 3 with the inside and the outside."""
-    window.context.choose_theme(theme)
-    qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)
+    lasting_window.context.choose_theme(theme)
+    qtbot.waitUntil(lambda: lasting_window.is_themed, timeout=60_000)
     faint, looked_at = [], 0
-    for name in window.pages:
-        window.show_page(name)
+    for name in lasting_window.pages:
+        lasting_window.show_page(name)
         qapp.processEvents()
-        for field in window.page.findChildren(QWidget):
+        for field in lasting_window.page.findChildren(QWidget):
             is_field = isinstance(field, FIELDS) and not inside(field, FIELDS)
             if not is_field or not field.isVisible() or not field.isEnabled():
                 continue
@@ -145,16 +145,16 @@ def test_every_field_has_a_visible_edge(window, qapp, qtbot, contrast, theme):
 @pytest.mark.parametrize(
     "size", [(1024, 700), (1280, 720), (2560, 1440)], ids=lambda size: f"{size[0]}x{size[1]}"
 )
-def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
-    window.context.choose_theme(theme)
-    qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)
-    window.resize(*size)
-    for name in window.pages:
-        window.show_page(name)
+def test_no_text_is_cut_off(lasting_window, qapp, qtbot, theme, size):
+    lasting_window.context.choose_theme(theme)
+    qtbot.waitUntil(lambda: lasting_window.is_themed, timeout=60_000)
+    lasting_window.resize(*size)
+    for name in lasting_window.pages:
+        lasting_window.show_page(name)
         qapp.processEvents()
-        assert (window.width(), window.height()) == size, f"{name} page needs more room"
-        assert list(cut_off(window)) == [], name
-        assert list(scrolled_sideways(window.page)) == [], name
+        assert (lasting_window.width(), lasting_window.height()) == size, f"{name} page needs more room"
+        assert list(cut_off(lasting_window)) == [], name
+        assert list(scrolled_sideways(lasting_window.page)) == [], name
 
 
 @pytest.mark.thorough

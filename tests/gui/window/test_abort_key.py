@@ -2,7 +2,7 @@
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMenu, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QVBoxLayout, QWidget
 
 from vibench.gui.window.menus import AbortKey
 
@@ -41,15 +41,6 @@ def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, abort_signal
     qtbot.keyClick(field, Qt.Key.Key_Escape)
     assert abort_signals == ["abort"]
     assert not dialog.isVisible()
-
-
-def test_the_abort_key_works_in_an_open_menu(qtbot, abort_signals):
-    menu = QMenu()
-    menu.addAction("one")
-    qtbot.addWidget(menu)
-    menu.popup(menu.pos())
-    qtbot.keyClick(menu, Qt.Key.Key_Escape)
-    assert abort_signals == ["abort"]
 
 
 def test_other_keys_do_not_abort(qtbot, abort_signals):

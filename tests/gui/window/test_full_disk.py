@@ -1,10 +1,9 @@
 """Saving on a full disk gives one sentence and leaves every file unchanged."""
 
-from contextlib import contextmanager
-
 import pytest
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
+from tests.full_disk import full_disk
 from vibench.acquisition.plan import Campaign
 from vibench.analysis.errors import AnalysisError
 from vibench.gui.page.app_context import SettingKey, Settings
@@ -14,19 +13,6 @@ from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.notice import QUEUE, TEST
 
 from ...attack.recordings_corpus import good_recordings
-
-resource = pytest.importorskip("resource", reason="limits on file size exist on POSIX only")
-
-
-@contextmanager
-def full_disk():
-    """Refuse every byte beyond the first twenty of a file."""
-    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20, usual[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
 
 
 def content(folder):
@@ -41,27 +27,27 @@ def own(tmp_path):
 
 
 @pytest.mark.parametrize("page", [TEST, QUEUE])
-def test_saving_a_test_or_campaign_on_a_full_disk_gives_one_message(window, own, monkeypatch, page):
-    measurement = window.context.selection.measurement
-    window.context.selection.choose_campaign(Campaign(name="night", measurements=(measurement,)))
+def test_saving_a_test_or_campaign_on_a_full_disk_gives_one_message(lasting_window, own, monkeypatch, page):
+    measurement = lasting_window.context.selection.measurement
+    lasting_window.context.selection.choose_campaign(Campaign(name="night", measurements=(measurement,)))
     (own / "mine.toml").write_text("older")
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(own / "mine.toml"), ""))
-    before, known = content(own), len(window.strip.notices)
+    before, known = content(own), len(lasting_window.strip.notices)
     with full_disk():
-        window.pages[page]._save()
-    (notice,) = window.strip.notices[known:]
+        lasting_window.pages[page]._save()
+    (notice,) = lasting_window.strip.notices[known:]
     assert "mine.toml: cannot be written" in notice.what
     assert "save it elsewhere" in notice.what
     assert content(own) == before
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "csv"])
-def test_saving_a_plot_on_a_full_disk_gives_one_dialog(window, own, monkeypatch, ending):
+def test_saving_a_plot_on_a_full_disk_gives_one_dialog(lasting_window, own, monkeypatch, ending):
     said = []
     monkeypatch.setattr(plot_actions, "new_path", lambda *_: own / f"plot.{ending}")
     monkeypatch.setattr(QMessageBox, "warning", lambda *given: said.append(given[-1]))
     with full_disk():
-        plot_actions.save_plot(window.findChildren(Plot)[0])
+        plot_actions.save_plot(lasting_window.findChildren(Plot)[0])
     assert len(said) == 1
     assert "was not written: File too large" in said[0]
     assert content(own) == {}
@@ -89,12 +75,12 @@ def test_settings_on_a_full_disk_are_reported_and_the_old_ones_kept(qapp, own):
     assert content(own) == before
 
 
-def test_the_bench_check_works_without_a_recording_folder(window, own, monkeypatch):
+def test_the_bench_check_works_without_a_recording_folder(lasting_window, own, monkeypatch):
     """An impossible folder raised an error in the window before the engine could report it."""
     orders = []
     (own / "file").touch()
-    window.context.choose_folder(own / "file" / "recordings")
-    monkeypatch.setattr(type(window.user_actions), "_may", lambda *_: True)
-    monkeypatch.setattr(window.context.bridge, "order", lambda *given, **_: orders.append(given))
-    window.user_actions.check()
+    lasting_window.context.choose_folder(own / "file" / "recordings")
+    monkeypatch.setattr(type(lasting_window.user_actions), "_may", lambda *_: True)
+    monkeypatch.setattr(lasting_window.context.bridge, "order", lambda *given, **_: orders.append(given))
+    lasting_window.user_actions.check()
     assert orders[0][1] == own / "file" / "recordings"

@@ -10,15 +10,15 @@ from vibench.gui.widgets.theme import DARK
 from vibench.gui.window.window import PAGES, Window
 
 
-def test_every_page_has_a_working_key(window, qtbot):
-    for number, name in enumerate(window.pages, start=1):
-        qtbot.keyClick(window, getattr(Qt.Key, f"Key_{number}"), Qt.KeyboardModifier.ControlModifier)
-        assert window.page is window.pages[name], name
+def test_every_page_has_a_working_key(lasting_window, qtbot):
+    for number, name in enumerate(lasting_window.pages, start=1):
+        qtbot.keyClick(lasting_window, getattr(Qt.Key, f"Key_{number}"), Qt.KeyboardModifier.ControlModifier)
+        assert lasting_window.page is lasting_window.pages[name], name
 
 
-def test_pages_are_in_the_order_of_the_job(window):
+def test_pages_are_in_the_order_of_the_job(lasting_window):
     names = list(PAGES)
-    assert list(window.pages) == names
+    assert list(lasting_window.pages) == names
     assert names[:3] == ["Rig", "Test", "Run"]
 
 
@@ -49,11 +49,11 @@ def test_a_restart_restores_theme_page_and_test_without_arming(window, qapp, own
     again.deleteLater()
 
 
-def test_banner_and_stop_are_visible_on_every_page(window, qapp):
-    for name in window.pages:
-        window.show_page(name)
+def test_banner_and_stop_are_visible_on_every_page(lasting_window, qapp):
+    for name in lasting_window.pages:
+        lasting_window.show_page(name)
         qapp.processEvents()
-        assert window.banner.isVisible(), name
+        assert lasting_window.banner.isVisible(), name
 
 
 @pytest.mark.thorough

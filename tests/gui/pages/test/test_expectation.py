@@ -1,7 +1,5 @@
 """The Test page shows the predicted motion and the expected uncertainty of a test."""
 
-from pathlib import Path
-
 import pytest
 
 from vibench.acquisition.excitation.feedback import BaseLevel
@@ -10,7 +8,7 @@ from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.test import test_preview as preview
 from vibench.gui.pages.test.test_page import TestPage as Page, summary_text
 
-RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig("virtual_rig")
 
 
 @pytest.fixture
@@ -40,7 +38,7 @@ def test_a_branch_beyond_the_fast_loop_is_refused_with_the_reason(page):
     fast_loop = pytest.importorskip(
         "vibench_fast_loop.branch_continuation", reason="pip install -e extensions/fast_loop"
     )
-    rig = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig_controller.toml")
+    rig = load_rig("virtual_rig_controller")
     plan = fast_loop.BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=1e-6), start_hz=95, low_hz=94.5, high_hz=96
     )

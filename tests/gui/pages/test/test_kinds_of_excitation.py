@@ -1,7 +1,5 @@
 """The list of excitations is grouped and explained; each kind starts with a name and valid values."""
 
-from pathlib import Path
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QStyleOptionViewItem
@@ -11,7 +9,7 @@ from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.test import test_page as _test_form
 from vibench.gui.pages.test.test_page import shipped_tests
 
-RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig("virtual_rig")
 
 
 @pytest.fixture
