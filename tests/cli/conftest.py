@@ -1,5 +1,6 @@
 """Run the command line in separate processes, or in this one where that makes no difference."""
 
+import json
 import os
 import subprocess
 import sys
@@ -52,5 +53,33 @@ def vibench_here() -> Vibench:
             with pytest.raises(SystemExit) as ended:
                 main()
         return subprocess.CompletedProcess(words, ended.value.code or 0, out.getvalue(), err.getvalue())
+
+    return run
+
+
+@pytest.fixture
+def answered(vibench_here, tmp_path):
+    """Run a command that succeeds in the test's folder; return its JSON, or what it printed without it."""
+
+    def run(*arguments):
+        ran = vibench_here(*arguments, cwd=tmp_path)
+        assert ran.returncode == 0, ran.stderr
+        return json.loads(ran.stdout) if "--json" in arguments else ran.stdout
+
+    return run
+
+
+@pytest.fixture
+def refusal(vibench_here, tmp_path):
+    """Run a command that is refused in the test's folder; return its one sentence."""
+
+    def run(*arguments):
+        ran = vibench_here(*arguments, cwd=tmp_path)
+        assert ran.returncode == 1
+        # `measure` prints first how long the campaign takes.
+        assert ran.stdout == "" or (arguments[0] == "measure" and "--estimate" not in arguments)
+        assert "Traceback" not in ran.stderr
+        (sentence,) = [line for line in ran.stderr.splitlines() if line.startswith("error: ")]
+        return sentence
 
     return run

@@ -16,12 +16,9 @@ from .killed_campaign import short_points, slow_rig
 HARDWARE_CONFIGS = Path(__file__).parents[2] / "hardware_configs"
 
 
-def test_an_estimate_is_one_json_document_and_writes_no_file(vibench_here, tmp_path):
+def test_an_estimate_is_one_json_document_and_writes_no_file(answered, tmp_path):
     plan, bench = short_points(tmp_path, 3), slow_rig(tmp_path)
-    arguments = ("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
-    result = vibench_here(*arguments, cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)
+    told = answered("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
     assert (told["recordings"], told["kept"], told["fits"]) == (3, 0, True)
     assert abs(told["duration_s"] - 3 * (0.6 + 0.08 + 0.3 + 0.1 + 0.08)) < 1e-6
     assert not (tmp_path / "out").exists()
@@ -46,14 +43,12 @@ def test_a_campaign_is_catalogued_and_its_end_notified(vibench, tmp_path):
 
 
 @pytest.mark.thorough
-def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibench_here, tmp_path):
+def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(answered, vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
-    checked = vibench_here("bench", "check", "--bench", bench, "--knobs", knobs, cwd=tmp_path)
-    assert checked.returncode == 0, checked.stderr
+    answered("bench", "check", "--bench", bench, "--knobs", knobs)
     knobs.write_text(knobs.read_text().replace('"simulated"', '"A. Student"'))
-    made = vibench_here(*campaign, "--out", "out", cwd=tmp_path)
-    assert made.returncode == 0, made.stderr
+    answered(*campaign, "--out", "out")
     with open_recording(next(tmp_path.glob("out/*.h5"))) as recording:
         assert recording.confirmations["operator"] == "A. Student"
     knobs.write_text(knobs.read_text().replace('"10 dB"', '"20 dB"'))
@@ -73,16 +68,9 @@ def test_a_file_that_is_no_sheet_is_not_replaced_by_one(vibench_here, tmp_path):
 
 
 def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
-    expected = CampaignEstimate(
-        recordings=3,
-        kept=2,
-        duration_s=3723.4,
-        rest_s=120.0,
-        lead_in_s=60.0,
-        largest_bytes=10**6,
-        total_bytes=2 * 10**6,
-        free_bytes=10**6,
-    )
+    times = {"duration_s": 3723.4, "rest_s": 120.0, "lead_in_s": 60.0}
+    sizes = {"largest_bytes": 10**6, "total_bytes": 2 * 10**6, "free_bytes": 10**6}
+    expected = CampaignEstimate(recordings=3, kept=2, **times, **sizes)
     first, rest, second, third = estimate_text(expected).splitlines()
     assert first == "3 recordings (2 kept), 1:02:03 (h:min:s) of rig time, about 2 MB; 1 MB are free"
     assert rest == "0:02:00 of it are silence between recordings"
@@ -94,23 +82,18 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
 
 
 @pytest.mark.thorough
-def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(vibench_here, tmp_path):
+def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(refusal, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     usual = (HARDWARE_CONFIGS / "virtual_rig_controller.toml").read_text(encoding="utf-8")
     bench = tmp_path / "late.toml"
     bench.write_text(usual.replace("latency_s = 3e-4", "latency_s = 2e-3"), encoding="utf-8")
-    result = vibench_here("measure", "branch", "--bench", bench, "--out", "out", "--estimate", cwd=tmp_path)
-    assert result.returncode == 1
-    assert "largest multiplier is 1.21 at 116.2" in result.stderr
+    said = refusal("measure", "branch", "--bench", bench, "--out", "out", "--estimate")
+    assert "largest multiplier is 1.21 at 116.2" in said
     assert not (tmp_path / "out").exists()
 
 
-def test_an_estimate_reports_a_missing_output_of_the_bench(vibench_here, tmp_path):
+def test_an_estimate_reports_a_missing_output_of_the_bench(refusal, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
-    result = vibench_here(
-        "measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate", cwd=tmp_path
-    )
-    assert result.returncode == 1
-    assert "branch_3um needs a real-time controller, and this bench has none" in result.stderr
-    assert result.stdout == ""
+    said = refusal("measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate")
+    assert "branch_3um needs a real-time controller, and this bench has none" in said
     assert not (tmp_path / "out").exists()

@@ -75,18 +75,8 @@ def test_chain_lengths_and_alternating_cells_can_be_studied():
 @pytest.mark.thorough
 @pytest.mark.parametrize("frequency", ["220", "200:300"])
 def test_a_lost_run_reports_only_its_ending(frequency, tmp_path):
-    options = (
-        "--cells",
-        2,
-        "--amplitude",
-        1e100,
-        "--frequency",
-        frequency,
-        "--duration",
-        0.2,
-        "--settle",
-        0.1,
-    )
+    drive = ("--amplitude", 1e100, "--frequency", frequency)
+    options = ("--cells", 2, *drive, "--duration", 0.2, "--settle", 0.1)
     found = answer(*options, "--out", tmp_path / "out")
     (point,) = found["runs"]
     assert point["outcome"] != "reached the end time"

@@ -16,6 +16,12 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
+def answer(*arguments):
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
 def refused(*arguments):
     """The sentence with which a command refuses."""
     result = run(*arguments)
@@ -25,9 +31,7 @@ def refused(*arguments):
 
 def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_path):
     options = ("--frequency", "60:64", "--amplitude", "5e-6", "--places", 2, "--starts", 1)
-    result = run("branches", *options, "--json", "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
-    (branch,) = json.loads(result.stdout)["branches"]
+    (branch,) = answer("branches", *options, "--out", tmp_path / "out")["branches"]
     assert branch["points"][0]["frequency_hz"] == 60.0
     assert all(point["is_stable"] for point in branch["points"])
     names = {each.name for each in (tmp_path / "out").iterdir()}
@@ -36,9 +40,7 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
 
 
 def test_branches_end_when_the_requested_time_is_over():
-    result = run("branches", "--frequency", "50:600", "--amplitude", "5e-6", "--time", "300 ms", "--json")
-    assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
+    found = answer("branches", "--frequency", "50:600", "--amplitude", "5e-6", "--time", "300 ms")
     assert not found["is_complete"]
     assert sum(each["end"] == ArcEnd.OUT_OF_TIME for each in found["branches"]) <= 1
 
@@ -50,14 +52,13 @@ def test_branches_along_the_level_are_reported_in_sentences():
     assert "1 branches (0 isolated)" in result.output
 
 
+SHORT_LINE = (
+    "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
+)  # fmt: skip
+
+
 def test_branches_report_which_motions_a_bench_can_hold():
-    bench = shipped("hardware_configs/virtual_rig.toml")
-    result = run(
-        "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
-        "--holdable", bench, "--json",
-    )  # fmt: skip
-    assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
+    found = answer(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig.toml"))
     # Ten looks of ten periods or of a fifth of a second.
     assert found["least_growth_time_s"] == pytest.approx(2.0, rel=0.05)
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
@@ -65,34 +66,23 @@ def test_branches_report_which_motions_a_bench_can_hold():
 
 def test_a_real_time_controller_extends_the_holdable_motions():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
-    result = run(
-        "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
-        "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"), "--json",
-    )  # fmt: skip
-    assert result.exit_code == 0, result.output
+    found = answer(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"))
     # Ten times 0.3 ms of latency and one and a half of 10,240 samples a second.
-    assert json.loads(result.stdout)["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
+    assert found["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
 
 
 @pytest.mark.parametrize("options", [("--model", "linear"), ()])
 def test_rounding_causes_no_instability_or_bifurcation_without_damping(options):
-    result = run(
-        "branches", "--damping-time", 0, "--amplitude", 5e-6, "--frequency", "200:201", "--places", 2,
-        "--starts", 1, "--json", *options,
-    )  # fmt: skip
-    assert result.exit_code == 0, result.output
-    smooth = max(json.loads(result.stdout)["branches"], key=lambda each: len(each["points"]))
+    line = ("--amplitude", 5e-6, "--frequency", "200:201", "--places", 2, "--starts", 1)
+    found = answer("branches", "--damping-time", 0, *line, *options)
+    smooth = max(found["branches"], key=lambda each: len(each["points"]))
     assert all(point["is_stable"] for point in smooth["points"])
     assert smooth["events"] == []
 
 
 def test_exponents_are_printed_as_json_and_written(tmp_path):
-    result = run(
-        "spectrum", "--amplitude", 5e-6, "--frequency", 260, "--duration", 1.5, "--settle", 0.5, "--json",
-        "--out", tmp_path / "s",
-    )  # fmt: skip
-    assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
+    times = ("--duration", 1.5, "--settle", 0.5)
+    found = answer("spectrum", "--amplitude", 5e-6, "--frequency", 260, *times, "--out", tmp_path / "s")
     (point,) = found["points"]
     assert len(point["exponents_per_s"]) == 6
     assert found["largest_sum_difference"] < 1e-6
@@ -103,22 +93,16 @@ def test_exponents_are_printed_as_json_and_written(tmp_path):
 
 POINT = ("--amplitude", "5e-6", "--frequency", "260")
 LINE = ("--amplitude", "5e-6", "--frequency", "60:70")
+DRIVEN = (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))
 
 
 @pytest.mark.parametrize(
     "command",
     [
         *(("spectrum", *POINT, option) for option in ("--duration", "--settle", "--confidence")),
-        *(
-            ("branches", *LINE, option)
-            for option in ("--places", "--starts", "--harmonics", "--most-periods")
-        ),
+        *(("branches", *LINE, name) for name in ("--places", "--starts", "--harmonics", "--most-periods")),
         *(("chain", *POINT, option) for option in ("--duration", "--settle", "--exponent", "--cells")),
-        *((*each, "--gap") for each in (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))),
-        *(
-            (*each, "--damping-time")
-            for each in (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))
-        ),
+        *((*each, option) for each in DRIVEN for option in ("--gap", "--damping-time")),
     ],
 )
 @pytest.mark.parametrize("value", ["-1", "nan"])
@@ -154,30 +138,15 @@ def test_zero_is_quoted_as_typed(command):
         (("branches", "--amplitude", "5e-6", "--frequency", "70:60"), "70 is not below 60"),
         (("branches", "--amplitude", "x", "--frequency", "60:70"), "'x' is not a number"),
         (("branches", "--amplitude", "-1", "--frequency", "60:70"), "-1 is not above 0"),
-        (
-            ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--model", "rigid:2"),
-            "Restitution 2.0 is not allowed",
-        ),
-        (
-            ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--method", "first-order"),
-            "one harmonic cannot describe hertz",
-        ),
-        (
-            ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--places", "1"),
-            "places was given as 1",
-        ),
-        (
-            ("spectrum", "--amplitude", "5e-6", "--frequency", "60:70"),
-            "one above 0 Hz or START:STOP:STEP such as 50:600:1",
-        ),
+        (("branches", *LINE, "--model", "rigid:2"), "Restitution 2.0 is not allowed"),
+        (("branches", *LINE, "--method", "first-order"), "one harmonic cannot describe hertz"),
+        (("branches", *LINE, "--places", "1"), "places was given as 1"),
+        (("spectrum", *LINE), "one above 0 Hz or START:STOP:STEP such as 50:600:1"),
         (
             ("spectrum", "--amplitude", "1e-6:2e-6:1e-6", "--frequency", "60:70:1"),
             "give one of them as one number",
         ),
-        (
-            ("spectrum", "--amplitude", "5e-6", "--frequency", "260", "--duration", "0.1"),
-            "ask for 32 or more",
-        ),
+        (("spectrum", *POINT, "--duration", "0.1"), "ask for 32 or more"),
     ],
 )
 def test_invalid_options_are_refused_in_one_sentence(arguments, said):
@@ -192,7 +161,7 @@ def test_invalid_options_are_refused_in_one_sentence(arguments, said):
         (("chain", *POINT, "--amplitude", "1e300"), "Drive amplitude 1e+300 m is not allowed"),
         *(
             ((*each, "--damping-time", value), f"--damping-time was given as {float(value)!r}")
-            for each in (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))
+            for each in DRIVEN
             for value in ("1e300", "1e3")
         ),
     ],

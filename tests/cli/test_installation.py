@@ -12,6 +12,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from tests.full_disk import full_disk
 from vibench.acquisition import shipped_folder
 from vibench.acquisition.host.extras import EXTRAS
 from vibench.cli.__main__ import COMMANDS
@@ -46,61 +47,54 @@ print(json.dumps(told))
 """
 
 
-def without(libraries, *arguments, cwd):
-    """Run ``vibench`` where some libraries cannot be imported."""
-    program = WITHOUT.format(libraries=libraries, arguments=arguments)
+def ran(program, cwd):
     environment = {**os.environ, "COLUMNS": "200"}
     return subprocess.run(
         [sys.executable, "-c", program], cwd=cwd, env=environment, capture_output=True, text=True, check=False
     )
 
 
-def test_the_version_matches_the_package(vibench_here, tmp_path):
-    assert vibench_here("--version", cwd=tmp_path).stdout == f"vibench {version('vibench')}\n"
+def without(libraries, *arguments, cwd):
+    """Run ``vibench`` where some libraries cannot be imported."""
+    return ran(WITHOUT.format(libraries=libraries, arguments=tuple(map(str, arguments))), cwd)
 
 
-def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(vibench_here, tmp_path):
-    told = vibench_here("study", "paper", "--out", "out.h5", "--estimate", "--json", cwd=tmp_path)
-    assert json.loads(told.stdout)["points"] == 17730
+def test_the_version_matches_the_package(answered):
+    assert answered("--version") == f"vibench {version('vibench')}\n"
+
+
+def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(answered, tmp_path):
+    assert answered("study", "paper", "--out", "out.h5", "--estimate", "--json")["points"] == 17730
     assert not (tmp_path / "out.h5").exists()
 
 
-def test_copies_of_shipped_files_are_complete_and_never_overwrite(vibench_here, tmp_path):
-    assert vibench_here("examples", "--copy", "mine", cwd=tmp_path).returncode == 0
+def test_copies_of_shipped_files_are_complete_and_never_overwrite(answered, refusal, tmp_path):
+    answered("examples", "--copy", "mine")
     for folder in ("campaigns", "hardware_configs", "studies", "examples"):
         for path in shipped_folder(folder).rglob("*.toml"):
             copy = tmp_path / "mine" / folder / path.relative_to(shipped_folder(folder))
             assert copy.read_bytes() == path.read_bytes()
     changed = tmp_path / "mine" / "campaigns" / "quick.toml"
     changed.write_text("changed", encoding="utf-8")
-    again = vibench_here("examples", "--copy", "mine", cwd=tmp_path)
-    assert again.returncode == 1
-    assert "exists already; nothing was copied" in again.stderr
+    assert "exists already; nothing was copied" in refusal("examples", "--copy", "mine")
     assert changed.read_text(encoding="utf-8") == "changed"
 
 
-def test_every_example_has_its_own_name(vibench_here, tmp_path):
-    for line in vibench_here("examples", cwd=tmp_path).stdout.splitlines()[:-1]:
+def test_every_example_has_its_own_name(answered):
+    for line in answered("examples").splitlines()[:-1]:
         names = line.partition(": ")[2].split(", ")
         assert len(names) == len(set(names)), line
 
 
-def test_studies_are_listed_as_toml_files(vibench_here, tmp_path):
-    listed = json.loads(vibench_here("examples", "--json", cwd=tmp_path).stdout)["studies"]
+def test_studies_are_listed_as_toml_files(answered):
+    listed = answered("examples", "--json")["studies"]
     assert {Path(each).suffix for each in listed} == {".toml"}
 
 
-def test_a_full_disk_is_reported_in_one_sentence(vibench_here, tmp_path):
-    resource = pytest.importorskip("resource", reason="bounds on files are POSIX")
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
-    try:
-        told = vibench_here("examples", "--copy", "mine", cwd=tmp_path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert told.returncode == 1
-    assert re.search(r"there is no space for .*ine/campaigns/branch\.toml", told.stderr)
-    assert "Traceback" not in told.stderr
+def test_a_full_disk_is_reported_in_one_sentence(refusal):
+    with full_disk(room_bytes=100):
+        said = refusal("examples", "--copy", "mine")
+    assert re.search(r"there is no space for .*ine/campaigns/branch\.toml", said)
 
 
 @pytest.mark.thorough
@@ -168,7 +162,7 @@ def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, 
         ("matplotlib", ("analyse", "some.h5", "--out", "out"), "figures"),
         (
             "matplotlib",
-            ("branches", "--frequency", "60", "--amplitude", "1e-6:2e-6", "--out", "out"),
+            ("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--out", "out"),
             "figures",
         ),
         ("matplotlib", ("map", "basin", "--out", "out"), "figures"),
@@ -201,15 +195,7 @@ def test_the_base_installation_supports_commands_without_figures_and_all_help(tm
     program = ONE_AFTER_ANOTHER.format(
         libraries=[*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], lines=[*CORE_ALONE, *helps]
     )
-    environment = {**os.environ, "COLUMNS": "200"}
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran(program, tmp_path)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert [(code, said) for code, _, said in told if code] == []

@@ -6,12 +6,10 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from pathlib import Path
 from threading import Event
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
 CAMPAIGN = """
 name = "night"
 [[measurements]]

@@ -43,8 +43,9 @@ def free_port():
         return taken.getsockname()[1]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def served():
+    """What the command printed; each test sets first what it depends on."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     options = ("--address", "127.0.0.1:0", "--scpi-port", str(free_port()))
     arguments = [sys.executable, "-u", "-m", "vibench.cli", "serve-rig", *options]
@@ -112,7 +113,7 @@ def test_an_indefinite_length_block_ends_at_the_newline(served):
 
 
 def test_the_own_driver_works_over_the_socket(served):
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", served))
     config = rig.generator.model_copy(update={"resource": resource})
     generator = AFG1022X.open(config)

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +16,6 @@ from vibench.acquisition.stopping.program import (
 )
 from vibench.sim.operating_system.this import OpenFile
 
-ROOT = Path(__file__).resolve().parents[2]
 DRIVING = """
 import sys
 from threading import Event

@@ -1,15 +1,11 @@
 """`vibench tradeoff` of a user's scene: error over time for every applicable method."""
 
-import json
-
 import pytest
 
 
-def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(vibench_here, tmp_path):
+def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(answered, tmp_path):
     asked = ("tradeoff", "--amplitude", 5e-6, "--frequency", 100, "--model", "power:7", "--error", "0.1 %")
-    ran = vibench_here(*asked, "--json", "--out", tmp_path / "new", cwd=tmp_path)
-    assert ran.returncode == 0, ran.stderr
-    points = json.loads(ran.stdout)["points"]
+    points = answered(*asked, "--json", "--out", tmp_path / "new")["points"]
     (chosen,) = [each for each in points if each["is_chosen"]]
     assert chosen["error"] <= 1e-3
     by_method = {each["method"]: each for each in points}
@@ -29,19 +25,14 @@ def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(vibenc
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
     ],
 )
-def test_an_impossible_scene_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
-    ran = vibench_here("tradeoff", *arguments, cwd=tmp_path)
-    assert ran.returncode != 0
-    (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
-    assert said in line
+def test_an_impossible_scene_is_refused_in_one_sentence(refusal, tmp_path, arguments, said):
+    assert said in refusal("tradeoff", *arguments)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.thorough
-def test_without_a_scene_the_four_cases_of_the_paper_are_measured(vibench_here, tmp_path):
-    ran = vibench_here("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new", cwd=tmp_path)
-    assert ran.returncode == 0, ran.stderr
-    scenes = json.loads(ran.stdout)["scenes"]
+def test_without_a_scene_the_four_cases_of_the_paper_are_measured(answered, tmp_path):
+    scenes = answered("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new")["scenes"]
     assert [each["scene"] for each in scenes] == [f"hertz, 260 Hz, {um} µm" for um in (1, 5, 10, 50)]
     assert all(sum(point["is_chosen"] for point in each["points"]) == 1 for each in scenes)
     assert (tmp_path / "new" / "tradeoff.png").is_file()

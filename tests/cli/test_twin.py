@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.full_disk import full_disk
 from vibench.acquisition import open_recording
 from vibench.acquisition.check.admission import CheckRule
 from vibench.acquisition.engine import (
@@ -30,13 +31,8 @@ STOPPING = {"on_changed_specimen": "stop"}
 
 
 def campaign(limits, duration_s=600.0):
-    dwell = {
-        "kind": "dwell",
-        "amplitude_vpp": 1.5,
-        "frequency_hz": 260,
-        "settle_s": 0.2,
-        "duration_s": duration_s,
-    }
+    dwell = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": duration_s}
+    dwell["settle_s"] = 0.2
     one = {"name": "dwell", "ramp_s": 0.3, "excitation": dwell, "limits": limits}
     return Campaign.model_validate({"name": "twins", "measurements": [one]})
 
@@ -46,7 +42,7 @@ def running(tmp_path, monkeypatch):
     """Start an engine on a rig at the wall's pace, and on it a campaign."""
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     with start_engine(Supervision.UNATTENDED) as engine:
 
@@ -121,17 +117,12 @@ def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
 
 def test_a_twin_whose_baseline_finds_no_room_goes_on_with_one_sentence(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     known = {Hidden.M1: KnownNumber(value=2.1e-3, low=2.0e-3, high=2.2e-3)}
     live = SimpleNamespace(watch=ChangeWatch(Level(mean=1.0, sd=0.1)), known=known)
     following = _Following(None, rig, specimen_of(rig), live, (0, 1), plan="dwell")
-    resource = pytest.importorskip("resource", reason="limits on file size exist on POSIX only")
-    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20, usual[1]))
-    try:
+    with full_disk():
         following._keep_baseline()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
     (said,) = "".join(capsys.readouterr().err.split("\n")).split("warning: ")[1:]
     assert "could not be written (File too large)" in said
     assert not [each for each in tmp_path.rglob("*") if each.is_file()]

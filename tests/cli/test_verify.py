@@ -106,11 +106,8 @@ def test_the_catalogue_names_a_damaged_recording_and_fails(vibench_here, folder)
     found = vibench_here("catalogue", ".", "--json", cwd=folder)
     assert found.returncode == 1
     assert found.stderr.startswith("error: two.h5: not as it was sealed: attributes")
-    assert [each["seal"] for each in json.loads(found.stdout)["recordings"]] == [
-        "intact",
-        "damaged",
-        "intact",
-    ]
+    seals = [each["seal"] for each in json.loads(found.stdout)["recordings"]]
+    assert seals == ["intact", "damaged", "intact"]
 
 
 def packed(vibench_here, folder):

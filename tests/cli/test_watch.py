@@ -14,13 +14,7 @@ import pytest
 from tests.frozen import frozen
 from tests.windows_here import sees_locks
 from vibench.acquisition import StopSwitch, open_recording, stop_on_signal
-from vibench.acquisition.engine import (
-    EngineState,
-    StopDelivery,
-    Supervision,
-    start_engine,
-    stop_engine,
-)
+from vibench.acquisition.engine import EngineState, StopDelivery, Supervision, start_engine, stop_engine
 from vibench.acquisition.engine._client import EngineAddress, announce
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
@@ -40,7 +34,7 @@ def own_state(tmp_path_factory, monkeypatch):
 @pytest.fixture
 def running(tmp_path):
     with start_engine(Supervision.UNATTENDED) as engine:
-        engine.client.open(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"))
+        engine.client.open(load_rig("virtual_rig"))
         wait(engine, EngineState.READY)
         engine.client.arm(LONG, tmp_path)
         engine.client.start()
