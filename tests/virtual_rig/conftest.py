@@ -1,13 +1,14 @@
 """A small analogue world that behaves, and programs connected to a simulated DAQ that samples it."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
 import grpc
 import numpy as np
 import pytest
-from nidaqmx import GrpcSessionOptions, Task
+from nidaqmx import DaqError, GrpcSessionOptions, Task
+from nidaqmx.constants import AcquisitionType
 
 from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.daqmx.rig import Pace
@@ -129,6 +130,31 @@ class Daq:
     def task(self, name: str = "") -> Task:
         """A task that is closed with the test."""
         return self.resources.enter_context(Task(name, grpc_options=self.options))
+
+    def inputs(
+        self, channels: str, rate_hz: float | None = None, samples: int | None = None, **limits
+    ) -> Task:
+        """A task of inputs: on demand without a rate, continuous unless it ends after ``samples``."""
+        task = self.task()
+        task.ai_channels.add_ai_voltage_chan(channels, **limits)
+        if samples is not None:
+            task.timing.cfg_samp_clk_timing(rate_hz, samps_per_chan=samples)
+        elif rate_hz is not None:
+            task.timing.cfg_samp_clk_timing(rate_hz, sample_mode=AcquisitionType.CONTINUOUS)
+        return task
+
+    def outputs(self, channels: str = "Dev1/ao0", limit_v: float = 1.0) -> Task:
+        task = self.task()
+        task.ao_channels.add_ao_voltage_chan(channels, min_val=-limit_v, max_val=limit_v)
+        return task
+
+
+@contextmanager
+def refused(code, match: str | None = None, kind: type[DaqError] = DaqError) -> Iterator:
+    """Expect an error of the driver with that code; gives what was caught."""
+    with pytest.raises(kind, match=match) as caught:
+        yield caught
+    assert caught.value.error_code == code
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from nidaqmx.constants import ProductCategory
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.system import System
 
+from tests.virtual_rig.conftest import refused
 from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.daqmx.channels import channel_names, expand
 from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with
@@ -49,17 +50,15 @@ def test_the_usb_4431_has_one_output(system):
 
 
 def test_missing_device_features_are_refused_by_name(system):
-    with pytest.raises(DaqError, match=r"(?s)analogue output.*cDAQ1Mod1") as caught:
+    with refused(DAQmxErrors.ATTR_NOT_SUPPORTED, r"(?s)analogue output.*cDAQ1Mod1"):
         _ = system.devices["cDAQ1Mod1"].ao_voltage_rngs
-    assert caught.value.error_code == DAQmxErrors.ATTR_NOT_SUPPORTED
     with pytest.raises(DaqError, match=r"Device\.PCI_BUS_NUM"):
         _ = system.devices["Dev1"].pci_bus_num
 
 
 def test_an_unknown_device_is_refused_with_the_devices_there_are(system):
-    with pytest.raises(DaqError, match="Dev1") as caught:
+    with refused(DAQmxErrors.INVALID_DEVICE_ID, "Dev1"):
         _ = system.devices["Dev9"].product_type
-    assert caught.value.error_code == DAQmxErrors.INVALID_DEVICE_ID
 
 
 def test_a_device_can_have_the_name_a_configuration_gives_it(connect):

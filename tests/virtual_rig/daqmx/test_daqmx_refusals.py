@@ -10,13 +10,8 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqReadError, RpcError
 from session_pb2 import Session
 
+from tests.virtual_rig.conftest import refused
 from vibench.virtual_rig.daqmx.errors import Fault, ServerGone
-
-
-def code_of(action):
-    with pytest.raises(DaqError) as caught:
-        action()
-    return caught.value.error_code
 
 
 @pytest.fixture
@@ -31,27 +26,25 @@ def test_a_device_in_use_is_refused_and_the_holder_named(daq, task):
     task.start()
     rival = daq.task("rival")
     rival.ai_channels.add_ai_voltage_chan("Dev1/ai3")
-    with pytest.raises(DaqError, match=r"(?s)measure.*rival") as caught:
+    with refused(DAQmxErrors.PAL_RESOURCE_RESERVED, r"(?s)measure.*rival"):
         rival.start()
-    assert caught.value.error_code == DAQmxErrors.PAL_RESOURCE_RESERVED
     task.stop()
     rival.start()
 
 
 def test_inputs_and_outputs_of_one_device_do_not_disturb_each_other(daq, task):
     task.start()
-    output = daq.task()
-    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    output = daq.outputs("Dev1/ao0", 1)
     output.timing.cfg_samp_clk_timing(1000)
     output.write(np.zeros(1000), auto_start=True)
 
 
 def test_a_task_without_channels_can_do_nothing(daq):
     empty = daq.task()
-    assert code_of(empty.start) == DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
-    assert code_of(lambda: empty.timing.cfg_samp_clk_timing(1000)) == (
-        DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
-    )
+    with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
+        empty.start()
+    with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
+        empty.timing.cfg_samp_clk_timing(1000)
 
 
 def test_a_running_task_cannot_be_changed(task):
@@ -62,14 +55,16 @@ def test_a_running_task_cannot_be_changed(task):
         lambda: task.ai_channels.add_ai_voltage_chan("Dev1/ai3"),
         lambda: setattr(task.timing, "samp_clk_rate", 2000.0),
     ):
-        assert code_of(change) == DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING
+        with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING):
+            change()
 
 
 def test_a_cleared_task_is_gone(daq):
     task = Task("short", grpc_options=daq.options)
     interpreter, handle = task._interpreter, task._handle
     task.close()
-    assert code_of(lambda: interpreter.start_task(handle)) == DAQmxErrors.INVALID_TASK
+    with refused(DAQmxErrors.INVALID_TASK):
+        interpreter.start_task(handle)
 
 
 def test_a_second_task_of_a_name_is_refused_or_joined_as_the_program_wishes(daq, task):
@@ -77,34 +72,33 @@ def test_a_second_task_of_a_name_is_refused_or_joined_as_the_program_wishes(daq,
         return GrpcSessionOptions(daq.options.grpc_channel, "", initialization_behavior=behavior)
 
     new = options(SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
-    assert code_of(lambda: Task("measure", grpc_options=new)) == DAQmxErrors.DUPLICATE_TASK
+    with refused(DAQmxErrors.DUPLICATE_TASK):
+        Task("measure", grpc_options=new)
     join = options(SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION)
     with Task("measure", grpc_options=join) as joined:
         assert joined.channel_names == task.channel_names
     assert task.channel_names  # leaving the second one has not cleared the first
-    assert code_of(lambda: Task("nothing", grpc_options=join)) == DAQmxErrors.INVALID_TASK
+    with refused(DAQmxErrors.INVALID_TASK):
+        Task("nothing", grpc_options=join)
 
 
 def test_waiting_for_a_task_that_does_not_end_reports_it(task):
     task.start()
-    assert code_of(lambda: task.wait_until_done(timeout=0.01)) == (
-        DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
-    )
+    with refused(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE):
+        task.wait_until_done(timeout=0.01)
 
 
 def test_a_missing_trigger_times_out_without_samples(daq, task):
     task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
-    with pytest.raises(DaqReadError) as caught:
+    with refused(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(10, timeout=0.01)
-    assert caught.value.error_code == DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE
     assert caught.value.samps_per_chan_read == 0
     daq.server.edge("/Dev1/PFI0")
     assert np.shape(task.read(10)) == (2, 10)
 
 
 def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
-    output = daq.task()
-    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    output = daq.outputs("Dev1/ao0", 1)
     output.timing.cfg_samp_clk_timing(1000, source="/Dev1/ai/SampleClock")
     output.write(np.ones(1000), auto_start=True)
     daq.world.advance(0.25)
@@ -113,44 +107,35 @@ def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
 
 
 def test_a_read_past_the_end_returns_the_rest_with_an_error(daq):
-    task = daq.task()
-    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
-    task.timing.cfg_samp_clk_timing(1000, samps_per_chan=30)
-    with pytest.raises(DaqReadError) as caught:
+    task = daq.inputs("Dev1/ai1", 1000, samples=30)
+    with refused(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE, kind=DaqReadError) as caught:
         task.read(50)
-    assert caught.value.error_code == DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE
     assert caught.value.samps_per_chan_read == 30
 
 
 def test_a_chassis_shows_its_trigger_terminal_once_it_is_reserved(daq):
-    task = daq.task()
-    task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
-    assert code_of(lambda: task.triggers.start_trigger.term) == (
-        DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING
-    )
+    task = daq.inputs("cDAQ1Mod1/ai0")
+    with refused(DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING):
+        _ = task.triggers.start_trigger.term
     task.control(TaskMode.TASK_RESERVE)
     assert task.triggers.start_trigger.term == "/cDAQ1/ai/StartTrigger"
 
 
 def test_a_world_that_cannot_begin_leaves_the_device_free(daq):
     daq.world.slowest_hz = 2000.0
-    task = daq.task()
-    task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    task = daq.inputs("Dev1/ai0")
     task.timing.cfg_samp_clk_timing(1000)
-    with pytest.raises(DaqError, match="2000 Hz") as caught:
+    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "2000 Hz"):
         task.start()
-    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
-    rival = daq.task()
-    rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    rival = daq.inputs("Dev1/ai0")
     rival.timing.cfg_samp_clk_timing(4000)
     rival.start()
 
 
 def test_an_unknown_attribute_is_refused_by_name_or_number(daq, task):
     channel = task.ai_channels.all
-    with pytest.raises(DaqError, match=r"Channel\.AI_LOWPASS_CUTOFF_FREQ") as caught:
+    with refused(DAQmxErrors.ATTR_NOT_SUPPORTED, r"Channel\.AI_LOWPASS_CUTOFF_FREQ"):
         _ = channel.ai_lowpass_cutoff_freq
-    assert caught.value.error_code == DAQmxErrors.ATTR_NOT_SUPPORTED
     with pytest.raises(DaqError, match=r"Read\.0x7FFF"):
         task._interpreter.get_read_attribute_uint32(task._handle, 0x7FFF)
     with pytest.raises(DaqError, match="only be read"):
@@ -178,9 +163,8 @@ def test_an_injected_fault_reaches_the_reader_with_its_code(daq, task, code):
     fault = Fault("ReadAnalogF64", code)
     task.read(10)
     daq.server.faults.add(fault)
-    with pytest.raises(DaqReadError) as caught:
+    with refused(code, kind=DaqReadError):
         task.read(10)
-    assert caught.value.error_code == code
     daq.server.faults.remove(fault)
     task.read(10)
 
@@ -192,7 +176,8 @@ def test_a_restarted_server_has_no_tasks(daq, task):
         task.read(1)
     assert caught.value.rpc_code is grpc.StatusCode.UNAVAILABLE
     daq.server.faults.remove(gone)
-    assert code_of(lambda: task.read(1)) == DAQmxErrors.INVALID_TASK
+    with refused(DAQmxErrors.INVALID_TASK):
+        task.read(1)
     task._close_on_exit, task._handle = False, None
 
 

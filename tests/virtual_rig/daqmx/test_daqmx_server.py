@@ -35,8 +35,7 @@ def test_tasks_of_a_vanished_client_are_there_until_the_restart(daq):
         with pytest.raises(DaqError, match="held by task leaked"):
             rival.start()
     restart(daq)
-    task = daq.task()
-    task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    task = daq.inputs("Dev1/ai0")
     task.start()
 
 
@@ -51,9 +50,7 @@ def test_another_service_can_share_the_port(connect):
 
 
 def test_messages_of_many_megabytes_are_accepted(daq):
-    task = daq.task()
-    task.ai_channels.add_ai_voltage_chan("Dev1/ai1:2")
-    task.timing.cfg_samp_clk_timing(100e3, sample_mode=AcquisitionType.CONTINUOUS)
+    task = daq.inputs("Dev1/ai1:2", 100e3)
     assert np.shape(task.read(400_000)) == (2, 400_000)
 
 

@@ -5,6 +5,7 @@ import nidaqmx
 import pytest
 from nidaqmx import GrpcSessionOptions
 
+from tests.changed import changed
 from vibench.acquisition import InstrumentLost, open_bench
 from vibench.acquisition.rig import TOKEN_VARIABLE, CalibrationRule, confirm_simulated, load_rig
 from vibench.virtual_rig import VirtualRig
@@ -14,17 +15,15 @@ from vibench.virtual_rig.usb.bus import RemoteUsbDevice
 
 @pytest.fixture
 def served(pytestconfig):
-    rig = load_rig(pytestconfig.rootpath / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     resource = "USB0::0x0699::0x0353::TOKEN::INSTR"
-    rig = rig.model_copy(update={"generator": rig.generator.model_copy(update={"resource": resource})})
+    rig = changed(rig, generator={"resource": resource})
     with VirtualRig(rig, "0.0.0.0:0") as virtual:
         yield virtual, virtual.daq_address.replace("0.0.0.0", "127.0.0.1")
 
 
 def connected(virtual, address):
-    return virtual.rig.model_copy(
-        update={"virtual": None, "daq": virtual.rig.daq.model_copy(update={"server": address})}
-    )
+    return changed(virtual.rig, virtual=None, daq={"server": address})
 
 
 def bench_on(rig):

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.changed import changed
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, open_bench
 from vibench.acquisition.bench.bench import RigPower
 from vibench.acquisition.campaign import ReconnectingBench
@@ -24,14 +25,9 @@ _serials = itertools.count(1)
 
 @pytest.fixture
 def rig():
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     resource = f"USB0::0x0699::0x0353::F{next(_serials):04d}::INSTR"
-    return rig.model_copy(
-        update={
-            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
-            "generator": rig.generator.model_copy(update={"resource": resource}),
-        }
-    )
+    return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
 
 
 @pytest.fixture
@@ -39,8 +35,7 @@ def scripted(rig, tmp_path):
     def make(text, **changes):
         path = tmp_path / "faults.toml"
         path.write_text(text, encoding="utf-8")
-        changed = rig.model_copy(update={"virtual": rig.virtual.model_copy(update=changes)})
-        return with_faults(changed, path)
+        return with_faults(changed(rig, virtual=changes), path)
 
     return make
 

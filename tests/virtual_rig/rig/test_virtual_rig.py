@@ -1,7 +1,6 @@
 """The whole virtual rig, used as a stranger's program would: pyvisa sets, nidaqmx reads."""
 
 from contextlib import ExitStack
-from pathlib import Path
 
 import grpc
 import nidaqmx
@@ -12,18 +11,15 @@ import usb.core
 from nidaqmx.constants import AcquisitionType, Coupling, ExcitationSource
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
+from tests.changed import changed
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 from vibench.virtual_rig.usb.bus import RemoteUsbDevice
 
-SHIPPED = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-RIG = SHIPPED.model_copy(
-    update={
-        "generator": SHIPPED.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::C060606::INSTR"})
-    }
-)
+SHIPPED = load_rig("virtual_rig")
+RIG = changed(SHIPPED, generator={"resource": "USB0::0x0699::0x0353::C060606::INSTR"})
 RATE_HZ = 12_800.0
 DRIVE, AMPLIFIER, BASE, LASER = range(4)
 
@@ -170,7 +166,7 @@ def test_the_usb_cable_is_served_on_the_daq_port_and_the_socket_answers(switch_o
 
 
 def test_a_rig_on_the_wall_clock_delivers_as_time_passes(switch_on):
-    fast = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"pace": "wall", "speed": 5.0})})
+    fast = changed(RIG, virtual={"pace": "wall", "speed": 5.0})
     program = switch_on(fast)
     program.play(160, 0.2)
     task = program.task()
@@ -198,11 +194,7 @@ def test_a_generator_that_is_not_on_usb_cannot_be_simulated():
 
 def test_an_address_in_use_starts_nothing():
     with VirtualRig(RIG) as first:
-        other = RIG.model_copy(
-            update={
-                "generator": RIG.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::C2::INSTR"})
-            }
-        )
+        other = changed(RIG, generator={"resource": "USB0::0x0699::0x0353::C2::INSTR"})
         with pytest.raises(ConfigurationError, match="cannot listen"), VirtualRig(other, first.daq_address):
             pass
         assert serials_on_the_bus() == ["C060606"]
@@ -220,7 +212,7 @@ def test_the_scale_of_the_driver_matches_the_step_of_the_samples(switch_on):
 
 
 def test_the_devices_have_the_names_that_the_rig_gives_them(switch_on):
-    named = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"device": "ShakerDaq"})})
+    named = changed(RIG, daq={"device": "ShakerDaq"})
     program = switch_on(named)
     system = nidaqmx.system.System.remote(program.options)
     assert "ShakerDaq" in system.devices.device_names

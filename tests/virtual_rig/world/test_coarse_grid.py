@@ -1,7 +1,5 @@
 """A coarser grid of the virtual rig: what it costs in accuracy, and which ones are refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ from vibench.virtual_rig.world.sensors import resonant, running_filter
 from vibench.virtual_rig.world.time_grid import TimeGrid
 from vibench.virtual_rig.world.world import World
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig("virtual_rig")
 COARSE = TimeGrid(COARSEST_GRID_RATE_HZ)
 
 

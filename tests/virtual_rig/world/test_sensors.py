@@ -1,7 +1,5 @@
 """The vibrometer and the accelerometer: scale, noise, full scale, dropouts."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ from vibench.virtual_rig.world.sensors import (
 )
 from vibench.virtual_rig.world.time_grid import FULL_BAND_HZ, USUAL_GRID
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig("virtual_rig")
 GRID_RATE_HZ = USUAL_GRID.rate_hz
 FULL_SCALE_V = RIG.vibrometer.full_scale_v
 FULL_SCALE_M_PER_S = FULL_SCALE_V * RIG.vibrometer.units_per_volt("m s-1")

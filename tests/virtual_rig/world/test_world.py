@@ -1,12 +1,12 @@
 """The analogue world through its sockets: the same for any block size, right in amplitude and time."""
 
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from tests.changed import changed
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
@@ -17,19 +17,16 @@ from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-QUIET = RIG.model_copy(
-    update={
-        "virtual": RIG.virtual.model_copy(
-            update={
-                "amplifier_noise_v": 0.0,
-                "accelerometer_noise_m_per_s2": 0.0,
-                "vibrometer_noise_m_per_s_per_rthz": 0.0,
-                "converter_noise_v": 0.0,
-                "converter_clock_ppm": 0.0,
-            }
-        )
-    }
+RIG = load_rig("virtual_rig")
+QUIET = changed(
+    RIG,
+    virtual={
+        "amplifier_noise_v": 0.0,
+        "accelerometer_noise_m_per_s2": 0.0,
+        "vibrometer_noise_m_per_s_per_rthz": 0.0,
+        "converter_noise_v": 0.0,
+        "converter_clock_ppm": 0.0,
+    },
 )
 INPUTS = tuple(
     Input(
@@ -98,16 +95,14 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_states(frequency
 @settings(deadline=None, max_examples=10)
 @given(st.lists(st.integers(1, 1500), min_size=2, max_size=12))
 def test_two_worlds_agree_bit_for_bit_for_any_block_size(sizes):
-    rig = RIG.model_copy(
-        update={"virtual": RIG.virtual.model_copy(update={"vibrometer_dropouts_per_s": 50.0})}
-    )
+    rig = changed(RIG, virtual={"vibrometer_dropouts_per_s": 50.0})
     whole = World(rig, Tone(260.0, 2.0)).sample(INPUTS, 25_600.0).read(sum(sizes))
     sampler = World(rig, Tone(260.0, 2.0)).sample(INPUTS, 25_600.0)
     assert np.array_equal(np.concatenate([sampler.read(size) for size in sizes], axis=1), whole)
 
 
 def test_another_seed_gives_other_noise():
-    other = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"seed": 2})})
+    other = changed(RIG, virtual={"seed": 2})
     one, two = (World(rig, Silence()).sample(INPUTS, 51_200.0).read(2000) for rig in (RIG, other))
     for row in range(4):
         assert abs(np.corrcoef(one[row], two[row])[0, 1]) < 0.1
