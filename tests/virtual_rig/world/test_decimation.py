@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.virtual_rig.world.conversion import (
-    EARLIEST_STEPS,
-    GROUP_DELAY_SAMPLES,
-    decimator,
-    history_steps,
-)
+from vibench.virtual_rig.world.conversion import EARLIEST_STEPS, GROUP_DELAY_SAMPLES, decimator, history_steps
 
 RATIOS = [1.0, 2.0, 4.0, 62.0, 2.32, 7.9]
 
