@@ -11,8 +11,8 @@ from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 from ..excitation.kinds import EXCITATION_KINDS, present_word
 from ..host.shipped import named
 from ..host.toml_file import FrozenModel, load_toml
-from ._schedule import Measurement, Name, Point, measured_s
-from ._sweep import Sweep
+from ._schedule import Measurement, Name, Point, ScanPoint, measured_s
+from ._sweep import LONGEST_NAME, Sweep
 
 
 class Retryable(StrEnum):
@@ -63,6 +63,8 @@ class Campaign(FrozenModel):
     """Pause between two recordings [s], in which specimen and amplifier cool."""
     measurements: tuple[Measurement, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
+    scan: tuple[ScanPoint, ...] = ()
+    """Points to which the vibrometer moves; each gets all measurements and sweeps."""
 
     @model_validator(mode="before")
     @classmethod
@@ -82,6 +84,29 @@ class Campaign(FrozenModel):
                 return content
 
     @model_validator(mode="after")
+    def _scans_different_points(self) -> Self:
+        if not self.scan:
+            return self
+        for what in ("name", "node"):
+            values = [str(getattr(each, what)).lower() for each in self._numbered_scan()]
+            twice = next((value for value in values if values.count(value) > 1), None)
+            if twice is not None:
+                raise ValueError(f"scan: two points have the {what} {twice!r}; give every point its own")
+        for point in self.points():
+            if len(point.name) > LONGEST_NAME:
+                raise ValueError(
+                    f"scan: the recording {point.name!r} would have a name of {len(point.name)} characters, "
+                    f"allowed are {LONGEST_NAME}; shorten the name of the point or of the measurement"
+                )
+            kind = point.measurement.excitation.kind
+            if EXCITATION_KINDS[kind].is_feedback:
+                raise ValueError(
+                    f"scan: {kind} needs the motion of m0, and a scan moves the "
+                    "vibrometer; use an excitation without feedback"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _has_points_of_different_names(self) -> Self:
         names = Counter(name.lower() for name in self.recording_names())
         if not names:
@@ -95,13 +120,25 @@ class Campaign(FrozenModel):
         return self
 
     def points(self) -> tuple[Point, ...]:
-        """All planned recordings, in order: measurements, then sweeps."""
+        """All planned recordings, in order: measurements, then sweeps; a scan repeats both at each point."""
         listed = (Point(name, each) for each in self.measurements for name in _names(each))
-        return (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
+        alone = (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
+        return tuple(_at(place, each) for place in self._numbered_scan() for each in alone) or alone
+
+    def _numbered_scan(self) -> tuple[ScanPoint, ...]:
+        return tuple(
+            each.model_copy(update={"node": each.node or number})
+            for number, each in enumerate(self.scan, start=1)
+        )
 
     def recordings(self) -> tuple[tuple[str, Measurement], ...]:
         """Name and measurement of each recording, in order."""
         return tuple((point.name, point.measurement) for point in self.points())
+
+    @property
+    def places(self) -> int:
+        """Number of places at which each measurement is made: the points of a scan, or one."""
+        return max(1, len(self.scan))
 
     def recording_names(self) -> tuple[str, ...]:
         """Names of all recordings, in order, without ``.h5``."""
@@ -118,11 +155,18 @@ class Campaign(FrozenModel):
         return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
 
 
+def _at(place: ScanPoint, point: Point) -> Point:
+    """Return a point of a campaign at a point of a scan."""
+    measurement = point.measurement.model_copy(update={"point": place})
+    chain = f"{point.chain}-{place.name}" if point.chain else ""
+    return Point(f"{point.name}-{place.name}", measurement, chain)
+
+
 def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
     """Return one point for each different drive; its limit checks hold for all points with that drive."""
     first: dict[str, Point] = {}
     for point in points:
-        first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats"}), point)
+        first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats", "point"}), point)
     return tuple(first.values())
 
 

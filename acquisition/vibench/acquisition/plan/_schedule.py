@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import takewhile
 from math import ceil, cos, pi
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_validator
 
@@ -17,7 +17,7 @@ from ..excitation.steps import LoopTone, Play, Segment, Step, Stream, Tone, Wave
 from ..host.toml_file import FrozenModel
 from ..instruments import Sweep
 from ..recording import SegmentLabel
-from ..rig import OutputUse, Rig, generator_driver
+from ..rig import OutputUse, Rig, Role, generator_driver
 from ._until import SHORTEST_S, Until
 
 # A measurement is a plan: excitation, ramps, limits during the run. A point is one recording of a campaign.
@@ -83,6 +83,35 @@ class InRunLimits(FrozenModel):
     on_changed_specimen: OnChange = OnChange.NOTE
 
 
+class ScanPoint(FrozenModel):
+    """Point on the specimen at which the vibrometer's beam measures."""
+
+    name: Name
+    """Name of the point, which ends the names of its recordings."""
+    body: Literal["m0", "m1", "m2"]
+    """Mass on which the point lies."""
+    node: PositiveInt | None = Field(default=None, le=999_999_999)
+    """Number in universal files; absent: its place in the list, from 1."""
+    x_m: float
+    """Coordinate along x [m]."""
+    y_m: float
+    """Coordinate along y [m]."""
+    z_m: float
+    """Coordinate along z [m]."""
+    direction: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
+    """Direction of a positive velocity."""
+
+    @property
+    def role(self) -> Role:
+        """Channel that records the vibrometer at this point."""
+        return Role(f"{self.body}_velocity")
+
+    @property
+    def text(self) -> str:
+        """Name, mass and coordinates in words."""
+        return f"{self.name} on {self.body} (x {self.x_m:g}, y {self.y_m:g}, z {self.z_m:g} m)"
+
+
 class Measurement(FrozenModel):
     """One excitation, from ramp up to ramp down, into one recording."""
 
@@ -98,6 +127,8 @@ class Measurement(FrozenModel):
     notes: str = ""
     until: Until | None = None
     """Required bounds of results, which end the recording; if absent, the plan's time is recorded."""
+    point: ScanPoint | None = None
+    """Point of a scan at which the vibrometer measures; absent: m0."""
 
     @model_validator(mode="after")
     def _until_fits(self) -> Self:

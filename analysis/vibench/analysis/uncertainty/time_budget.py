@@ -48,8 +48,9 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
             f"{campaign.name} has no measurement with until whose time can be predicted, so no time can be "
             "distributed. Nothing was played; add until to a measurement, or leave --within out"
         )
-    variable_s = sum(each.repeats * _cost(each) * recorded_s(each) for each in mine)
-    needed_s = sum(each.repeats * _cost(each) * (needs[each.name] or 0.0) for each in mine)
+    places = campaign.places
+    variable_s = sum(places * each.repeats * _cost(each) * recorded_s(each) for each in mine)
+    needed_s = sum(places * each.repeats * _cost(each) * (needs[each.name] or 0.0) for each in mine)
     fixed_s = campaign.duration_s - variable_s
     if available_s < fixed_s + needed_s:
         left_s = available_s - fixed_s

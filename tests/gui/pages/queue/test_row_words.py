@@ -20,6 +20,11 @@ def test_rows_show_the_base_level_and_the_kind_of_sweep():
     assert (what["sweep"], what["branch"]) == ("sine sweep, 1.5 Vpp", "sweep of dwell")
 
 
+def test_rows_count_the_recordings_at_all_points_of_a_scan():
+    (row,) = entry_rows(load_campaign(CAMPAIGNS / "scan.toml"))
+    assert row[:1] + row[2:3] == ("noise", "4")
+
+
 def test_rows_show_levels_and_existing_recordings(tmp_path):
     """After a restart of the window all rows were shown as planned."""
     campaign = load_campaign(CAMPAIGNS / "quick.toml")

@@ -125,12 +125,13 @@ SYMBOLS = {
 
 def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
     """Return one row per test and sweep: name, excitation, number of recordings, duration."""
+    places = campaign.places
     rows = [
         (
             each.name,
             excitation_text(each.excitation),
-            str(each.repeats),
-            clock(each.repeats * duration_s(each)),
+            str(places * each.repeats),
+            clock(places * each.repeats * duration_s(each)),
         )
         for each in campaign.measurements
     ]
@@ -139,7 +140,7 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
         kinds = dict.fromkeys(point.measurement.excitation.kind for point in points)
         kind = ", ".join(EXCITATION_KINDS[each].label for each in kinds)
         takes = sum(duration_s(point.measurement) for point in points)
-        rows.append((sweep.name, f"sweep of {kind}", str(len(points)), clock(takes)))
+        rows.append((sweep.name, f"sweep of {kind}", str(places * len(points)), clock(places * takes)))
     return rows
 
 
