@@ -143,6 +143,15 @@ NotifyCommand = Annotated[
         name="--notify",
     ),
 ]
+MoveCommand = Annotated[
+    str | None,
+    option(
+        "Command that moves the vibrometer to each point of a scan, without a shell; it reads the point as "
+        "JSON.",
+        "COMMAND",
+        name="--move-beam",
+    ),
+]
 MailPath = Annotated[
     Path | None, option("Send mail at every fault and at the end.", "MAIL.toml", name="--mail")
 ]
@@ -192,6 +201,7 @@ def measure(
     ] = False,
     notify: NotifyCommand = None,
     mail: MailPath = None,
+    move_beam: MoveCommand = None,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
     if as_json and not only_estimate:
@@ -212,6 +222,7 @@ def measure(
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)
+    mover = None if move_beam is None else CommandMessenger.of(move_beam)
     request = CampaignRequest(
         campaign=plan,
         folder=out,
@@ -222,7 +233,7 @@ def measure(
         check=check,
     )
     with the_bench(rig, plan.name, None if knobs is None else confirm_by_sheet(knobs)) as engine:
-        point_results = engine.measure(request, messengers=messengers)
+        point_results = engine.measure(request, messengers=messengers, move_beam=mover)
     if as_json:
         rows = [
             {"name": each.name, "outcome": each.outcome.value, "path": str(each.path), "reason": each.reason}

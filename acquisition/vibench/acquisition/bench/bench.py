@@ -3,7 +3,9 @@
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from copy import copy
+from dataclasses import replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from getpass import getuser
@@ -11,7 +13,7 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from threading import Event as Alarm
-from typing import Any, Self
+from typing import Any, Self, cast
 
 from vibench.sim.operating_system.this import (
     is_locked_alone,
@@ -26,6 +28,7 @@ from ..errors import AcquisitionError, InstrumentBusy
 from ..host.chosen import chosen
 from ..instruments import (
     AnalogOutput,
+    Block,
     Digitizer,
     FunctionGenerator,
     Identity,
@@ -39,6 +42,7 @@ from ..rig import (
     Confirm,
     KnobSheet,
     Rig,
+    Role,
     channels_of,
     check_calibrations,
     confirm_at_terminal,
@@ -178,6 +182,11 @@ class RigPower:
         """Faults that a script has injected into the rig so far."""
         return () if self._virtual is None else self._virtual.played_faults
 
+    def aim(self, role: Role) -> None:
+        """Move the vibrometer's beam of a virtual rig to the mass of ``role``; do nothing on a real rig."""
+        if self._virtual is not None:
+            self._virtual.aim(role)
+
     def let_pass(self, duration_s: float) -> None:
         """Let rig time pass on a virtual rig while nothing is sampled; do nothing on a real rig."""
         if self._virtual is not None:
@@ -200,6 +209,30 @@ class RigPower:
     def __exit__(self, *_: object) -> None:
         self._virtual = None
         self._closing.close()
+
+
+class _AimedDigitizer:
+    """A digitizer whose channel ``m0_velocity`` has the role of the mass that the beam is on."""
+
+    def __init__(self, digitizer: Digitizer, role: Role) -> None:
+        self._digitizer = digitizer
+        self._names = {Role.M0_VELOCITY.value: role.value}
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._digitizer, name)
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the channels, in the order of the rows of a block."""
+        return tuple(self._names.get(each, each) for each in self._digitizer.roles)
+
+    def read(self, samples: int) -> Block:
+        """Read the next samples; overloads have the role of the mass."""
+        block = self._digitizer.read(samples)
+        named = (
+            replace(each, channel=self._names.get(each.channel, each.channel)) for each in block.overloads
+        )
+        return replace(block, overloads=tuple(named))
 
 
 class BenchKind(StrEnum):
@@ -254,6 +287,21 @@ class Bench:
     def kind(self) -> BenchKind:
         """Whether the instruments are simulated."""
         return _kind(self.rig, self.digitizer)
+
+    @contextmanager
+    def aimed(self, role: Role) -> Iterator["Bench"]:
+        """Yield the bench with the beam on the mass of ``role``; a virtual rig moves it there and back.
+
+        Raises ConfigurationError when the vibrometer of this rig cannot measure there.
+        """
+        aimed = copy(self)
+        aimed.rig = self.rig.aimed(role)
+        aimed.digitizer = cast("Digitizer", _AimedDigitizer(self.digitizer, role))
+        self._power.aim(role)
+        try:
+            yield aimed
+        finally:
+            self._power.aim(Role.M0_VELOCITY)
 
     def idle(self, duration_s: float) -> None:
         """Wait while nothing is sampled [s]; a virtual rig at free pace needs no real time for it."""

@@ -7,13 +7,14 @@ from time import monotonic
 
 from ..bench.bench import Bench
 from ..errors import AcquisitionError, InstrumentError, RecordingError
-from ..plan import Point, Retryable, RetryPolicy, RunState
+from ..plan import Measurement, Point, Retryable, RetryPolicy, RunState
 from ..recording import open_recording
 from ..run.acquisition_loop import BLOCK_S
 from ..run.ending import Outcome, Progress
 from ..run.run import run_measurement
 from ..stopping.stop import StopSwitch
 from ._attempt_files import next_attempt
+from ._beam import BeamMover
 from ._bench_identity import BenchIdentity
 from ._journal import Journal, JournalPointState, PointOutcome, PointResult, ReasonCode, reason_code_of
 from ._log import CampaignEvent, CampaignEventKind, CampaignListener
@@ -69,6 +70,7 @@ class Attempts:
         switch: StopSwitch,
         say: CampaignListener,
         pause: CoolingPause,
+        beam: BeamMover,
         reopen: Reopen | None,
     ) -> None:
         self._bench = bench
@@ -77,7 +79,12 @@ class Attempts:
         self._switch = switch
         self._say = say
         self._pause = pause
+        self._beam = beam
         self._reopen = reopen
+
+    def ask_for_beam(self, measurement: Measurement) -> None:
+        """Wait until the operator has moved the beam to the point of a measurement; a stop ends it."""
+        self._beam.ask(self._bench, measurement)
 
     def pause_before(self, name: str) -> None:
         """Pause between two recordings as the campaign requires; a stop ends it."""
@@ -94,9 +101,10 @@ class Attempts:
             self._journal.start(point.name, path.name)
             self._tell(CampaignEventKind.POINT_BEGUN, f"{path.name} begins", point, path)
             try:
-                outcome = run_measurement(
-                    self._bench, point.measurement, path, on_progress=partial(tell, path), switch=self._switch
-                )
+                with self._beam.moved(self._bench, point.name, point.measurement) as bench:
+                    outcome = run_measurement(
+                        bench, point.measurement, path, on_progress=partial(tell, path), switch=self._switch
+                    )
             except AcquisitionError as error:
                 self._failed(point, path, error)
                 if not (left and self._is_retryable(reason_code_of(error))):

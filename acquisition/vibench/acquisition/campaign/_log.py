@@ -15,7 +15,7 @@ from email.message import EmailMessage
 from enum import StrEnum
 from pathlib import Path
 from time import monotonic
-from typing import Protocol
+from typing import Any, Protocol
 
 from pydantic import Field, PositiveFloat, PositiveInt, SecretStr
 
@@ -42,6 +42,8 @@ class CampaignEventKind(StrEnum):
     RETRY = "retry"
     RESTING = "resting"
     """Pause between two recordings."""
+    MOVE_BEAM = "move_beam"
+    """The operator must move the beam to the next point of a scan."""
     BENCH_REOPENED = "bench_reopened"
     FURTHER = "further"
     """A result requested more measurements."""
@@ -280,20 +282,24 @@ class CommandMessenger:
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
         """Run the command; end it after `COMMAND_LONGEST_S`."""
+        return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
+
+    def run(self, document: Mapping[str, Any], longest_s: float) -> str:
+        """Run the command with a document; return a clause on its failure, which is empty without one."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,
-                input=json.dumps(notice).encode(),
+                input=json.dumps(document).encode(),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                timeout=COMMAND_LONGEST_S,
+                timeout=longest_s,
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            return f"{self.arguments[0]} took more than {COMMAND_LONGEST_S:g} s and was ended"
+            return f"{self.arguments[0]} took more than {longest_s:g} s and was ended"
         except OSError as error:
             return f"{self.arguments[0]} could not be run ({error.strerror})"
-        return f"{self.arguments[0]} ended with {ended.returncode}"
+        return f"{self.arguments[0]} ended with {ended.returncode}" if ended.returncode else ""
 
 
 class Notifier:

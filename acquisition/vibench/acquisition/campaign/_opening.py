@@ -16,6 +16,7 @@ from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run.drive import drive_for
 from ..stopping.stop import StopSwitch
 from ._attempt_files import KeptRecording, attempts_in, complete_attempt, next_attempt, read_attempt
+from ._beam import rig_at
 from ._bench_identity import BenchIdentity, differences
 from ._journal import (
     ChangedBench,
@@ -143,8 +144,13 @@ class PlannedRecording:
 
 
 def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
-    """Refuse a campaign with a point that exceeds a limit or cannot be played; raises LimitExceeded."""
+    """Refuse a campaign with a point that exceeds a limit or cannot be played.
+
+    Raises LimitExceeded, or ConfigurationError when the vibrometer cannot measure at a point of a scan.
+    """
     complaints: dict[str, None] = {}
+    for point in points:
+        rig_at(bench.rig, point.measurement)
     for point in played_alike(points):
         try:
             require_within_limits(point.measurement, bench.rig)
@@ -204,8 +210,11 @@ def open_journal(
                 _recover(attempts_in(folder, point.name), point.measurement)
             found = found_recordings(campaign.points(), folder, SealDepth.WHOLE, stop)
             if changed is ChangedBench.REFUSE:
-                for kept in (each for each in found.values() if not each.damage):
-                    _require_no_differences(differences(kept.rig, bench.rig.model_dump(mode="json")))
+                for point in campaign.points():
+                    kept = found.get(point.name)
+                    if kept is not None and not kept.damage:
+                        now = rig_at(bench.rig, point.measurement).model_dump(mode="json")
+                        _require_no_differences(differences(kept.rig, now))
             journal = Journal.begin(path, campaign, identity)
             for name, kept in found.items():
                 if kept.damage:

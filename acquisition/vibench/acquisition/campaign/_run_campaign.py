@@ -22,6 +22,7 @@ from ..run.ending import Progress
 from ..stopping.program import stop_on_signal
 from ..stopping.stop import StopSwitch
 from ._attempts import Attempts, CoolingPause, Reopen
+from ._beam import BeamMover, rig_at
 from ._journal import (
     After,
     AfterFailure,
@@ -47,6 +48,7 @@ from ._log import (
     CampaignEventKind,
     CampaignListener,
     CampaignLog,
+    CommandMessenger,
     Messenger,
     Notifier,
     StatusLine,
@@ -128,9 +130,10 @@ class CampaignRunner:
                 self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Pause before a point that is to be measured; return False after a stop."""
+        """Pause, and have the beam moved, before a point is measured; return False after a stop."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
             self._attempts.pause_before(point.name)
+            self._attempts.ask_for_beam(point.measurement)
         return self._stop.request is None
 
     def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
@@ -210,6 +213,7 @@ def run_campaign(
     changed_bench: ChangedBench | str = ChangedBench.REFUSE,
     on_event: CampaignListener = ignore_event,
     messengers: tuple[Messenger, ...] = (),
+    move_beam: CommandMessenger | None = None,
 ) -> tuple[PointResult, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
@@ -237,6 +241,9 @@ def run_campaign(
         attempt; absent, a lost instrument ends the campaign.
     messengers
         Ways to notify somebody at every fault and at the end.
+    move_beam
+        Command that moves the vibrometer of a real rig to each point of a scan, which it reads as JSON;
+        absent, the campaign holds until the operator has moved it.
 
     Raises
     ------
@@ -276,7 +283,8 @@ def run_campaign(
             on_progress(stand)
 
         pause = CoolingPause(campaign.rest_s, stop, say)
-        attempts = Attempts(bench, journal, campaign.retry, stop, say, pause, reopen)
+        beam = BeamMover(move_beam, stop, say)
+        attempts = Attempts(bench, journal, campaign.retry, stop, say, pause, beam, reopen)
         runner = CampaignRunner(journal, folder, attempts, stop, after_failure, after, say)
         return runner.run(campaign, progress, on_result)
 
@@ -426,6 +434,8 @@ def estimate_campaign(
     """
     for each in campaign.measurements:
         require_played(each, rig)
+    for point in campaign.points():
+        rig_at(rig, point.measurement)
     planned = planned_recordings(campaign, folder, existing)
     missing = [each.measurement for each in planned if not each.is_complete]
     for each in missing:

@@ -13,6 +13,7 @@ from ..campaign import (
     CampaignEventKind,
     CampaignListener,
     CampaignProgress,
+    CommandMessenger,
     Messenger,
     PointOutcome,
     PointResult,
@@ -135,6 +136,7 @@ class Engine:
         on_result: Callable[[PointResult], None] = ignore_result,
         on_event: CampaignListener = ignore_event,
         messengers: tuple[Messenger, ...] = (),
+        move_beam: CommandMessenger | None = None,
     ) -> tuple[PointResult, ...]:
         """Make the recordings of a campaign; see `run_campaign`, which calls the functions given here."""
         assert self._reconnecting is not None
@@ -152,6 +154,9 @@ class Engine:
                 self.published.note_pause(request.campaign.rest_s, event.text)
             if event.kind is CampaignEventKind.DAMAGED:
                 self.published.messages.warn(event.text)
+            if event.kind is CampaignEventKind.MOVE_BEAM:
+                self.published.messages.warn(event.text)
+                self.published.enter(EngineState.HELD)
             on_event(event)
 
         self.published.begin(request.campaign, request.folder)
@@ -178,6 +183,7 @@ class Engine:
                 changed_bench=request.changed_bench,
                 on_event=on_campaign_event,
                 messengers=messengers,
+                move_beam=move_beam,
             )
         except CheckStopped as stopped:
             self._check_ended(stopped)

@@ -85,24 +85,30 @@ class Campaign(FrozenModel):
 
     @model_validator(mode="after")
     def _scans_different_points(self) -> Self:
-        if not self.scan:
-            return self
         for what in ("name", "node"):
             values = [str(getattr(each, what)).lower() for each in self._numbered_scan()]
             twice = next((value for value in values if values.count(value) > 1), None)
             if twice is not None:
                 raise ValueError(f"scan: two points have the {what} {twice!r}; give every point its own")
+        if self.scan and any(each.point is not None for each in self.measurements):
+            raise ValueError("a measurement has its own point; list it under [[scan]] with the others")
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_scanned(self) -> Self:
         for point in self.points():
+            kind = point.measurement.excitation.kind
+            if point.measurement.point is None:
+                continue
             if len(point.name) > LONGEST_NAME:
                 raise ValueError(
                     f"scan: the recording {point.name!r} would have a name of {len(point.name)} characters, "
                     f"allowed are {LONGEST_NAME}; shorten the name of the point or of the measurement"
                 )
-            kind = point.measurement.excitation.kind
             if EXCITATION_KINDS[kind].is_feedback:
                 raise ValueError(
-                    f"scan: {kind} needs the motion of m0, and a scan moves the "
-                    "vibrometer; use an excitation without feedback"
+                    f"scan: {kind} needs the motion of m0, and a scan moves the vibrometer; use an "
+                    "excitation without feedback"
                 )
         return self
 

@@ -277,7 +277,10 @@ class RecordingHeader:
 
     def attributes(self) -> dict[str, Attribute]:
         """Attributes of the file itself, apart from format and identity."""
+        point = json.loads(self.plan_json).get("point")
+        place = point if isinstance(point, dict) else {}
         return {
+            **{f"point_{name}": value for name, value in place.items() if value is not None},
             "sample_rate_hz": float(self.sample_rate_hz),
             "requested_sample_rate_hz": float(self.requested_sample_rate_hz or self.sample_rate_hz),
             "expected_samples": UNPLANNED if self.expected_samples is None else self.expected_samples,

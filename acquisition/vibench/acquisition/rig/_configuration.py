@@ -17,10 +17,12 @@ from pydantic import (
 
 from vibench.sim import SpecimenTable
 
+from ..errors import ConfigurationError
 from ..host.toml_file import FrozenModel
 from ..instruments import Knob
 from ._sensors import (
     RESPONSE_ROLES,
+    SCANNED_ROLES,
     AccelerometerConfig,
     Role,
     SensorConfig,
@@ -388,7 +390,7 @@ class Rig(FrozenModel):
     amplifier: AmplifierConfig
     shaker: ShakerConfig
     vibrometer: VibrometerConfig | None = None
-    """Sensor of the channel ``m0_velocity``; absent if another sensor shows m0."""
+    """Sensor of the channel ``m0_velocity``, in a scan of another mass; absent if another sensor shows m0."""
     accelerometer: AccelerometerConfig
     """Sensor of the channel ``base_acceleration``."""
     sensors: dict[Role, TransducerConfig] = Field(default_factory=dict)
@@ -429,13 +431,38 @@ class Rig(FrozenModel):
     def sensor(self, role: Role) -> SensorConfig | None:
         """Return the sensor of a channel; None for a voltage, or if none is described."""
         described = {Role.BASE_ACCELERATION: self.accelerometer, Role.M0_VELOCITY: self.vibrometer}
-        return described.get(role, self.sensors.get(role))
+        is_scanned = role in SCANNED_ROLES and Role.M0_VELOCITY not in self._roles
+        return described.get(role, self.sensors.get(role, self.vibrometer if is_scanned else None))
+
+    def aimed(self, role: Role) -> Self:
+        """Return the rig with the vibrometer's beam on the mass of ``role``, such as ``m2_velocity``.
+
+        Raises ConfigurationError when no channel records the vibrometer, or another one records that mass.
+        """
+        if Role.M0_VELOCITY not in self._roles:
+            raise ConfigurationError(
+                f"a scan moves the vibrometer, and the rig {self.name!r} has no channel m0_velocity. Nothing "
+                "was played; add it to daq.channels, or leave the scan out"
+            )
+        if role is not Role.M0_VELOCITY and role in self._roles:
+            raise ConfigurationError(
+                f"the scan has a point on {role.place}, and the rig {self.name!r} records {role.value} with "
+                "another sensor. Nothing was played; leave out that point or that channel"
+            )
+        channels = tuple(
+            each.model_copy(update={"role": role}) if each.role is Role.M0_VELOCITY else each
+            for each in self.daq.channels
+        )
+        return self.model_copy(update={"daq": self.daq.model_copy(update={"channels": channels})})
+
+    @property
+    def _roles(self) -> tuple[Role, ...]:
+        return tuple(channel.role for channel in self.daq.channels)
 
     @property
     def response(self) -> Role | None:
         """Channel that shows the motion of m0, the first of RESPONSE_ROLES; None if there is none."""
-        roles = {channel.role for channel in self.daq.channels}
-        return next((role for role in RESPONSE_ROLES if role in roles), None)
+        return next((role for role in RESPONSE_ROLES if role in self._roles), None)
 
     @model_validator(mode="after")
     def _grid_carries_the_sample_rate(self) -> Self:

@@ -249,6 +249,8 @@ UNIT_OF_QUANTITY = {
 """UDUNITS text, by the quantity of a channel."""
 RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
 """Channels that show the motion of m0; the first one of a rig is used."""
+SCANNED_ROLES = (Role.M0_VELOCITY, Role.M1_VELOCITY, Role.M2_VELOCITY)
+"""Channels that can show the vibrometer in a scan."""
 _TABLES: Mapping[str, str] = {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
 
 

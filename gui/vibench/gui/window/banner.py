@@ -193,7 +193,7 @@ NEXT_STEPS = {
     EngineState.CHECKING: "The bench is being checked.",
     EngineState.ARMED: "Next: F5 starts what the Run page says. Cancel there disarms.",
     EngineState.RUNNING: "STOP ramps down as planned; Esc aborts, from anywhere.",
-    EngineState.HELD: "The drive is on. Go on from the Run page; STOP ramps down, Esc aborts.",
+    EngineState.HELD: "The drive may be on. Go on from the Run page; STOP ramps down, Esc aborts.",
     EngineState.RAMPING_DOWN: "Ramping down; Esc aborts.",
     EngineState.FAULT: "Details say what happened. Open the bench again on the Rig page (Ctrl+1).",
 }

@@ -10,7 +10,7 @@ from typing import Any, Self
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.instruments import PlugInKind, plug_in as load_plug_in
 from vibench.acquisition.recording import DiskTrouble, troubled_disks
-from vibench.acquisition.rig import Rig, VirtualConfig
+from vibench.acquisition.rig import Rig, Role, VirtualConfig
 
 from ..daqmx.devices import catalogue_with
 from ..daqmx.rig import OnDemandPace, Pace, WallPace
@@ -127,6 +127,10 @@ class VirtualRig:
     def played_faults(self) -> tuple[PlayedFault, ...]:
         """Faults of the configuration's script that have started."""
         return tuple(self._running_state.faults.played)
+
+    def aim(self, role: Role) -> None:
+        """Move the vibrometer's beam to the mass of ``role``, such as ``m2_velocity``."""
+        self.world.aim(role)
 
     def let_pass(self, duration_s: float) -> None:
         """Advance rig time without sampling; a rig in real time advances by itself."""

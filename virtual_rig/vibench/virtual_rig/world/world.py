@@ -200,6 +200,7 @@ class World:
         self._step = 0
         self._unspent_steps = 0.0
         self._last_end = np.zeros((1, len(MOTION_COLUMNS)))
+        self._beam = Role.M0_VELOCITY
         self._truth: list[FloatArray] | None = None
         self._turn = threading.RLock()
 
@@ -282,6 +283,12 @@ class World:
         with self._turn:
             self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
 
+    def aim(self, role: Role) -> None:
+        """Move the vibrometer's beam to the mass of ``role``; it then shows that velocity instead of m0's."""
+        with self._turn:
+            self._beam = role
+            self._compute_to(self._step + 1)  # the velocity over a step needs the state before it
+
     def disturb_response(self, duration_s: float, level: float) -> None:
         """Make the sensor of m0 output ``level`` (share of full scale) for a while."""
         with self._turn:
@@ -360,6 +367,8 @@ class World:
         steps = signals.shape[1]
         noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
         others = [role for role in self._sensors if role not in _LOOP_ROLES]
+        if self._beam is not Role.M0_VELOCITY and Role.M0_VELOCITY in self._sensors:
+            others.append(Role.M0_VELOCITY)
         motion = ShakenMotion.of(steps, steps if others or self._truth is not None else 0)
         try:
             if self._loop is not None and self._loop.is_on:
@@ -374,7 +383,7 @@ class World:
                 for role, means in zip(
                     _LOOP_ROLES, (motion.base_acceleration, motion.m0_velocity), strict=True
                 ):
-                    if role in self._sensors:
+                    if role in self._sensors and role not in others:
                         signals[self._rows[role]] = self._sensors[role].volts(means, first)
         except MotionFailed as error:
             raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
@@ -382,7 +391,8 @@ class World:
             ends = np.concatenate([self._last_end, motion.ends])
             self._last_end = ends[-1:]
             for role in others:
-                signals[self._rows[role]] = self._sensors[role].volts(self._means(role, ends), first)
+                shown = self._beam if role is Role.M0_VELOCITY else role
+                signals[self._rows[role]] = self._sensors[role].volts(self._means(shown, ends), first)
         if self._truth is not None:
             self._truth.append(motion.ends)
 
