@@ -3,30 +3,39 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QWidget
 
 from vibench.analysis.prediction.progress import PartialResult
 from vibench.analysis.prediction.worker import Asked, answer
 from vibench.sim.background import Job
 
 from ..background.background import Background
+from ..widgets.boxes import push_button
+from ..widgets.notice import Notice, NoticeKind
+from .app_context import AppContext
 
 
 class Simulator(QObject):
     """Process that computes the newest request of a page, and lives as long as the page.
 
-    ``grown`` receives partial results, ``ended`` is called after the last one, ``died`` after a failure.
+    ``grown`` receives partial results, ``ended`` is called after the last one, and ``said`` receives what
+    else happens, in words.
     """
 
     def __init__(
         self,
-        page: QObject,
+        page: QWidget,
+        context: AppContext,
         grown: Callable[[tuple[PartialResult, ...]], None],
         ended: Callable[[], None],
-        died: Callable[[str], None],
+        said: Callable[[str], None],
     ) -> None:
         super().__init__(page)
-        self._grown, self._ended, self._died = grown, ended, died
+        self._context = context
+        self._grown, self._ended, self._said = grown, ended, said
         self._job: Job | None = None
+        self.cancel_button = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
+        self.cancel_button.setEnabled(False)
         self.background = Background(1, self)
         page.destroyed.connect(self.background.close)
 
@@ -37,16 +46,27 @@ class Simulator(QObject):
 
     def begin(self, request: Asked) -> None:
         """Start a request; the answer to an earlier one is dropped."""
-        self.cancel()
+        self._drop()
         self._job = self.background.stream(answer, self._grown, self._end, self._die, request)
+        self.cancel_button.setEnabled(True)
+        self._said("Computing; the program is being loaded for the first result…")
 
     def cancel(self) -> None:
-        """Cancel the request."""
+        """Cancel the request; the results so far stay."""
+        self._drop()
+        self._said("Cancelled; the results so far are shown.")
+
+    def _drop(self) -> None:
         if self._job is not None:
             self._job.drop()
+        self.cancel_button.setEnabled(False)
 
     def _end(self, _answer: None) -> None:
+        self.cancel_button.setEnabled(False)
         self._ended()
 
     def _die(self, error: BaseException) -> None:
-        self._died(f"The simulation failed: {error}.")
+        self.cancel_button.setEnabled(False)
+        what, done = f"The simulation failed: {error}.", "The results so far are shown."
+        self._context.say(Notice(NoticeKind.FAULT, what, done, "Compute again.", "SIMULATOR"))
+        self._said("It broke off.")

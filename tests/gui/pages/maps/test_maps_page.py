@@ -121,7 +121,7 @@ def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
     assert all(each.is_current for each in page.displayed_results)
     page.begin()
     assert page.map.image.image is None
-    page.cancel()
+    page.simulator.cancel()
 
 
 def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot):

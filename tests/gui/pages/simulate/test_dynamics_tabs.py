@@ -73,7 +73,7 @@ def test_stable_branches_are_solid_and_unstable_ones_dashed(page, along):
     view = page.branches
     start = 1e-6 if along is Parameter.AMPLITUDE else 100.0
     start_request(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
-    view.cancel()
+    view.simulator.cancel()
     view._grow((line(),))
     page.refresh()
     solid, dashed = lines(view.picture.plots(along)[0])
@@ -87,7 +87,7 @@ def test_branches_can_be_overlaid_on_recordings(page):
     view = page.branches
     view.form.show_value(BranchRequest(start=100.0, stop=110.0))
     start_request(view, BranchRequest(start=100.0, stop=110.0, places=2, starts=0))
-    view.cancel()
+    view.simulator.cancel()
     view._grow((line(),))
     predictions, wanted = [], []
     page.context.prediction_made.connect(predictions.append)
@@ -100,7 +100,7 @@ def test_branches_can_be_overlaid_on_recordings(page):
 def test_exponents_are_drawn_with_their_intervals(page):
     view = page.spectrum
     start_request(view, SpectrumRequest(start=250.0, stop=260.0, step=10.0))
-    view.cancel()
+    view.simulator.cancel()
     six = (100.0, 40.0, 0.0, -80.0, -130.0, -190.0)
     low, high = tuple(x - 5.0 for x in six), tuple(x + 5.0 for x in six)
     for place in (250.0, 260.0):
@@ -178,7 +178,7 @@ def test_a_running_search_is_shown_as_running_without_a_result(page, name):
     view.begin()
     assert view.summary.strip().startswith("Computing")
     assert not re.search(r"[Nn]o |0\.0 s|not found", view.summary)
-    view.cancel()
+    view.simulator.cancel()
 
 
 @pytest.mark.parametrize("place", range(4))

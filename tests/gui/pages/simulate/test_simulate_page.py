@@ -56,7 +56,7 @@ def test_a_simulation_completes_and_is_drawn(page, wait_for):
 def test_cancelling_is_immediate_and_keeps_partial_results(page, wait_for):
     simulate(page, step_hz=0.05)
     wait_for(lambda: page.progress.done > 0, 60.0)
-    page.cancel()
+    page.simulator.cancel()
     assert not page.simulator.is_busy
     found = page.progress.done
     assert 0 < found < page.progress.requested
@@ -102,7 +102,7 @@ def test_cost_and_error_are_shown_beside_the_accuracy(page):
 
 def test_exponents_similarity_impacts_and_motion_are_drawn_as_computed(page):
     simulate(page, step_hz=100.0)
-    page.cancel()
+    page.simulator.cancel()
     page._grow(
         (point("a", 100.0, exponent=-3.0), point("a", 200.0, 4.0, 7, 90.0), point("b", 100.0, exponent=-3.5))
     )
@@ -121,7 +121,7 @@ def test_exponents_similarity_impacts_and_motion_are_drawn_as_computed(page):
 
 def test_coexisting_motions_are_dots_and_table_rows_with_their_shares(page):
     simulate(page, step_hz=100.0)
-    page.cancel()
+    page.simulator.cancel()
     motions = tuple(
         FoundMotion(kind, period, response, response, 1.0, 1.0, 1e-6, starts, Share(starts / 16, low, high))
         for kind, period, response, starts, low, high in (

@@ -34,7 +34,7 @@ from ...plots.axis import FREQUENCY, TIME, PlotAxis, Scale
 from ...plots.line_style import LineStyle, curve_style
 from ...plots.plot import Plot
 from ...widgets.boxes import column, fill_box, push_button, row, splitter, titled_box
-from ...widgets.notice import MAPS, SIMULATE, Notice, NoticeKind
+from ...widgets.notice import MAPS, SIMULATE
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel
 
@@ -198,7 +198,8 @@ class MapsPage(Page):
         self.form: ValidatedForm[MapRequest] = ValidatedForm(MapRequest, "map", frozenset({"described"}))
         self.map = MapPlot(context.theme)
         self.motion = MotionView(context.theme)
-        self.simulator = Simulator(self, self._grow, self._end, self._die)
+        self._state = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
+        self.simulator = Simulator(self, context, self._grow, lambda: None, self._state.setText)
         self.picture: MapPicture | None = None
         self._request: MapRequest | None = None
         self._point: tuple[float, float] | None = None
@@ -260,7 +261,6 @@ class MapsPage(Page):
         self.map.clear()
         self._validate()
         self.simulator.begin(request)
-        self._show_text("Computing; the program is being loaded for the first picture…")
 
     def begin_in_sight(self) -> None:
         """Compute the visible part with as many points as the whole map."""
@@ -272,11 +272,6 @@ class MapsPage(Page):
         rounded = {name: float(f"{value:.{DIGITS}g}") for name, value in edges.items()}
         self.form.form.show_content({**self.form.form.content(), **rounded})
         self.begin()
-
-    def cancel(self) -> None:
-        """Stop the computation; points found so far stay."""
-        self.simulator.cancel()
-        self._show_text("Cancelled; the results so far are shown.")
 
     def pick(self, frequency_hz: float, amplitude_m: float) -> None:
         """Show the motion at a point of the map."""
@@ -305,20 +300,11 @@ class MapsPage(Page):
             match part:
                 case MapPicture():
                     self.picture, self._is_stale = part, True
-                    self._show_text(part.text)
+                    self._state.setText(part.text)
                 case Trouble():
                     self.context.warn(part.sentence)
                 case _:
                     pass
-
-    def _end(self) -> None:
-        self._show_text(self.summary)
-
-    def _die(self, what: str) -> None:
-        self.context.say(
-            Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Compute again.", "SIMULATOR")
-        )
-        self._show_text("It broke off.")
 
     def _show_motion(self, request: MotionRequest, motion: SettledMotion) -> None:
         self._motion_of = request
@@ -333,10 +319,6 @@ class MapsPage(Page):
     def _show_level(self, level: RecordedLevel) -> None:
         self._levels.append(level)
         self.map.show_level(level, len(self._levels) - 1)
-
-    def _show_text(self, text: str) -> None:
-        self._state.setText(text)
-        self._cancel.setEnabled(self.simulator.is_busy)
 
     def _validate(self) -> None:
         wanted = self.form.value
@@ -360,14 +342,11 @@ class MapsPage(Page):
             "&Map", "Compute the request of the form in another process", self.begin, "first"
         )
         self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
-        self._cancel = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
-        self._cancel.setEnabled(False)
-        return row((self._begin, 1), (self._finer, 1), (self._cancel, 1))
+        return row((self._begin, 1), (self._finer, 1), (self.simulator.cancel_button, 1))
 
     def _answer(self) -> QWidget:
         self.quantity = Choice("Quantity shown by the colours of the map", items=COLOURINGS)
         self.quantity.currentIndexChanged.connect(self._recolour)
-        self._state = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
         self._open = push_button(
             "&Open in Simulate",
             "Simulate a frequency range around this point, with errors",

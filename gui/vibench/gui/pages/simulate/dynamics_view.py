@@ -3,21 +3,17 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar, cast
+from typing import Generic, Protocol, TypeVar
 
 from PySide6.QtWidgets import QLayout, QVBoxLayout, QWidget
 
 from vibench.analysis import Curve
 from vibench.analysis.dynamics import (
     BranchDiagram,
-    BranchLine,
     BranchRequest,
     ChainAnswer,
     ChainRequest,
-    ChainRun,
     ExponentSpectrum,
-    SpecimenChoice,
-    SpectrumPoint,
     SpectrumRequest,
 )
 from vibench.analysis.prediction.progress import PartialResult, Trouble
@@ -28,11 +24,11 @@ from ...page.app_context import AppContext
 from ...page.page import DisplayedResult, SideAndPicture
 from ...page.simulator import Simulator
 from ...widgets.boxes import column, fill_box, push_button, row, titled_box
-from ...widgets.notice import COMPARE, Notice, NoticeKind
+from ...widgets.notice import COMPARE
 from ...widgets.units import SentenceLabel
 
-Request = TypeVar("Request", bound=SpecimenChoice)
-Answer = TypeVar("Answer")
+Request = TypeVar("Request", bound=BranchRequest | SpectrumRequest | ChainRequest)
+Answer = TypeVar("Answer", bound=BranchDiagram | ExponentSpectrum | ChainAnswer)
 Shown_contra = TypeVar("Shown_contra", contravariant=True)
 
 
@@ -47,6 +43,11 @@ class AnswerPicture(Protocol[Shown_contra]):
         """Draw a result."""
 
 
+def _no_curves(_answer: object) -> tuple[Curve, ...]:
+    """Return no curves, because exponents and chains cannot be compared with a recording."""
+    return ()
+
+
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
     """Request type of a tab, and functions that describe its result."""
@@ -55,12 +56,11 @@ class DynamicsKind(Generic[Request, Answer]):
     request: type[Request]
     hidden: frozenset[str]
     """Fields of the request without an editor."""
-    answer: Callable[[Request, tuple[PartialResult, ...], float], Answer]
-    """Function that builds the result from request, pieces so far and elapsed time [s]."""
-    cost: Callable[[Answer], str]
-    curves: Callable[[Answer], tuple[Curve, ...]]
+    answer: Callable[..., Answer]
+    """Class of the result, built from request, pieces so far and elapsed time [s]."""
     before: str
     """Text about cost and error that is shown before a result exists."""
+    curves: Callable[[Answer], tuple[Curve, ...]] = _no_curves
 
 
 @dataclass
@@ -81,7 +81,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self.context, self.kind, self.picture = context, kind, picture
         self.setAccessibleName(kind.name.capitalize())
         self.form: ValidatedForm[Request] = ValidatedForm(kind.request, kind.name, kind.hidden)
-        self.simulator = Simulator(self, self._grow, self._end, self._die)
+        self.simulator = Simulator(self, context, self._grow, self._end, self._show_text)
         self.answer: Answer | None = None
         self._course: _Course | None = None
         self._is_stale = False
@@ -113,16 +113,10 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         request = self.form.value
         if request is None:
             return
-        self._course = _Course(request, time.perf_counter())  # type: ignore[arg-type]
+        self._course = _Course(request, time.perf_counter())
         self._validate()
         self._take(())
-        self.simulator.begin(request)  # type: ignore[arg-type]
-        self._show_text("Computing; the program is being loaded for the first result…")
-
-    def cancel(self) -> None:
-        """Cancel the computation; pieces found so far stay."""
-        self.simulator.cancel()
-        self._show_text("Cancelled; the results so far are shown.")
+        self.simulator.begin(request)
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         self._take(parts)
@@ -139,7 +133,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
                 case _:
                     course.parts.append(part)
         elapsed_s = time.perf_counter() - course.began
-        self.answer = self.kind.answer(course.request, tuple(course.parts), elapsed_s)  # type: ignore[arg-type]
+        self.answer = self.kind.answer(course.request, tuple(course.parts), elapsed_s)
         self._is_stale = True
 
     def _end(self) -> None:
@@ -148,17 +142,10 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         if self._course is not None and self._course.troubles:
             self.context.warn(self._course.troubles[0])
 
-    def _die(self, what: str) -> None:
-        self.context.say(
-            Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Ask again.", "SIMULATOR")
-        )
-        self._show_text("It broke off.")
-
     def _show_text(self, text: str) -> None:
         has_nothing = self.simulator.is_busy and (self._course is None or not self._course.parts)
-        cost = "" if self.answer is None or has_nothing else self.kind.cost(self.answer)
+        cost = "" if self.answer is None or has_nothing else self.answer.cost_sentence
         self._state.setText(f"{text} {cost}")
-        self._cancel.setEnabled(self.simulator.is_busy)
         self._compare.setEnabled(self.answer is not None and bool(self.kind.curves(self.answer)))
 
     def _validate(self) -> None:
@@ -179,9 +166,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._begin = push_button(
             "Find", "Compute the request of the form in another process", self.begin, "first"
         )
-        self._cancel = push_button("Cancel", "Stop; the results so far stay", self.cancel)
-        self._cancel.setEnabled(False)
-        return row((self._begin, 1), self._cancel)
+        return row((self._begin, 1), self.simulator.cancel_button)
 
     def _right(self) -> QWidget:
         self._state = SentenceLabel("Nothing has been computed yet.")
@@ -193,32 +178,12 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return column((self.picture.widget, 1), row((self._state, 1), self._compare))
 
 
-def _diagram(request: BranchRequest, parts: tuple[PartialResult, ...], elapsed_s: float) -> BranchDiagram:
-    return BranchDiagram(request, cast("tuple[BranchLine, ...]", parts), elapsed_s)
-
-
-def _spectrum(
-    request: SpectrumRequest, parts: tuple[PartialResult, ...], elapsed_s: float
-) -> ExponentSpectrum:
-    return ExponentSpectrum(request, cast("tuple[SpectrumPoint, ...]", parts), elapsed_s)
-
-
-def _chain(request: ChainRequest, parts: tuple[PartialResult, ...], elapsed_s: float) -> ChainAnswer:
-    return ChainAnswer(request, cast("tuple[ChainRun, ...]", parts), elapsed_s)
-
-
-def _no_curves(_answer: ExponentSpectrum | ChainAnswer) -> tuple[Curve, ...]:
-    """Return no curves, because exponents and chains cannot be compared with a recording."""
-    return ()
-
-
 BRANCHES = DynamicsKind(
     name="branches",
     request=BranchRequest,
     hidden=frozenset({"resonance_band_hz", "phase_of", "loop_time_s", "recorded_level", "described"}),
-    answer=_diagram,
-    cost=lambda answer: answer.cost_sentence,
-    curves=lambda answer: answer.curves(),
+    answer=BranchDiagram,
+    curves=BranchDiagram.curves,
     before=(
         "A search runs every start for 300 drive periods. A branch takes one to several seconds. Each "
         "motion is shown with its error (docs/branches.md)."
@@ -228,9 +193,7 @@ SPECTRUM = DynamicsKind(
     name="exponents",
     request=SpectrumRequest,
     hidden=frozenset({"described"}),
-    answer=_spectrum,
-    cost=lambda answer: answer.cost_sentence,
-    curves=_no_curves,
+    answer=ExponentSpectrum,
     before=(
         "Each point integrates six perturbations over its whole duration. The sum of the exponents is "
         "known from the damping and checks the result (docs/branches.md)."
@@ -240,9 +203,7 @@ CHAIN = DynamicsKind(
     name="chain",
     request=ChainRequest,
     hidden=frozenset({"others", "described"}),
-    answer=_chain,
-    cost=lambda answer: answer.cost_sentence,
-    curves=_no_curves,
+    answer=ChainAnswer,
     before=(
         "Waves need no run. One simulated second with contacts takes a few hundredths of a second for 8 "
         "cells, a third of a second for 64. Errors of contacts follow the accuracy; energies have a "

@@ -36,37 +36,32 @@ _FIRST_SPECIAL_COLOUR = 1
 """Colour of the first kind of special points; colour 0 is for motions of one drive period."""
 
 
-class _TwoPlots(QStackedWidget):
+class _PairPicture:
     """Two pairs of plots, one over frequency and one over level; one pair is visible."""
 
     def __init__(self, theme: Theme, titles: tuple[str, str], axes: tuple[PlotAxis, PlotAxis], hint: str):
-        super().__init__()
-        self.pairs: dict[Parameter, tuple[Plot, Plot]] = {}
+        self.widget = QStackedWidget()
+        self._pairs: dict[Parameter, tuple[Plot, Plot]] = {}
         for along, across in ACROSS.items():
             over = f"{titles[0]} over {along.value}", f"{titles[1]} over {along.value}"
             first, second = (Plot(title, across, axis, theme) for title, axis in zip(over, axes, strict=True))
             first.with_legend().with_hint(hint)
             second.with_legend().with_hint("The same motions.")
             second.setXLink(first)
-            self.pairs[along] = (first, second)
-            self.addWidget(column((first, 1), (second, 1)))
-
-    def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Clear and show the pair of plots over a parameter, and return the pair."""
-        self.setCurrentIndex(list(ACROSS).index(along))
-        pair = self.pairs[along]
-        for plot in pair:
-            plot.wipe()
-        return pair
-
-
-class _PairPicture:
-    def __init__(self, plots: _TwoPlots) -> None:
-        self.widget = plots
+            self._pairs[along] = (first, second)
+            self.widget.addWidget(column((first, 1), (second, 1)))
 
     def plots(self, along: Parameter) -> tuple[Plot, Plot]:
         """Return the pair of plots over a parameter."""
-        return self.widget.pairs[along]
+        return self._pairs[along]
+
+    def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
+        """Clear and show the pair of plots over a parameter, and return the pair."""
+        self.widget.setCurrentIndex(list(ACROSS).index(along))
+        pair = self.plots(along)
+        for plot in pair:
+            plot.wipe()
+        return pair
 
 
 class BranchPicture(_PairPicture):
@@ -76,12 +71,12 @@ class BranchPicture(_PairPicture):
         axes = RESPONSES[0][1], RESPONSES[1][1]
         hint = "Periodic motions: stable ones solid, unstable ones dashed, as they are found."
         titles = ("Response I of branches", "Response II of branches")
-        super().__init__(_TwoPlots(theme, titles, axes, hint))
+        super().__init__(theme, titles, axes, hint)
 
     def show_answer(self, answer: BranchDiagram) -> None:
         """Draw every branch."""
         along = answer.request.along
-        pair = self.widget.cleared(along)
+        pair = self.cleared(along)
         named: set[str] = set()
         for line in answer.lines:
             for is_stable, piece in line.pieces():
@@ -107,12 +102,12 @@ class SpectrumPicture(_PairPicture):
     def __init__(self, theme: Theme) -> None:
         hint = "All six Lyapunov exponents with their intervals, as they are found."
         titles = ("Exponents", "Kaplan-Yorke dimension")
-        super().__init__(_TwoPlots(theme, titles, (EXPONENT, DIMENSION), hint))
+        super().__init__(theme, titles, (EXPONENT, DIMENSION), hint)
 
     def show_answer(self, answer: ExponentSpectrum) -> None:
         """Draw the spectra found so far."""
         along = answer.request.along
-        upper, lower = self.widget.cleared(along)
+        upper, lower = self.cleared(along)
         if not answer.points:
             return
         place = answer.column("frequency_hz" if along is Parameter.FREQUENCY else "amplitude_m")

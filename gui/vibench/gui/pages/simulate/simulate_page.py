@@ -20,7 +20,7 @@ from ...page.app_context import AppContext, SettingKey
 from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.simulator import Simulator
 from ...widgets.boxes import TimedBar, column, fill_box, push_button, row, titled_box
-from ...widgets.notice import COMPARE, SIMULATE, Notice, NoticeKind
+from ...widgets.notice import COMPARE, SIMULATE
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel
 from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
@@ -39,7 +39,7 @@ class SimulatePage(Page):
             SimulationRequest, "simulation", frozenset({"described"})
         )
         self.plots = AnswerPlots(context.theme)
-        self.simulator = Simulator(self, self._grow, self._end, self._die)
+        self.simulator = Simulator(self, context, self._grow, self._end, self._say_progress)
         self.progress: SimulationProgress | None = None
         self._request: SimulationRequest | None = None
         self._is_stale = False
@@ -109,7 +109,6 @@ class SimulatePage(Page):
         self.plots.setEnabled(True)
         self._bar.begin()
         self.simulator.begin(request)
-        self._say_progress("Simulating; the program is being loaded for the first result…")
 
     def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
         """Set the form to a frequency range around a drive, and to the time signal at that drive."""
@@ -118,11 +117,6 @@ class SimulatePage(Page):
         content["step_hz"] = 0.01 * frequency_hz
         self.form.form.show_content(content)
         self.tabs.setCurrentIndex(0)
-
-    def cancel(self) -> None:
-        """Stop the computation; points found so far stay."""
-        self.simulator.cancel()
-        self._say_progress("Cancelled; the results so far are shown.")
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         if self.progress is not None:
@@ -143,12 +137,6 @@ class SimulatePage(Page):
         if troubles:
             self.context.warn(troubles[0], details="\n".join(troubles[1:]))
 
-    def _die(self, what: str) -> None:
-        self.context.say(
-            Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Simulate again.", "SIMULATOR")
-        )
-        self._say_progress("The simulation failed.")
-
     def _say_cost(self) -> None:
         request = self.form.value
         self._begin.setEnabled(request is not None)
@@ -159,11 +147,9 @@ class SimulatePage(Page):
         self._cost.setText("\n".join(cost_sentences(request, os.cpu_count() or 1)))
 
     def _say_progress(self, text: str) -> None:
-        is_busy = self.simulator.is_busy
         done, total = (0, 0) if self.progress is None else (self.progress.done, self.progress.requested)
         self._bar.show_done(done, total)
         self._state.setText(text)
-        self._cancel.setEnabled(is_busy)
         self._compare.setEnabled(self.progress is not None and bool(self.progress.curves()))
 
     def _hand_to_compare(self) -> None:
@@ -192,8 +178,7 @@ class SimulatePage(Page):
         self._begin = push_button(
             "&Simulate", "Compute the request of the form in another process", self.begin, "first"
         )
-        self._cancel = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
-        return row((self._begin, 1), self._cancel)
+        return row((self._begin, 1), self.simulator.cancel_button)
 
     def _answer(self) -> QWidget:
         self._bar = TimedBar("Points simulated", "points")
