@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field
 from PySide6.QtCore import QEvent, QObject, Qt, QUrl, Signal
@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QFileDialog,
-    QMainWindow,
     QMenu,
     QMessageBox,
     QTextBrowser,
@@ -30,10 +29,12 @@ from vibench.sim import FrozenModel
 
 from ..forms.model_form import ValidatedForm
 from ..page.app_context import AppContext, SettingKey
-from ..page.user_actions import UserActions
 from ..widgets.boxes import fill_box, push_button
 from ..widgets.theme import DARK, LIGHT, THEMES, Theme
 from ..widgets.units import UNITS
+
+if TYPE_CHECKING:
+    from .window import Window
 
 
 def whole_path(folder: str) -> str:
@@ -234,25 +235,6 @@ class MenuAction:
     about: str = ""
 
 
-class MenuTarget(Protocol):
-    """Functions of the window that menus call."""
-
-    def close(self) -> bool:
-        """Close the window."""
-
-    def reset_layout(self) -> None:
-        """Restore the default layout."""
-
-    def undo(self) -> None:
-        """Undo the last edit of the plan on the visible page."""
-
-    def redo(self) -> None:
-        """Redo the last undone edit."""
-
-    def open_path(self, path: Path) -> None:
-        """Open a file or folder."""
-
-
 OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("Esc, Pause", "abort with the fastest ramp of the shaker, from anywhere"),
     ("Space", "freeze the picture (Run page); the recording goes on"),
@@ -278,19 +260,18 @@ def key_text(actions: tuple[MenuAction, ...]) -> str:
     return f"<table>{rows}</table>"
 
 
-def menu_actions(
-    window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
-) -> tuple[MenuAction, ...]:
+def menu_actions(window: "Window") -> tuple[MenuAction, ...]:
     """Return all actions, menu by menu."""
+    context, actions = window.context, window.user_actions
     return (
-        MenuAction("&File", "&Open…", lambda: _open(window, target, context), "Ctrl+O", "open any file"),
+        MenuAction("&File", "&Open…", lambda: _open(window), "Ctrl+O", "open any file"),
         MenuAction("&File", "Recordings &folder…", lambda: choose_folder(window, context)),
         MenuAction(
             "&File", "&Settings…", lambda: SettingsDialog(context, window).open(), "Ctrl+,", "settings"
         ),
-        MenuAction("&File", "&Quit", target.close, "Ctrl+Q"),
-        MenuAction("Edit", "&Undo", target.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
-        MenuAction("Edit", "&Redo", target.redo, "Ctrl+Shift+Z", "make it again"),
+        MenuAction("&File", "&Quit", window.close, "Ctrl+Q"),
+        MenuAction("Edit", "&Undo", window.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
+        MenuAction("Edit", "&Redo", window.redo, "Ctrl+Shift+Z", "make it again"),
         MenuAction("&Test", "&Check the bench", actions.check, "F6"),
         MenuAction("&Test", "Check as a new &reference", partial(actions.check, new_reference=True)),
         MenuAction("&Test", "&Arm the test", actions.arm_test, "Ctrl+Return", "arm"),
@@ -302,22 +283,20 @@ def menu_actions(
             MenuAction(
                 "&View", f"&{number}  {name}", partial(context.page_requested.emit, name), f"Ctrl+{number}"
             )
-            for number, name in enumerate(pages, start=1)
+            for number, name in enumerate(window.pages, start=1)
         ),
         MenuAction("&View", "&Light or dark", lambda: context.choose_theme(_other(context)), "Ctrl+T"),
-        MenuAction("&View", "&Reset layout", target.reset_layout),
+        MenuAction("&View", "&Reset layout", window.reset_layout),
         MenuAction("Hel&p", "&Manual", lambda: show_manual(window), "Shift+F1", "the manual, offline"),
         MenuAction("Hel&p", "&About…", lambda: show_about(window, context), "", ""),
     )
 
 
-def build_menus(
-    window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
-) -> None:
+def build_menus(window: "Window") -> None:
     """Add the menus to a window."""
     bar = window.menuBar()
     bar.setAccessibleName("Menus")
-    table = menu_actions(window, target, context, actions, pages)
+    table = menu_actions(window)
     keys = MenuAction("Hel&p", "&Keys", lambda: show_keys(window, (*table, keys)), "F1", "this list")
     menus = {name: bar.addMenu(name) for name in dict.fromkeys(each.menu for each in table)}
     for row in (*table, keys):
@@ -326,40 +305,40 @@ def build_menus(
         action.triggered.connect(lambda _checked=False, row=row: row.act())
     recent = QMenu("Open &recent", menus["&File"])
     menus["&File"].insertMenu(menus["&File"].actions()[1], recent)
-    recent.aboutToShow.connect(lambda: _list_recent(recent, target, context))
+    recent.aboutToShow.connect(lambda: _list_recent(recent, window))
 
 
-def _list_recent(menu: QMenu, target: MenuTarget, context: AppContext) -> None:
+def _list_recent(menu: QMenu, window: "Window") -> None:
     menu.clear()
-    for path in context.recent_files:
+    for path in window.context.recent_files:
         name = printable(str(path)).replace("&", "&&")
-        menu.addAction(name).triggered.connect(lambda _checked=False, path=path: target.open_path(path))
-    if not context.recent_files:
+        menu.addAction(name).triggered.connect(lambda _checked=False, path=path: window.open_path(path))
+    if not window.context.recent_files:
         menu.addAction("nothing yet").setEnabled(False)
 
 
-def _open(window: QMainWindow, target: MenuTarget, context: AppContext) -> None:
+def _open(window: "Window") -> None:
     given, _ = QFileDialog.getOpenFileName(
         window,
         "Open",
-        str(context.folder),
+        str(window.context.folder),
         "Recordings, tests, campaigns, configurations (*.h5 *.part *.toml)",
     )
     if given:
-        target.open_path(Path(given))
+        window.open_path(Path(given))
 
 
-def choose_folder(window: QMainWindow, context: AppContext) -> None:
+def choose_folder(parent: QWidget, context: AppContext) -> None:
     """Ask for the folder of new recordings."""
-    chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(context.folder))
+    chosen = QFileDialog.getExistingDirectory(parent, "Folder for recordings", str(context.folder))
     if chosen:
         context.choose_folder(Path(chosen))
 
 
-def show_keys(window: QMainWindow, actions: tuple[MenuAction, ...]) -> None:
+def show_keys(parent: QWidget, actions: tuple[MenuAction, ...]) -> None:
     """Show the list of keys in a separate window, which does not block the main one."""
     text = f"{key_text(actions)}<p>{EMERGENCY}</p>"
-    box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=window)
+    box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=parent)
     box.setModal(False)
     box.show()
 

@@ -160,7 +160,7 @@ class Window(QMainWindow):
         self._lay_out()
         self.user_actions = UserActions(context, self)
         self.setAcceptDrops(True)
-        build_menus(self, self, context, self.user_actions, tuple(self.pages))
+        build_menus(self)
         self._connect()
         self._restore()
         self._timer = QTimer(self, interval=TICK_MS)
