@@ -23,6 +23,14 @@ class Scale(Enum):
     LINEAR = auto()
     LOGARITHMIC = auto()
 
+    def drawn(self, value: float) -> float:
+        """Return where a plot draws a value."""
+        return log10(value) if self is Scale.LOGARITHMIC else value
+
+    def value_at(self, drawn: float) -> float:
+        """Return the value that is drawn at a place."""
+        return float(10.0 ** min(max(drawn, -300.0), 300.0)) if self is Scale.LOGARITHMIC else drawn
+
 
 class Blankness(Enum):
     """Whether an axis has numbers."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from math import isfinite, log10
+from math import isfinite
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QRectF, Qt
@@ -214,14 +214,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     def stripes(self, line_style: LineStyle) -> Stripes:
         """Add vertical stripes for frequency or time ranges."""
-        item = Stripes(self._across)
+        item = Stripes(self.scales[0].drawn)
         self.addItem(item, ignoreBounds=True)
         self._line_style(line_style, lambda theme: item.dress(shade_of(line_style, theme)))
         return item
 
     def rules(self, line_style: LineStyle) -> Rules:
         """Add vertical lines without labels."""
-        item = Rules(self._across)
+        item = Rules(self.scales[0].drawn)
         self.addItem(item, ignoreBounds=True)
         self._line_style(
             line_style, lambda theme: item.dress(straight_pen(line_style, theme, self.devicePixelRatioF()))
@@ -232,7 +232,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self, line_style: LineStyle, value: float, label: str = "", label_at: float = 0.92
     ) -> pg.InfiniteLine:
         """Add a vertical line at a value; ``label_at`` is the height of its label."""
-        return self._line(line_style, self._across(value), 90, label, label_at)
+        return self._line(line_style, self.scales[0].drawn(value), 90, label, label_at)
 
     def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
         """Add a horizontal line; a logarithmic axis does not show values of zero or below."""
@@ -365,10 +365,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         for item, value in self._levels.items():
             item.setVisible(isfinite(value) and (value > 0 or not is_logarithmic))
             if item.isVisible():
-                item.setValue(log10(value) if is_logarithmic else value)
-
-    def _across(self, value: float) -> float:
-        return log10(value) if self.scales[0] is Scale.LOGARITHMIC else value
+                item.setValue(self.scales[1].drawn(value))
 
     def _line(
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float

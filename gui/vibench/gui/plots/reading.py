@@ -63,7 +63,7 @@ class Reading:
         for line, at in zip(self._create_lines()[:2], drawn, strict=True):
             line.setValue(at)
             line.show()
-        across, up = (_value(at, scale) for at, scale in zip(drawn, scales, strict=True))
+        across, up = (scale.value_at(at) for at, scale in zip(drawn, scales, strict=True))
         self.place = across, up
         axes = self._plot.across.axis, self._plot.up.axis
         parts = [_value_text(value, axis) for value, axis in zip(self.place, axes, strict=True)]
@@ -127,7 +127,7 @@ class Reading:
             is_drawn = self._marked is not None and (value > 0.0 or scale is Scale.LINEAR)
             line.setVisible(is_drawn)
             if is_drawn:
-                line.setValue(log10(value) if scale is Scale.LOGARITHMIC else value)
+                line.setValue(scale.drawn(value))
 
     def _create_lines(self) -> tuple[pg.InfiniteLine, ...]:
         if not self._lines:
@@ -165,10 +165,6 @@ class Reading:
             if isfinite(drawn_y[place]) and item.yData is not None:
                 found.append((abs(drawn_y[place] - point.y()), name, float(item.yData[place])))
         return None if not found else min(found)[1:]
-
-
-def _value(drawn: float, scale: Scale) -> float:
-    return float(10.0 ** min(max(drawn, -300.0), 300.0)) if scale is Scale.LOGARITHMIC else drawn
 
 
 def _value_text(value: float, axis: PlotAxis) -> str:

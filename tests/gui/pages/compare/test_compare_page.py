@@ -97,9 +97,9 @@ def test_unticked_curves_are_neither_drawn_nor_listed(overlaid):
 
 def test_markers_read_every_curve(overlaid):
     overlaid._markers.setChecked(True)
-    overlaid.plots.put_marker(0, 150.0)
-    overlaid.plots.put_marker(1, 300.0)
-    assert overlaid.plots.markers_hz == (150.0, 300.0)
+    overlaid.plots.markers.put(0, 150.0)
+    overlaid.plots.markers.put(1, 300.0)
+    assert overlaid.plots.markers.values == (150.0, 300.0)
     first, second = texts(overlaid.readings)
     assert float(first[1]) == pytest.approx(2 * float(second[1]), rel=1e-3)
     expected = mode("one").at(np.array([150.0, 300.0])).magnitude

@@ -208,11 +208,12 @@ def test_zoom_and_pan_are_limited_to_the_recording_and_to_a_few_samples(opened):
 def test_markers_measure_time_differences(opened):
     page = opened("whole.h5")
     page._markers.setChecked(True)
-    first, second = page.time_histories._histories[1].markers
-    first.setValue(2.0)
-    second.setValue(2.5)
-    assert page.time_histories.markers_s == (2.0, 2.5)
-    assert page.time_histories._histories[0].markers[0].value() == 2.0
+    markers = page.time_histories.markers
+    for (_, line, *_), time_s in zip(markers.lines, (2.0, 2.5), strict=True):
+        line.setValue(time_s)
+        line.sigDragged.emit(line)
+    assert markers.values == (2.0, 2.5)
+    assert markers.lines[0][0].value() == 2.0
     assert "0.5 s apart = 1 / 2 Hz" in page._view.text()
 
 

@@ -101,7 +101,7 @@ class ComparePage(Page):
         fill_box(QVBoxLayout(self), SideAndPicture(context, COMPARE, self._side(), self._picture()))
         self.curves.changed.connect(self._draw)
         self.pair_box.changed.connect(self._draw)
-        self.plots.markers_moved.connect(self._read)
+        self.plots.markers.moved.connect(self._read)
         self.panel.wanted.connect(self.analyse_again)
         self.panel.cancelled.connect(self.cancel)
         context.comparison_requested.connect(self.add_recordings)
@@ -165,7 +165,7 @@ class ComparePage(Page):
         shown = tuple(each for each, _ in self.curves.ticked())
         recordings = tuple(each for each in self._recordings.values() if each is not None)
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
-        marked = self.plots.markers_hz
+        marked = self.plots.markers.values
         ask = self.context.background.ask
         ask(export_comparison, self._exported, self.context.fail, path, shown, recordings, pair, marked)
 
@@ -210,7 +210,7 @@ class ComparePage(Page):
         self._read()
 
     def _read(self) -> None:
-        markers_hz = self.plots.markers_hz
+        markers_hz = self.plots.markers.values
         curves = tuple(each for each, _ in self.curves.ticked()) if markers_hz else ()
         self.readings.show_numbers(marker_headings(markers_hz), marker_rows(curves, markers_hz))
 
@@ -261,7 +261,7 @@ class ComparePage(Page):
         vertical.setStretchFactor(0, 1)
         self._markers = push_button("&Markers", "Show two markers to read the curves at", lambda: None)
         self._markers.setCheckable(True)
-        self._markers.toggled.connect(self.plots.show_markers)
+        self._markers.toggled.connect(self.plots.markers.show)
         self._markers.toggled.connect(lambda is_on: tabs.setCurrentIndex(int(is_on)))
         show_all = push_button(
             "Sho&w all", "Let the axes follow the curves", self.plots.magnitudes.show_everything

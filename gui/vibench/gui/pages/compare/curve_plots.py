@@ -2,10 +2,9 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import isfinite, log10
+from math import isfinite
 
 import numpy as np
-import pyqtgraph as pg
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import (
@@ -34,6 +33,7 @@ from vibench.analysis import (
 from ...forms.editor import Choice
 from ...plots.axis import LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import GUIDE, Dash, LineStyle, curve_style, dashed_pen
+from ...plots.markers import Markers
 from ...plots.plot import Plot
 from ...widgets.boxes import fill_box, hint_in_list, label_for, plain_tip, splitter
 from ...widgets.read_table import ReadTable
@@ -42,7 +42,6 @@ from ...widgets.units import UNITS, SentenceLabel
 
 MAGNITUDE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 DIFFERENCE = PlotAxis("Difference", "dB")
-_MARKER = LineStyle(lambda theme: theme.accent)
 _BAND, _BAND_COLUMNS = 0.16, 300
 _DOTS = {CurveOrigin.MEASURED: 10, CurveOrigin.SIMULATED: 6}
 _OTHER_DOTS = 4
@@ -50,8 +49,6 @@ _OTHER_DOTS = 4
 
 class CurvePlots(QWidget):
     """The plots of a comparison, with two movable markers."""
-
-    markers_moved = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -66,14 +63,7 @@ class CurvePlots(QWidget):
         self.magnitudes.across.show_nothing()
         parts = splitter("Curves and their difference", self.magnitudes, self.differences, (500, 170))
         fill_box(QVBoxLayout(self), parts, margin=0)
-        self._marker_hz: list[float] = [100.0, 300.0]
-        self._are_marked = False
-        self._lines: list[tuple[pg.InfiniteLine, pg.InfiniteLine]] = []
-
-    @property
-    def markers_hz(self) -> tuple[float, ...]:
-        """Frequencies of the markers; empty while they are hidden."""
-        return tuple(sorted(self._marker_hz)) if self._are_marked else ()
+        self.markers = Markers(100.0, 300.0, self)
 
     def show_curves(
         self, curves: tuple[tuple[Curve, LineStyle], ...], difference: CurveDifference | None
@@ -87,20 +77,7 @@ class CurvePlots(QWidget):
         if difference is not None:
             line = self.differences.curve(curve_style(0))
             line.setData(difference.frequency_hz, difference.decibel, connect="finite")
-        self._add_markers()
-
-    def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
-        """Show or hide the markers; they are moved into the visible range."""
-        self._are_marked = are_shown
-        low, high = self.magnitudes.getViewBox().viewRange()[0]
-        if are_shown and not all(low <= log10(each) <= high for each in self._marker_hz):
-            self._marker_hz = [10 ** (low + (high - low) * share) for share in (1 / 3, 2 / 3)]
-        self._place_markers()
-
-    def put_marker(self, number: int, frequency_hz: float) -> None:
-        """Move a marker."""
-        self._marker_hz[number] = frequency_hz
-        self._place_markers()
+        self.markers.draw_in((self.magnitudes, self.differences))
 
     def _draw(self, curve: Curve, line_style: LineStyle) -> None:
         lone = curve.frequency_hz.size == 1
@@ -114,33 +91,6 @@ class CurvePlots(QWidget):
             self.magnitudes.band(shade, curve.name).set_data(*curve.band(_BAND_COLUMNS))
         line = self.magnitudes.curve(line_style, curve.name)
         line.setData(curve.frequency_hz, curve.magnitude, connect="finite")
-
-    def _add_markers(self) -> None:
-        self._lines = []
-        for number in range(2):
-            pair = tuple(
-                plot.upright(_MARKER, self._marker_hz[number]) for plot in (self.magnitudes, self.differences)
-            )
-            for line in pair:
-                line.setMovable(True)
-                line.sigPositionChanged.connect(
-                    lambda moved, number=number: self._moved(number, moved.value())
-                )
-            self._lines.append((pair[0], pair[1]))
-        self._place_markers()
-
-    def _place_markers(self) -> None:
-        for number, pair in enumerate(self._lines):
-            for line in pair:
-                line.setVisible(self._are_marked)
-                line.setValue(log10(self._marker_hz[number]))
-        self.markers_moved.emit()
-
-    def _moved(self, number: int, place: float) -> None:
-        if not self._are_marked or abs(log10(self._marker_hz[number]) - place) < 1e-12:
-            return
-        self._marker_hz[number] = 10**place
-        self._place_markers()
 
 
 PEAK_HEADINGS = (

@@ -224,8 +224,8 @@ class FilesPage(Page):
             return
         low_s, high_s = self.time_histories.view_s
         text = f"In sight: {low_s:.6g} to {high_s:.6g} s"
-        if self._markers.isChecked():
-            early_s, late_s = self.time_histories.markers_s
+        if markers_s := self.time_histories.markers.values:
+            early_s, late_s = markers_s
             between_s = late_s - early_s
             rate = f" = 1 / {1 / between_s:.5g} Hz" if between_s > 0 else ""
             text += f"      Markers: {early_s:.6g} s, {late_s:.6g} s, {between_s:.6g} s apart{rate}"
@@ -284,7 +284,7 @@ class FilesPage(Page):
         parts.show_parts(browser, ScrollArea("Recording in sight", self._viewer()), (200, 600))
         fill_box(QVBoxLayout(self), parts)
         self.time_histories.range_changed.connect(self._say_view)
-        self.time_histories.markers_moved.connect(self._say_view)
+        self.time_histories.markers.moved.connect(self._say_view)
 
     def _browser(self) -> QWidget:
         self._folder_line = LineField(str(self._folder))
@@ -324,7 +324,7 @@ class FilesPage(Page):
         self._view = ElidedLabel()
         self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
         self._markers.setCheckable(True)
-        self._markers.toggled.connect(self.time_histories.show_markers)
+        self._markers.toggled.connect(self.time_histories.markers.show)
         bar = row(
             (self._view, 1),
             self._markers,

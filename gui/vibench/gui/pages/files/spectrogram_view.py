@@ -1,7 +1,7 @@
 """The pictures of a recording: time histories, spectrogram and hidden-state estimate of the visible range."""
 
 from collections.abc import Callable
-from math import log10, nan
+from math import nan
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -338,9 +338,7 @@ class _Image:
 
     def show_picture(self, found: DensityPicture) -> None:
         """Draw a picture; colours range from the strongest line downwards."""
-        low, high = found.frequency_hz
-        is_log = found.request.spacing is RowSpacing.LOGARITHMIC
-        bottom, top = (log10(low), log10(high)) if is_log else (low, high)
+        bottom, top = map(self._plot.scales[1].drawn, found.frequency_hz)
         left, right = found.time_s
         self.item.setImage(found.decibel, autoLevels=False)
         self.item.setRect(QRectF(left, bottom, right - left, top - bottom))

@@ -6,22 +6,23 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel
 
 from vibench.acquisition.recording import ChannelHeader, Recording
 from vibench.analysis.live import RecordingOverview, zigzag
 
 from ...plots.axis import TIME, PlotAxis
 from ...plots.line_style import LIMIT, Dash, LineStyle, curve_style
+from ...plots.markers import Markers
 from ...plots.plot import Plot
+from ...plots.plot_stack import AXIS_EM, PlotStack
 from ...widgets.theme import Theme
 from ...widgets.units import plain_unit
 from .recording_table import role_text
 
 LEAST_SAMPLES = 8
 _STEP, _ZOOM = 0.2, 0.6
-_TIME_AXIS_EM, _LEAST_EM = 3, 3
-MARKER = LineStyle(lambda theme: theme.accent)
+_LEAST_EM = 3
 SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
 """Largest number of plots kept for reuse; creating a plot takes as long as drawing it ten times."""
@@ -36,28 +37,21 @@ class _TimeHistory:
     role: str
     plot: Plot
     curve: pg.PlotDataItem
-    markers: tuple[pg.InfiniteLine, ...] = ()
 
 
-class RecordingTimeHistories(QWidget):
+class RecordingTimeHistories(PlotStack):
     """Plots over one time axis. Wheel, + and - zoom; arrows and dragging move; Home shows all."""
 
     range_changed = Signal()
-    markers_moved = Signal()
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(theme)
         self.setAccessibleName("Time histories of the recording")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._theme = theme
         self._overview: RecordingOverview | None = None
         self._histories: list[_TimeHistory] = []
         self._kept: dict[tuple[str, str], _TimeHistory] = {}
-        self._marker_s = [0.0, 0.0]
-        self._are_marked = False
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(2)
+        self.markers = Markers(0.0, 0.0, self)
         # One move may cause several changes of the range; draw only once, after the last.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
@@ -71,20 +65,21 @@ class RecordingTimeHistories(QWidget):
         for history in self._histories:
             self._layout.removeWidget(history.plot)
             history.plot.hide()
-        self._histories = []
+        self._histories, self.plots = [], ()
         self._overview = overview
         if overview is None or overview.recording.samples == 0:
             return
         self._histories = [self._history_of(channel) for channel in overview.recording.channels]
+        self.plots = tuple(history.plot for history in self._histories)
         for number, history in enumerate(self._histories):
             self._begin(history, number, overview.recording)
         self._forget_others()
         self._mark_segments(overview)
         self._mark_overloads(overview)
-        duration_s = overview.recording.duration_s
-        self._marker_s = [duration_s / 3, 2 * duration_s / 3]
-        self.show_markers(self._are_marked)
-        self._share_height()
+        self.markers.draw_in(self.plots)
+        for number, share in enumerate((1 / 3, 2 / 3)):
+            self.markers.put(number, share * overview.recording.duration_s)
+        self._label_last()
         self.show_all()
         self._draw()
 
@@ -95,17 +90,6 @@ class RecordingTimeHistories(QWidget):
             return (0.0, 0.0)
         low, high = self._histories[0].plot.getViewBox().viewRange()[0]
         return (max(0.0, float(low)), min(float(high), self._overview.recording.duration_s))
-
-    @property
-    def markers_s(self) -> tuple[float, float]:
-        """Times of the two markers, the earlier first [s]."""
-        early, late = sorted(self._marker_s)
-        return early, late
-
-    @property
-    def plots(self) -> tuple[Plot, ...]:
-        """Plots, one for each channel."""
-        return tuple(history.plot for history in self._histories)
 
     def show_all(self) -> None:
         """Show the whole recording."""
@@ -130,26 +114,9 @@ class RecordingTimeHistories(QWidget):
         step_s = share * (high_s - low_s)
         self.show_range(low_s + step_s, high_s + step_s)
 
-    def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
-        """Show or hide the two markers."""
-        self._are_marked = are_shown
-        low_s, high_s = self.view_s
-        if are_shown and not all(low_s <= each <= high_s for each in self._marker_s) and high_s > low_s:
-            self._marker_s = [low_s + (high_s - low_s) / 3, low_s + 2 * (high_s - low_s) / 3]
-        for history in self._histories:
-            for marker, moment_s in zip(history.markers, self._marker_s, strict=True):
-                marker.setVisible(are_shown)
-                marker.setValue(moment_s)
-        self.markers_moved.emit()
-
-    def retheme(self, theme: Theme) -> None:
-        """Use other colours for new plots."""
-        self._theme = theme
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Redraw for the new width."""
         super().resizeEvent(event)
-        self._share_height()
         self._later.start()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -193,11 +160,8 @@ class RecordingTimeHistories(QWidget):
         plot, is_last = history.plot, number == len(recording.channels) - 1
         plot.wipe()
         history.curve = plot.curve(curve_style(number))
-        history.markers = self._new_markers(plot)
         em = self.fontMetrics().height()
-        plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))
-        plot.across.setStyle(showValues=is_last)
-        plot.across.showLabel(is_last)
+        plot.setMinimumHeight(_LEAST_EM * em + (AXIS_EM * em if is_last else 0))
         box = plot.getViewBox()
         box.setXLink(None)
         least_s = LEAST_SAMPLES / recording.sample_rate_hz
@@ -214,24 +178,6 @@ class RecordingTimeHistories(QWidget):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]
                 history.plot.deleteLater()
-
-    def _new_markers(self, plot: Plot) -> tuple[pg.InfiniteLine, ...]:
-        made = []
-        for number in range(2):
-            marker = plot.upright(MARKER, 0.0)
-            marker.setMovable(True)
-            marker.setVisible(False)
-            marker.sigPositionChanged.connect(lambda line, number=number: self._moved(number, line.value()))
-            made.append(marker)
-        return tuple(made)
-
-    def _moved(self, number: int, moment_s: float) -> None:
-        if not self._are_marked or self._marker_s[number] == moment_s:
-            return
-        self._marker_s[number] = moment_s
-        for history in self._histories:
-            history.markers[number].setValue(moment_s)
-        self.markers_moved.emit()
 
     def _mark_segments(self, overview: RecordingOverview) -> None:
         """Draw a line where each segment starts; long segments are named in the first plot."""
@@ -252,14 +198,6 @@ class RecordingTimeHistories(QWidget):
                 for each in overview.recording.overloads
                 if each.channel == history.role
             )
-
-    def _share_height(self) -> None:
-        axis = _TIME_AXIS_EM * self.fontMetrics().height()
-        history = max(1, (self.height() - axis) // max(1, len(self._histories)))
-        for place in range(len(self._histories)):
-            self._layout.setStretch(place, history + (axis if place == len(self._histories) - 1 else 0))
-        # Activate the layout now, because a later change would repaint everything.
-        self._layout.activate()
 
     def _ranged(self, view: pg.ViewBox, _range: object) -> None:
         if not self._histories or view is not self._histories[0].plot.getViewBox():

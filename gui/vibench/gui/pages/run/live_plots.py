@@ -7,7 +7,6 @@ from math import nan
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineStatus, TwinStatus
@@ -18,6 +17,7 @@ from vibench.analysis.live import LiveView, Portrait, zigzag
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import LIMIT, PREDICTED, Dash, LineStyle, curve_style
 from ...plots.plot import Plot
+from ...plots.plot_stack import PlotStack
 from ...widgets.boxes import fill_box
 from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
@@ -121,24 +121,19 @@ AGO = PlotAxis("Time before now", "s")
 """Time axis; it is fixed, because a scrolling one would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
 """Limits of the number of columns of a plot; one per column of pixels leaves no gap."""
-AXIS_EM, TIME_AXIS_EM = 4.0, 3
+UP_EM = 4.0
 USUAL_SPAN_S = 2.0
 """Time range shown at first [s]."""
 
 
-class TimeHistoryPlots(QWidget):
+class TimeHistoryPlots(PlotStack):
     """Plots over one time axis, rebuilt when the channels change."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
+        super().__init__(theme)
         self._curves: list[pg.PlotDataItem] = []
         self._span_s = 0.0
         self._channels: tuple[tuple[str, str], ...] = ()
-        self.plots: list[Plot] = []
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(1)
 
     def show_channels(self, channels: tuple[tuple[str, str], ...]) -> None:
         """Show one plot per channel, given by role and unit."""
@@ -165,47 +160,29 @@ class TimeHistoryPlots(QWidget):
                 plot.setXRange(-span_s, 0, padding=0)
         self._span_s = span_s
 
-    def retheme(self, theme: Theme) -> None:
-        """Use other colours for new plots."""
-        self._theme = theme
-
     def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
         """Create the missing plots and reuse the others, because creating a plot is slow."""
         for plot in self.plots[len(channels) :]:
             self._layout.removeWidget(plot)
             plot.deleteLater()
-        del self.plots[len(channels) :], self._curves[len(channels) :]
-        for row in range(len(self.plots), len(channels)):
+        plots = list(self.plots[: len(channels)])
+        del self._curves[len(channels) :]
+        for row in range(len(plots), len(channels)):
             plot = Plot("Time history", AGO, channel_axis(*channels[row]), self._theme)
             plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
-            plot.up_em = AXIS_EM
+            plot.up_em = UP_EM
             plot.follow_font()
             self._curves.append(plot.curve(curve_style(row)))
             self._layout.addWidget(plot, 1)
-            self.plots.append(plot)
-        for (role, unit), plot, curve in zip(channels, self.plots, self._curves, strict=True):
+            plots.append(plot)
+        for (role, unit), plot, curve in zip(channels, plots, self._curves, strict=True):
             curve.clear()
             plot.setAccessibleName(f"Time history of {channel_word(role)}")
             plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
             plot.up.show_unit(channel_axis(role, unit))
-            is_last = plot is self.plots[-1]
-            plot.across.setStyle(showValues=is_last)
-            plot.across.showLabel(is_last)
+        self.plots = plots
         self._span_s = 0.0
-        self._share_height()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep all plots equally high."""
-        super().resizeEvent(event)
-        self._share_height()
-
-    def _share_height(self) -> None:
-        axis = TIME_AXIS_EM * self.fontMetrics().height()
-        height = max(1, (self.height() - axis) // max(1, len(self.plots)))
-        for place in range(len(self.plots)):
-            self._layout.setStretch(place, height + (axis if place == len(self.plots) - 1 else 0))
-        # Activate the layout now, because a later change would repaint everything.
-        self._layout.activate()
+        self._label_last()
 
 
 MEASURED = "measured, 95 % bounds"
