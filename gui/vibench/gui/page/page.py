@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QHideEvent, QResizeEvent
@@ -93,6 +93,8 @@ class Page(QWidget):
     def __init__(self, context: AppContext) -> None:
         super().__init__()
         self.context = context
+        self.edits: History[Any] = History(lambda _plan: None)
+        """Edits of the plan; empty on pages without a plan."""
 
     @property
     def is_done(self) -> bool:
@@ -106,12 +108,6 @@ class Page(QWidget):
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
         """Functions that open files on this page, by kind."""
         return {}
-
-    def undo(self) -> None:
-        """Undo the last edit of the plan; pages without a plan do nothing."""
-
-    def redo(self) -> None:
-        """Redo the last undone edit."""
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
@@ -225,9 +221,10 @@ MOST_KEPT = 200
 
 
 class History(Generic[State]):
-    """Undo history: the states of a plan and the current position."""
+    """Undo history: the states of a plan and the current position; ``show`` shows a state again."""
 
-    def __init__(self) -> None:
+    def __init__(self, show: Callable[[State], None]) -> None:
+        self._show = show
         self._states: list[State] = []
         self._now = -1
 
@@ -238,16 +235,15 @@ class History(Generic[State]):
         self._states = [*self._states[: self._now + 1], state][-MOST_KEPT:]
         self._now = len(self._states) - 1
 
-    def undo(self) -> State | None:
-        """Return the state before; None at the beginning."""
-        return self._go(-1)
+    def undo(self) -> None:
+        """Show the state before, if there is one."""
+        self._go(-1)
 
-    def redo(self) -> State | None:
-        """Return the state after; None at the end."""
-        return self._go(1)
+    def redo(self) -> None:
+        """Show the state after, if there is one."""
+        self._go(1)
 
-    def _go(self, step: int) -> State | None:
-        if not 0 <= self._now + step < len(self._states):
-            return None
-        self._now += step
-        return self._states[self._now]
+    def _go(self, step: int) -> None:
+        if 0 <= self._now + step < len(self._states):
+            self._now += step
+            self._show(self._states[self._now])

@@ -252,6 +252,17 @@ LEAST_S = 1.0
 class ProgressBar(QProgressBar):
     """A progress bar whose text is shortened with dots; its tooltip has the whole text."""
 
+    def __init__(self, name: str, text: str = "") -> None:
+        super().__init__()
+        self.setAccessibleName(name)
+        self.setRange(0, 1000)
+        self.show_share(0.0, text)
+
+    def show_share(self, share: float, text: str) -> None:
+        """Show the finished share, with a text; more than the whole counts as the whole."""
+        self.setValue(round(1000 * min(1.0, share)))
+        self.setFormat(text)
+
     def text(self) -> str:
         """Return as much of the text as fits."""
         whole = super().text()
@@ -265,8 +276,7 @@ class TimedBar(ProgressBar):
     """A progress bar that estimates the remaining time from the finished pieces."""
 
     def __init__(self, name: str, pieces: str) -> None:
-        super().__init__()
-        self.setAccessibleName(name)
+        super().__init__(name)
         self._pieces = pieces
         self._begun_s = 0.0
         self._total = 0

@@ -349,11 +349,11 @@ class Window(QMainWindow):
 
     def undo(self) -> None:
         """Undo the last edit of the plan on the visible page."""
-        self.page.undo()
+        self.page.edits.undo()
 
     def redo(self) -> None:
         """Redo the last undone edit."""
-        self.page.redo()
+        self.page.edits.redo()
 
     def open_path(self, path: Path) -> None:
         """Open a file or folder on the page for its kind."""

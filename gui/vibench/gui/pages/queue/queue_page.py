@@ -128,7 +128,7 @@ class QueuePage(Page):
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
         self._actions = UserActions(context, self)
-        self._history: History[Campaign] = History()
+        self.edits = History(context.selection.choose_campaign)
         self._preview: CampaignPreview | None = None
         self._of: tuple[Campaign, Rig | None] | None = None
         """Campaign and rig of the displayed summary; None without one."""
@@ -148,10 +148,7 @@ class QueuePage(Page):
         )
         self.sweep = SweepForm()
         self.summary = SentenceLabel(name="Summary of the campaign")
-        self.progress = ProgressBar()
-        self.progress.setAccessibleName("Progress of the campaign")
-        self.progress.setRange(0, 1000)
-        self.progress.setFormat("not running")
+        self.progress = ProgressBar("Progress of the campaign", "not running")
         self.arm_button = push_button(
             "Arm the ca&mpaign…", "Describe in words what will happen", self._arm, "first"
         )
@@ -202,18 +199,6 @@ class QueuePage(Page):
         """Function that opens campaigns."""
         return {FileKind.CAMPAIGN: self.open_file}
 
-    def undo(self) -> None:
-        """Undo an edit of the campaign."""
-        self._show_again(self._history.undo())
-
-    def redo(self) -> None:
-        """Redo an edit."""
-        self._show_again(self._history.redo())
-
-    def _show_again(self, campaign: Campaign | None) -> None:
-        if campaign is not None:
-            self.context.selection.choose_campaign(campaign)
-
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """The summary and the rows, with their campaign as input."""
@@ -236,13 +221,14 @@ class QueuePage(Page):
     def _show_progress(self, status: EngineStatus | None) -> None:
         run = None if status is None else status.run
         if run is None:
-            self.progress.setValue(0)
-            self.progress.setFormat("not running")
+            self.progress.show_share(0.0, "not running")
             return
         left_s = max(0.0, run.campaign_total_s - run.campaign_elapsed_s)
         end = datetime.now().astimezone() + timedelta(seconds=left_s)
-        self.progress.setValue(round(1000 * run.campaign_elapsed_s / max(run.campaign_total_s, 1e-9)))
-        self.progress.setFormat(f"{run.number} of {run.count}, {clock(left_s)} left, ends about {end:%H:%M}")
+        self.progress.show_share(
+            run.campaign_elapsed_s / max(run.campaign_total_s, 1e-9),
+            f"{run.number} of {run.count}, {clock(left_s)} left, ends about {end:%H:%M}",
+        )
 
     def _show_campaign(self) -> None:
         campaign, rig = self.context.selection.campaign, self.context.selection.rig
@@ -252,7 +238,7 @@ class QueuePage(Page):
             self.entries.show_rows(())
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
-        self._history.note(campaign)
+        self.edits.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
         self._preview = self._of = None
         self.entries.setEnabled(False)

@@ -133,11 +133,7 @@ class WatchCard(QGroupBox):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__("Watch")
-        self.progress = ProgressBar()
-        self.progress.setAccessibleName("Progress of the run")
-        self.progress.setRange(0, 1000)
-        self.progress.setFormat("no run yet")
-        self.progress.setValue(0)
+        self.progress = ProgressBar("Progress of the run", "no run yet")
         self.impacts = QLabel("0")
         self.impacts.setAccessibleName("Impacts so far")
         self.impacts.setProperty("rank", "title")
@@ -192,8 +188,7 @@ class WatchCard(QGroupBox):
         self.twin.setEnabled(status is not None and status.bench is not None)
         self.twin.setChecked(status is not None and status.twin is not None)
         if run is not None and is_running:
-            self.progress.setValue(round(1000 * min(1.0, run.elapsed_s / max(run.total_s, 1e-9))))
-            self.progress.setFormat(_progress_text(run))
+            self.progress.show_share(run.elapsed_s / max(run.total_s, 1e-9), _progress_text(run))
         elif self.progress.value():
             self.progress.setFormat("the last run has ended")
 

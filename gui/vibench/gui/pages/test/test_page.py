@@ -330,7 +330,6 @@ class TestPage(Page):
         self._actions = UserActions(context, self)
         self._preview: MeasurementPreview | None = None
         self._refusal = ""
-        self._history: History[Measurement] = History()
         self._of: Asked = None
         self._requested_inputs: Asked = None
         self._summary_of: Asked = None
@@ -338,6 +337,7 @@ class TestPage(Page):
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
+        self.edits = History(self.form.show_value)
         self.summary = SentenceLabel(name="Summary of the test")
         self.plots = PreviewPlots(context.theme)
         self.limits = LimitTable()
@@ -376,18 +376,6 @@ class TestPage(Page):
         """Function that opens files of tests."""
         return {FileKind.TEST: self.open_file}
 
-    def undo(self) -> None:
-        """Undo an edit of the test."""
-        self._show_again(self._history.undo())
-
-    def redo(self) -> None:
-        """Redo an edit."""
-        self._show_again(self._history.redo())
-
-    def _show_again(self, measurement: Measurement | None) -> None:
-        if measurement is not None:
-            self.form.show_value(measurement)
-
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """Loads, plots and prediction, each with its test and rig as inputs."""
@@ -416,7 +404,7 @@ class TestPage(Page):
         seen = self.context.selection.prediction
         self.context.selection.choose_measurement(measurement)
         if measurement is not None:
-            self._history.note(measurement)
+            self.edits.note(measurement)
             if inputs == self._requested_inputs:
                 # Only name or notes changed, so the prediction stays valid.
                 if seen is not None:
