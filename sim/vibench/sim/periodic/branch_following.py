@@ -1,7 +1,7 @@
 """Follow any family of periodic motions along a parameter, and collect a branch."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar, Protocol
@@ -135,16 +135,6 @@ class Family(Curve, Protocol):
         ...
 
 
-@dataclass
-class _Gathered:
-    reports: list[OrbitReport]
-    events: list[BranchEvent]
-
-    def add_event(self, kind: BifurcationKind, report: OrbitReport) -> None:
-        last = len(self.reports) - 1
-        self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
-
-
 RANGE_LENGTH = 10.0
 """Length of the parameter's range; the gap or the spring's length scale has length 1."""
 
@@ -179,31 +169,23 @@ def follow(
     steps
         Lengths and tolerances.
     """
-    gathered = _Gathered([], [])
-    parameter = family.path.parameter
+    followed = _Followed(family, steps)
     while True:
-        end, last = _follow_at(family, start, toward, bounds, steps, gathered)
+        end, last = followed.go_on(start, toward, bounds)
         if end is not None:
-            return _branch(gathered, parameter, end)
-        refined = family.refined(last.point, last.tangent)
+            return followed.branch(end)
+        refined = followed.family.refined(last.point, last.tangent)
         if refined is None:
-            return _end_branch(gathered, parameter)
+            return followed.end_where_stuck()
         finer, guess, normal = refined
         point, iterations = correct(finer, guess, normal / np.linalg.norm(normal), steps.tolerance)
         if iterations == 0:
-            return _end_branch(gathered, parameter)
-        family, start, toward = finer, point, float(last.tangent[-1])
+            return followed.end_where_stuck()
+        followed.family, start, toward = finer, point, float(last.tangent[-1])
 
 
 NEARLY_GRAZING = 0.01
 """A branch that cannot be continued this close to grazing, relative to the gap, ends by grazing."""
-
-
-def _end_branch(gathered: _Gathered, parameter: Parameter) -> Branch:
-    """End a branch that cannot be continued; add an event if it ends by grazing at a rigid stop."""
-    if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
-        gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
-    return _branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT)
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
@@ -232,102 +214,105 @@ def _join_branches(back: Branch, onward: Branch) -> Branch:
     return replace(onward, **arrays, events=events, begin=back.end)
 
 
-def _follow_at(
-    family: Family,
-    start: Vector,
-    toward: float,
-    bounds: tuple[float, float],
-    steps: ArcSteps,
-    gathered: _Gathered,
-) -> tuple[ArcEnd | None, ArcPoint]:
-    """Follow at one resolution; return the reason for its end (None: refine) and the last point."""
-    points = trace(family, start, toward, bounds, steps)
-    before = next(points)
-    first = family.report(before.point)
-    signs = first.signs
-    if not gathered.reports:
-        # After a refinement, the first point was already reported.
-        gathered.reports.append(first)
-    for here in points:
-        if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):
-            return (None if here.end is ArcEnd.STEP_TOO_SHORT else here.end), here
-        report = family.report(here.point)
-        if is_joined(signs, report.signs) and not here.is_fold:
-            _add_simpler_end(family, before, here, signs, steps, gathered)
-            return ArcEnd.JOINED, here
-        if here.is_fold:
-            gathered.add_event(BifurcationKind.FOLD, report)
-            continue
-        if report.left_out > family.tolerance and family.refined(before.point, before.tangent) is not None:
-            return None, before
-        if here.end is ArcEnd.TOO_MANY_POINTS:
-            return here.end, here
-        for kind in bifurcations_between(signs, report.signs):
-            _add_event(family, before, here, kind, signs, steps, gathered)
-        gathered.reports.append(report)
-        if here.end is not None:
-            return here.end, here
-        before, signs = here, report.signs
-    return ArcEnd.TOO_MANY_POINTS, before
+@dataclass
+class _Followed:
+    """Points and events of a branch while it is followed."""
 
+    family: Family
+    """Family at the present resolution."""
+    steps: ArcSteps
+    reports: list[OrbitReport] = field(default_factory=list)
+    events: list[BranchEvent] = field(default_factory=list)
 
-def _add_simpler_end(
-    family: Family,
-    before: ArcPoint,
-    after: ArcPoint,
-    signs: OrbitSigns,
-    steps: ArcSteps,
-    gathered: _Gathered,
-) -> None:
-    """End a branch on the simpler motion; beyond it, the branch would repeat, shifted or mirrored."""
+    def go_on(
+        self, start: Vector, toward: float, bounds: tuple[float, float]
+    ) -> tuple[ArcEnd | None, ArcPoint]:
+        """Follow at one resolution; return the reason for its end (None: refine) and the last point."""
+        family = self.family
+        points = trace(family, start, toward, bounds, self.steps)
+        before = next(points)
+        first = family.report(before.point)
+        signs = first.signs
+        if not self.reports:
+            # After a refinement, the first point was already reported.
+            self.reports.append(first)
+        for here in points:
+            if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):
+                return (None if here.end is ArcEnd.STEP_TOO_SHORT else here.end), here
+            report = family.report(here.point)
+            if is_joined(signs, report.signs) and not here.is_fold:
+                self._end_on_simpler(before, here, signs)
+                return ArcEnd.JOINED, here
+            if here.is_fold:
+                self._add_event(BifurcationKind.FOLD, report)
+                continue
+            if (
+                report.left_out > family.tolerance
+                and family.refined(before.point, before.tangent) is not None
+            ):
+                return None, before
+            if here.end is ArcEnd.TOO_MANY_POINTS:
+                return here.end, here
+            for kind in bifurcations_between(signs, report.signs):
+                self._locate_event(before, here, kind, signs)
+            self.reports.append(report)
+            if here.end is not None:
+                return here.end, here
+            before, signs = here, report.signs
+        return ArcEnd.TOO_MANY_POINTS, before
 
-    def measure(point: ArcPoint) -> float:
-        return float(family.report(point.point).signs.apart @ signs.apart)
+    def end_where_stuck(self) -> Branch:
+        """End a branch that cannot be continued; add an event if it ends by grazing at a rigid stop."""
+        if self.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
+            self._add_event(BifurcationKind.GRAZING, self.reports[-1])
+        return self.branch(ArcEnd.STEP_TOO_SHORT)
 
-    found = locate(family, before, after, measure, steps.tolerance) or before
-    report = family.report(found.point)
-    last = len(gathered.reports) - 1
-    gathered.events[:] = [
-        each for each in gathered.events if not (each.kind is BifurcationKind.FOLD and each.index == last)
-    ]
-    assert signs.joins is not None
-    gathered.add_event(signs.joins, report)
-    gathered.reports.append(report)
+    def branch(self, end: ArcEnd) -> Branch:
+        """Return the branch so far."""
+        reports = self.reports
+        return Branch(
+            parameter=self.family.path.parameter,
+            frequencies_hz=np.array([r.frequency_hz for r in reports]),
+            amplitudes_m=np.array([r.amplitude_m for r in reports]),
+            response_i=np.array([r.response_i for r in reports]),
+            response_ii=np.array([r.response_ii for r in reports]),
+            states=np.array([r.state for r in reports]),
+            multipliers=np.array([r.signs.over_period for r in reports]),
+            left_out=np.array([r.left_out for r in reports]),
+            contacts=np.array([r.signs.contacts for r in reports], dtype=np.int64),
+            events=tuple(self.events),
+            end=end,
+        )
 
+    def _add_event(self, kind: BifurcationKind, report: OrbitReport) -> None:
+        last = len(self.reports) - 1
+        self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
-def _add_event(
-    family: Family,
-    before: ArcPoint,
-    after: ArcPoint,
-    kind: BifurcationKind,
-    signs: OrbitSigns,
-    steps: ArcSteps,
-    gathered: _Gathered,
-) -> None:
-    def measure(point: ArcPoint) -> float:
-        return sign_of(kind, family.report(point.point).signs, signs)
+    def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
+        """End a branch on the simpler motion; beyond it, the branch would repeat, shifted or mirrored."""
 
-    found = locate(family, before, after, measure, steps.tolerance)
-    if found is None:
-        return
-    report = family.report(found.point)
-    if kind is BifurcationKind.NEIMARK_SACKER and not report.signs.has_pair_on_circle:
-        return
-    gathered.add_event(kind, report)
+        def measure(point: ArcPoint) -> float:
+            return float(self.family.report(point.point).signs.apart @ signs.apart)
 
+        found = locate(self.family, before, after, measure, self.steps.tolerance) or before
+        report = self.family.report(found.point)
+        last = len(self.reports) - 1
+        self.events = [
+            each for each in self.events if not (each.kind is BifurcationKind.FOLD and each.index == last)
+        ]
+        assert signs.joins is not None
+        self._add_event(signs.joins, report)
+        self.reports.append(report)
 
-def _branch(gathered: _Gathered, parameter: Parameter, end: ArcEnd) -> Branch:
-    reports = gathered.reports
-    return Branch(
-        parameter=parameter,
-        frequencies_hz=np.array([r.frequency_hz for r in reports]),
-        amplitudes_m=np.array([r.amplitude_m for r in reports]),
-        response_i=np.array([r.response_i for r in reports]),
-        response_ii=np.array([r.response_ii for r in reports]),
-        states=np.array([r.state for r in reports]),
-        multipliers=np.array([r.signs.over_period for r in reports]),
-        left_out=np.array([r.left_out for r in reports]),
-        contacts=np.array([r.signs.contacts for r in reports], dtype=np.int64),
-        events=tuple(gathered.events),
-        end=end,
-    )
+    def _locate_event(
+        self, before: ArcPoint, after: ArcPoint, kind: BifurcationKind, signs: OrbitSigns
+    ) -> None:
+        def measure(point: ArcPoint) -> float:
+            return sign_of(kind, self.family.report(point.point).signs, signs)
+
+        found = locate(self.family, before, after, measure, self.steps.tolerance)
+        if found is None:
+            return
+        report = self.family.report(found.point)
+        if kind is not BifurcationKind.NEIMARK_SACKER or report.signs.has_pair_on_circle:
+            self._add_event(kind, report)
