@@ -62,45 +62,78 @@ def transition(
     structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
 ) -> NDArray[np.float64]:
     """Return the transition matrix of small departures (d, d') over ``span_rad``, shape (2 n, 2 n)."""
-    system, spring_in = _state_form(structure)
+    departures = _Departures(structure, spring, motion)
     edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
-    period = 1.0 / motion.frequency_hz
-    fastest = _fastest(structure, spring, motion, system)
     result = np.eye(2 * structure.size)
     for start, stop in pairwise(edges):
-        length = (stop - start) / (2.0 * math.pi) * period
-        middle = np.array([0.5 * (start + stop)])
-        if spring.kinks and not _acts(spring, motion, middle):
-            result = scipy.linalg.expm(system * length) @ result
-            continue
-        marks = _marks(start, stop, fastest * length, spring, int(motion.harmonics[-1]))
-        result = _transitions(system, spring_in, structure, spring, motion, marks) @ result
+        result = departures.over(start, stop) @ result
     return np.asarray(result)
 
 
-def _state_form(structure: LinearStructure) -> tuple[Floats, Floats]:
-    """Return the state matrix without the spring, shape (2n, 2n), and the vector of its force, (2n,)."""
-    n = structure.size
-    system = np.zeros((2 * n, 2 * n))
-    system[:n, n:] = np.eye(n)
-    system[n:, :n] = -np.linalg.solve(structure.mass, structure.stiffness)
-    system[n:, n:] = -np.linalg.solve(structure.mass, structure.damping)
-    return system, np.concatenate([np.zeros(n), -np.linalg.solve(structure.mass, structure.direction)])
+class _Departures:
+    """Small departures from a motion, between the phases at which p crosses a stop."""
 
+    def __init__(self, structure: LinearStructure, spring: RestoringForce, motion: Motion) -> None:
+        self._structure, self._spring, self._motion = structure, spring, motion
+        n = structure.size
+        self._system = np.zeros((2 * n, 2 * n))
+        """State matrix without the spring."""
+        self._system[:n, n:] = np.eye(n)
+        self._system[n:, :n] = -np.linalg.solve(structure.mass, structure.stiffness)
+        self._system[n:, n:] = -np.linalg.solve(structure.mass, structure.damping)
+        push = -np.linalg.solve(structure.mass, structure.direction)
+        self._spring_in = np.concatenate([np.zeros(n), push])
+        """Effect of the spring's force on the state, shape (2 n,)."""
+        # The fastest rate of the structure plus that of the spring at its stiffest [rad/s].
+        samples = grid_size(int(motion.harmonics[-1]))
+        omega = 2.0 * math.pi * motion.frequency_hz
+        p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
+        stiffest = float(np.max(np.abs(spring.stiffness(p, rate))))
+        own = float(np.max(np.abs(np.linalg.eigvals(self._system))))
+        self._fastest = own + math.sqrt(stiffest * float(-structure.direction @ push))
 
-def _fastest(structure: LinearStructure, spring: RestoringForce, motion: Motion, system: Floats) -> float:
-    """Return the fastest rate of the structure plus that of the spring at its stiffest [rad/s]."""
-    omega = 2.0 * math.pi * motion.frequency_hz
-    samples = grid_size(int(motion.harmonics[-1]))
-    p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
-    stiffest = float(np.max(np.abs(spring.stiffness(p, rate))))
-    lightness = float(structure.direction @ np.linalg.solve(structure.mass, structure.direction))
-    return float(np.max(np.abs(np.linalg.eigvals(system)))) + math.sqrt(stiffest * lightness)
+    def over(self, start: float, stop: float) -> Floats:
+        """Return the transition matrix from one phase to another [rad]."""
+        length = (stop - start) / (2.0 * math.pi * self._motion.frequency_hz)
+        stiffness, _ = self._slopes(np.array([0.5 * (start + stop)]))
+        if self._spring.kinks and stiffness[0] == 0.0:
+            return np.asarray(scipy.linalg.expm(self._system * length))
+        return self._by_magnus(self._marks(start, stop, self._fastest * length))
 
+    def _marks(self, start: float, stop: float, turn: float) -> Floats:
+        """Phases between which Magnus steps are taken [rad]."""
+        needed = math.ceil(STEPS_PER_TURN * turn)
+        if self._spring.kinks:
+            even = np.linspace(0.0, math.pi, max(CONTACT_STEPS, needed) + 1)
+            return start + 0.5 * (stop - start) * (1.0 - np.cos(even))
+        steps = max(SMOOTH_STEPS, needed, STEPS_PER_HARMONIC * int(self._motion.harmonics[-1]))
+        return np.linspace(start, stop, steps + 1)
 
-def _acts(spring: RestoringForce, motion: Motion, turn: Floats) -> bool:
-    p, rate = motion.p(turn), motion.rate(turn)
-    return bool(spring.stiffness(p, rate)[0] != 0.0)
+    def _by_magnus(self, marks: Floats) -> Floats:
+        """Return the transition matrix over all steps between ``marks``, by fourth-order Magnus exponents."""
+        widths = np.diff(marks)
+        middles = 0.5 * (marks[1:] + marks[:-1])
+        early, late = self._rates(middles - GAUSS * widths), self._rates(middles + GAUSS * widths)
+        lengths = (widths / (2.0 * math.pi * self._motion.frequency_hz))[:, None, None]
+        bracket = late @ early - early @ late
+        exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
+        steps = _exponentials(exponents)
+        while len(steps) > 1:
+            # Multiply in pairs: the same number of products, but on whole arrays.
+            pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
+            steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
+        return np.asarray(steps[0])
+
+    def _rates(self, turn: Floats) -> Floats:
+        """Return the state matrices at phases, shape (k, 2 n, 2 n)."""
+        direction = self._structure.direction
+        rows = np.concatenate([np.multiply.outer(slope, direction) for slope in self._slopes(turn)], axis=1)
+        return np.asarray(self._system + self._spring_in[None, :, None] * rows[:, None, :])
+
+    def _slopes(self, turn: Floats) -> tuple[Floats, Floats]:
+        """Return stiffness and damping of the spring at phases."""
+        p, rate = self._motion.p(turn), self._motion.rate(turn)
+        return self._spring.stiffness(p, rate), self._spring.damping(p, rate)
 
 
 def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[float]:
@@ -123,62 +156,9 @@ def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[f
     return sorted(turn for turn in found if turn <= span_rad)
 
 
-def _marks(start: float, stop: float, turn: float, spring: RestoringForce, highest: int) -> Floats:
-    """Phases between which Magnus steps are taken [rad]."""
-    needed = math.ceil(STEPS_PER_TURN * turn)
-    if spring.kinks:
-        even = np.linspace(0.0, math.pi, max(CONTACT_STEPS, needed) + 1)
-        return start + 0.5 * (stop - start) * (1.0 - np.cos(even))
-    steps = max(SMOOTH_STEPS, needed, STEPS_PER_HARMONIC * highest)
-    return np.linspace(start, stop, steps + 1)
-
-
-def _transitions(
-    system: Floats,
-    spring_in: Floats,
-    structure: LinearStructure,
-    spring: RestoringForce,
-    motion: Motion,
-    marks: Floats,
-) -> Floats:
-    """Return the transition matrix over all steps between ``marks``, by fourth-order Magnus exponents."""
-    widths = np.diff(marks)
-    middles = 0.5 * (marks[1:] + marks[:-1])
-    early = _rates(middles - GAUSS * widths, system, spring_in, structure, spring, motion)
-    late = _rates(middles + GAUSS * widths, system, spring_in, structure, spring, motion)
-    lengths = (widths / (2.0 * math.pi * motion.frequency_hz))[:, None, None]
-    bracket = late @ early - early @ late
-    exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
-    steps = _exponentials(exponents)
-    while len(steps) > 1:
-        # Multiply in pairs: the same number of products, but on whole arrays.
-        pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
-        steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
-    return np.asarray(steps[0])
-
-
 def _exponentials(small: Floats) -> Floats:
     """Exponentials of many matrices whose eigenvalues are below one, by the Pade approximant [3/3]."""
     squared = small @ small
     even = np.eye(small.shape[-1]) + squared / 10.0
     odd = small / 2.0 + squared @ small / 120.0
     return np.linalg.solve(even - odd, even + odd).astype(np.float64)
-
-
-def _rates(
-    turn: Floats,
-    system: Floats,
-    spring_in: Floats,
-    structure: LinearStructure,
-    spring: RestoringForce,
-    motion: Motion,
-) -> Floats:
-    p, rate = motion.p(turn), motion.rate(turn)
-    rows = np.concatenate(
-        [
-            np.multiply.outer(spring.stiffness(p, rate), structure.direction),
-            np.multiply.outer(spring.damping(p, rate), structure.direction),
-        ],
-        axis=1,
-    )
-    return np.asarray(system + spring_in[None, :, None] * rows[:, None, :])
