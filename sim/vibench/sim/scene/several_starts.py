@@ -23,7 +23,7 @@ from .plan import LinearMotion, never_touches
 from .prediction import Ensemble, FoundMotion, MotionKind, StartMemory
 from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
 from .scatter import COVERED, WindowScatter, window_scatter
-from .scene import CLEAR, FEWEST, MOST, FixedDuration, Observable, Scene
+from .scene import CLEAR, FEWEST, MOST, FixedDuration, Scene
 from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile, wilson_share
 from .states_alone import Follow, StatesAlone
 
@@ -462,27 +462,3 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
     if scene.budget_s == 0.0 or seen.path[-1].outcome is not Outcome.REACHED_END:
         return StartMemory.UNKNOWN
     return StartMemory.LOST if is_sensitive_to_start(begin, seen.path) else StartMemory.KEPT
-
-
-def ensemble_beside(
-    scene: Scene,
-    begin: FollowedRun,
-    requested: ReachedMotion,
-    pace: Pace,
-    error_of: ErrorOf,
-    follow: Follow,
-    draw: Draw | None = None,
-) -> Ensemble | None:
-    """Follow additional starts, within the scene's budget or by ``draw``.
-
-    None if the budget allows too few.
-    """
-    if draw is None and Observable.SCATTER in scene.observe:
-        draw = Draw(clear=FEWEST)
-    elif draw is None:
-        draw = Draw(budget_s=max(scene.budget_s - requested.run.cost_s, ALONE * scene.budget_s))
-    several = SeveralStarts(scene, begin, requested, pace, draw, follow)
-    several.follow()
-    if len(several.reached) == 1:
-        return None
-    return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..specimen.accuracy import Accuracy
 from ..specimen.outcome import Outcome
 from ..specimen.stops import chosen
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .plan import LinearMotion, linear_motion, plan_of, transient_decay_s
 from .prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, state_of
-from .repetition import FEWEST_TIMES, MOST_STATES, Pace, growth_of, pace_of
+from .repetition import FEWEST_TIMES, MOST_STATES, growth_of, pace_of
 from .scatter import WindowScatter, window_scatter
 from .scene import FEWEST, AutomaticDuration, FixedDuration, Observable, Scene
 from .several_starts import (
@@ -25,9 +24,9 @@ from .several_starts import (
     SEED,
     TOO_FEW,
     Draw,
-    ErrorOf,
     ReachedMotion,
-    ensemble_beside,
+    SeveralStarts,
+    ensemble_of,
     lasting,
     memory_of,
 )
@@ -96,12 +95,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     if method is Method.CLOSED_FORM:
         return in_closed_form(scene, motion, question)
     begun = _Begun(scene, method, motion, question)
-    way = begun.course.way
-    if way is not None:
-        way.follow()
-    chaos = begun.course.watch()
-    if chaos is not None:
-        chaos.follow()
+    begun.follow()
     return begun.answer(one_by_one)
 
 
@@ -218,9 +212,7 @@ def solve_ensemble(
     if method is Method.CLOSED_FORM:
         return None
     begun = _Begun(scene, method, motion, Question.ANSWER)
-    one_by_one([begun.course.way] if begun.course.way is not None else [])
-    chaos = begun.course.watch()
-    one_by_one([chaos] if chaos is not None else [])
+    begun.follow()
     seen = begun.course.seen()
     if begun.run.outcome is not Outcome.REACHED_END:
         return None
@@ -325,6 +317,14 @@ class _Begun:
                     by_itself_s=math.inf if is_answer else 0.0,
                 )
 
+    def follow(self) -> None:
+        """Follow the motion to its end by itself."""
+        if self.course.way is not None:
+            self.course.way.follow()
+        chaos = self.course.watch()
+        if chaos is not None:
+            chaos.follow()
+
     def answer(self, follow: Follow) -> ScenePrediction:
         """Return the result of the motion; ``follow`` follows other starts."""
         scene, seen = self._scene, self.course.seen()
@@ -346,7 +346,8 @@ class _Begun:
     def ensemble(
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
-        """Follow other starts, as many as the scene's budget or ``draw`` allows."""
+        """Follow other starts, as many as the scene's budget or ``draw`` allows; None if too few."""
+        scene, pace = self._scene, self._pace
         requested = ReachedMotion(
             self.run,
             seen.motion,
@@ -356,8 +357,25 @@ class _Begun:
             seen.wandered_until_s,
             growth_of(seen.path),
         )
-        error_of = _error_of(self._scene.accuracy, requested, errors, self._pace)
-        return ensemble_beside(self._scene, self._begin, requested, self._pace, error_of, follow, draw)
+        if draw is None and Observable.SCATTER in scene.observe:
+            draw = Draw(clear=FEWEST)
+        elif draw is None:
+            draw = Draw(budget_s=max(scene.budget_s - self.run.cost_s, ALONE * scene.budget_s))
+        several = SeveralStarts(scene, self._begin, requested, pace, draw, follow)
+        several.follow()
+
+        def error_of(reached: ReachedMotion) -> float | None:
+            if reached is requested:
+                return finite_or_none(float(np.max(errors.stated)))
+            if reached.period is None:
+                return None if reached.scatter is None else reached.scatter.between_runs
+            answer, period = reached.responses_m, reached.period
+            off = error_of_settled(reached.run, answer, scene.accuracy, period, pace.forgetting_s)
+            return finite_or_none(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
+
+        if len(several.reached) == 1:
+            return None
+        return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)
 
     def _found(
         self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
@@ -413,20 +431,6 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
     if seen.motion is MotionKind.PERIODIC:
         return None
     return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
-
-
-def _error_of(accuracy: Accuracy, requested: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
-    """Return the function that estimates the error of the responses of a motion."""
-
-    def error_of(reached: ReachedMotion) -> float | None:
-        if reached is requested:
-            return finite_or_none(float(np.max(errors.stated)))
-        if reached.period is None:
-            return None if reached.scatter is None else reached.scatter.between_runs
-        off = error_of_settled(reached.run, reached.responses_m, accuracy, reached.period, pace.forgetting_s)
-        return finite_or_none(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
-
-    return error_of
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
