@@ -191,19 +191,11 @@ def integrate_chain(
 
     Parameters
     ----------
-    chain, drive
-        Chain, and motion of its base.
-    duration_s
-        [s]; a sweep or a sampled drive must last as long.
-    accuracy
-        Relative error allowed in a step of a contact.
+    chain, drive, duration_s, accuracy, sample_rate_hz, start_time_s
+        As in `vibench.sim.motion.integrate`.
     initial_state
         x, y, z, vx, vy, vz of every cell, absolute [m, m/s], shape (cells, 6); at rest when None. Cells may
         be in contact.
-    sample_rate_hz
-        Samples at start_time_s + k / sample_rate_hz up to the end; no samples when None.
-    start_time_s
-        Start time on the drive's clock, to continue from an earlier final state.
     max_impact_rate_hz
         Mean impact rate per cell above which a run ends with TOO_MANY_IMPACTS.
     """

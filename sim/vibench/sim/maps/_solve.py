@@ -55,16 +55,8 @@ def solve_map(
     ----------
     plan
         The map.
-    out
-        File for the results, ``NAME.h5``; in memory only when None.
-    existing
-        Whether an existing file is refused or resumed.
-    workers
-        Number of threads; one per processor when None.
-    cluster
-        Address of a Dask scheduler, whose workers compute instead.
-    observer, cancelled
-        Called in the calling thread. The number of requested points grows with every level.
+    out, existing, workers, cluster, observer, cancelled
+        As in `vibench.sim.study.solve_study`. The number of requested points grows with every level.
 
     Returns
     -------
