@@ -6,7 +6,7 @@ from enum import Enum
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSignalBlocker, Qt
 from PySide6.QtGui import QKeyEvent, QPaintEvent, QStandardItemModel, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
@@ -79,6 +79,13 @@ class Choice(QComboBox):
         self.addItems(list(items))
         self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(self.LETTERS)
+
+    def replace_items(self, items: Iterable[str], chosen: str = "") -> None:
+        """Replace the entries without a signal, and choose one; by default the first."""
+        with QSignalBlocker(self):
+            self.clear()
+            self.addItems(list(items))
+            self.setCurrentIndex(max(0, self.findText(chosen)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Pass the space bar on to the page."""

@@ -7,7 +7,7 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
 from vibench.sim import SpecimenWarning
@@ -88,10 +88,9 @@ class ModelForm(QWidget):
 
     def show_content(self, content: Mapping[str, Any]) -> None:
         """Show content from a file; missing fields show the plan's defaults."""
-        blocked = self.blockSignals(True)
-        for name, row in self._rows.items():
-            row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
-        self.blockSignals(blocked)
+        with QSignalBlocker(self):
+            for name, row in self._rows.items():
+                row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
         self.edited = ""
         self.changed.emit()
 

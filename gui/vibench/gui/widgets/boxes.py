@@ -141,9 +141,15 @@ def label_for(text: str, field: QWidget, name: str = "") -> QLabel:
     return label
 
 
-def splitter(name: str, first: QWidget, second: QWidget, sizes: tuple[int, int]) -> QSplitter:
-    """Return two parts below each other with a movable divider."""
-    parts = QSplitter(Qt.Orientation.Vertical)
+def splitter(
+    name: str,
+    first: QWidget,
+    second: QWidget,
+    sizes: tuple[int, int],
+    orientation: Qt.Orientation = Qt.Orientation.Vertical,
+) -> QSplitter:
+    """Return two parts with a movable divider, by default below each other."""
+    parts = QSplitter(orientation)
     parts.setAccessibleName(name)
     parts.addWidget(first)
     parts.addWidget(second)

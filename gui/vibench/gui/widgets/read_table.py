@@ -12,8 +12,18 @@ from .units import UNITS
 Cell = QModelIndex | QPersistentModelIndex
 
 
-def offer_copies(table: QTableView) -> None:
-    """Add actions to copy the selected cells, or the whole table with its headings."""
+def make_readable(table: QTableView, name: str) -> None:
+    """Make a table read-only, with actions to copy the selected cells, or all with the headings."""
+    table.setAccessibleName(name)
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    table.setAlternatingRowColors(True)
+    table.setShowGrid(False)
+    table.setTabKeyNavigation(False)
+    table.verticalHeader().hide()
+    header = table.horizontalHeader()
+    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
     chosen = _offered(table, "Copy", lambda: chosen_text(table))
     chosen.setShortcut(QKeySequence.StandardKey.Copy)
     chosen.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -78,21 +88,12 @@ class ReadTable(QTableWidget):
         wide: int = -1,
     ) -> None:
         super().__init__(0, len(columns))
-        self.setAccessibleName(name)
+        make_readable(self, name)
         self.setHorizontalHeaderLabels(list(columns))
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setAlternatingRowColors(True)
-        offer_copies(self)
-        self.setShowGrid(False)
         self.setWordWrap(True)
-        self.setTabKeyNavigation(False)
-        self.verticalHeader().hide()
-        header = self.horizontalHeader()
-        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self._wide = range(len(columns))[wide]
-        header.setMaximumSectionSize(_WIDEST_LETTERS * self.fontMetrics().averageCharWidth())
+        widest = _WIDEST_LETTERS * self.fontMetrics().averageCharWidth()
+        self.horizontalHeader().setMaximumSectionSize(widest)
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
         UNITS.on_change(self._write)

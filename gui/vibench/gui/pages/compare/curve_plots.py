@@ -5,7 +5,7 @@ from functools import lru_cache
 from math import isfinite
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -245,27 +245,25 @@ class CurveList(QListWidget):
     def retheme(self, theme: Theme) -> None:
         """Redraw the swatches in other colours."""
         self._theme = theme
-        blocked = self.blockSignals(True)
-        for row, each in enumerate(self._curves):
-            self.item(row).setIcon(_swatch(self.line_style(each), theme))
-        self.blockSignals(blocked)
+        with QSignalBlocker(self):
+            for row, each in enumerate(self._curves):
+                self.item(row).setIcon(_swatch(self.line_style(each), theme))
 
     def _show_units(self) -> None:
         ticked = {each.name for each, _ in self.ticked()}
         self._list(lambda each: each.name in ticked)
 
     def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
-        blocked = self.blockSignals(True)
-        self.clear()
-        for each in self._curves:
-            item = QListWidgetItem(_name(each))
-            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
-            wanted = is_ticked(each)
-            item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
-            item.setToolTip(plain_tip(UNITS.convert(each.note)))
-            item.setIcon(_swatch(self.line_style(each), self._theme))
-            self.addItem(item)
-        self.blockSignals(blocked)
+        with QSignalBlocker(self):
+            self.clear()
+            for each in self._curves:
+                item = QListWidgetItem(_name(each))
+                item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+                wanted = is_ticked(each)
+                item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
+                item.setToolTip(plain_tip(UNITS.convert(each.note)))
+                item.setIcon(_swatch(self.line_style(each), self._theme))
+                self.addItem(item)
         self.changed.emit()
 
 
@@ -338,12 +336,8 @@ class PairBox(QGroupBox):
             if names == [box.itemText(number) for number in range(1, box.count())]:
                 continue
             chosen = box.currentText()
-            blocked = box.blockSignals(True)
-            box.clear()
-            box.addItems([_NOBODY, *names])
             default = _name(shown[place]) if len(shown) > 1 else _NOBODY
-            box.setCurrentText(chosen if chosen in names else default)
-            box.blockSignals(blocked)
+            box.replace_items([_NOBODY, *names], chosen if chosen in names else default)
 
     def pair(self) -> tuple[Curve, Curve] | None:
         """Return the curve and its reference; None unless two different curves are selected."""

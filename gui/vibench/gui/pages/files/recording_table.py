@@ -42,7 +42,7 @@ from vibench.analysis.live import THUMBNAIL_COLUMNS, OverviewLevel, Thumbnail, o
 from ...forms.editor import Choice
 from ...widgets.boxes import hint_in_list, plain_tip
 from ...widgets.notice import clock, moment_text, outcome_text
-from ...widgets.read_table import offer_copies
+from ...widgets.read_table import make_readable
 from ...widgets.theme import Theme
 
 Levels = dict[str, tuple[OverviewLevel, ...]]
@@ -254,12 +254,9 @@ class CampaignChoice(Choice):
         before = self.currentIndex()
         name = self._campaigns[before - 1].name if before > 0 else ""
         self._campaigns = campaigns
-        blocked = self.blockSignals(True)
-        self.clear()
-        self.addItems([ALL, *(printable(each.text) for each in campaigns)])
-        names = [each.name for each in campaigns]
-        self.setCurrentIndex(names.index(name) + 1 if name in names else 0)
-        self.blockSignals(blocked)
+        texts = [printable(each.text) for each in campaigns]
+        kept = (text for text, each in zip(texts, campaigns, strict=True) if each.name == name)
+        self.replace_items([ALL, *texts], next(kept, ALL))
         self.setVisible(bool(campaigns))
         self._choose()
 
@@ -283,10 +280,8 @@ _MEASURED_ROWS = 24
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 
-@dataclass(frozen=True)
-class _Row:
-    texts: tuple[str, ...]
-    sorting: tuple[str | float, ...]
+Cell = tuple[str, str | float]
+"""Text of a cell, and the value by which it is sorted."""
 
 
 class RecordingModel(QAbstractTableModel):
@@ -296,7 +291,7 @@ class RecordingModel(QAbstractTableModel):
         super().__init__()
         self._theme = theme
         self.entries: tuple[ListedRecording, ...] = ()
-        self._rows: tuple[_Row, ...] = ()
+        self._rows: tuple[tuple[Cell, ...], ...] = ()
         self._thumbnails: dict[Path, Thumbnail | None] = {}
         self._pictures: dict[Path, QPixmap] = {}
 
@@ -306,7 +301,7 @@ class RecordingModel(QAbstractTableModel):
             return
         self.beginResetModel()
         self.entries = entries
-        self._rows = tuple(_Row(_texts(entry), _sorting(entry)) for entry in entries)
+        self._rows = tuple(_cells(entry) for entry in entries)
         kept = {entry.path for entry in entries}
         self._thumbnails = {path: each for path, each in self._thumbnails.items() if path in kept}
         self._pictures = {path: each for path, each in self._pictures.items() if path in kept}
@@ -346,11 +341,12 @@ class RecordingModel(QAbstractTableModel):
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Return text, thumbnail, tooltip or sorting value of a cell."""
-        entry, row, column = self.entries[index.row()], self._rows[index.row()], index.column()
+        entry, column = self.entries[index.row()], index.column()
+        text, sorting = self._rows[index.row()][column]
         content: Any = None
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                content = row.texts[column]
+                content = text
             case Qt.ItemDataRole.DecorationRole if column == PICTURE:
                 content = self._picture(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
@@ -359,11 +355,11 @@ class RecordingModel(QAbstractTableModel):
             case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
                 content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.AccessibleTextRole:
-                content = f"{HEADINGS[column]}: {row.texts[column] or 'picture'}"
+                content = f"{HEADINGS[column]}: {text or 'picture'}"
             case Qt.ItemDataRole.UserRole:
                 content = entry.path
             case _ if role == SORT_ROLE:
-                content = row.sorting[column]
+                content = sorting
         return content
 
     def _picture(self, path: Path) -> QPixmap | None:
@@ -395,7 +391,7 @@ class RecordingTable(QTableView):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self.setAccessibleName("Recordings")
+        make_readable(self, "Recordings")
         self.is_listing = False
         self.recordings = RecordingModel(theme)
         self._sorted = _ChosenRows(self)
@@ -406,23 +402,12 @@ class RecordingTable(QTableView):
         self.setModel(self._sorted)
         self.setSortingEnabled(True)
         self.sortByColumn(HEADINGS.index("Began"), Qt.SortOrder.DescendingOrder)
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setAlternatingRowColors(True)
-        offer_copies(self)
-        self.setShowGrid(False)
-        self.setTabKeyNavigation(False)
         self.setIconSize(THUMBNAIL_SIZE)
-        self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE.height() + 6)
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.horizontalHeader().setResizeContentsPrecision(_MEASURED_ROWS)
         self.horizontalHeader().setHighlightSections(False)
         self.horizontalHeader().setSectionResizeMode(_WIDE, QHeaderView.ResizeMode.Stretch)
-        self.horizontalHeader().setDefaultAlignment(
-            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-        )
         self.setColumnWidth(PICTURE, THUMBNAIL_SIZE.width() + 10)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -468,33 +453,20 @@ class RecordingTable(QTableView):
         self.scrollTo(wanted[0])
 
 
-def _texts(entry: ListedRecording) -> tuple[str, ...]:
+def _cells(entry: ListedRecording) -> tuple[Cell, ...]:
     facts = entry.catalogue_entry
+    level = "" if facts.amplitude_vpp is None else f"{facts.amplitude_vpp:g} Vpp"
+    length = "" if facts.duration_s is None else duration_text(facts.duration_s)
     return (
-        "",
-        printable(entry.name),
-        state_text(facts.state),
-        printable(facts.verdict),
-        moment_text(facts.started_utc),
-        printable(entry.excitation_text),
-        "" if facts.amplitude_vpp is None else f"{facts.amplitude_vpp:g} Vpp",
-        "" if facts.duration_s is None else duration_text(facts.duration_s),
-        size_text(facts.size_bytes),
-    )
-
-
-def _sorting(entry: ListedRecording) -> tuple[str | float, ...]:
-    facts = entry.catalogue_entry
-    return (
-        entry.name,
-        entry.name,
-        facts.state,
-        facts.verdict,
-        facts.started_utc,
-        entry.excitation_text,
-        facts.amplitude_vpp or 0.0,
-        facts.duration_s or 0.0,
-        float(facts.size_bytes),
+        ("", entry.name),
+        (printable(entry.name), entry.name),
+        (state_text(facts.state), facts.state),
+        (printable(facts.verdict), facts.verdict),
+        (moment_text(facts.started_utc), facts.started_utc),
+        (printable(entry.excitation_text), entry.excitation_text),
+        (level, facts.amplitude_vpp or 0.0),
+        (length, facts.duration_s or 0.0),
+        (size_text(facts.size_bytes), float(facts.size_bytes)),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRectF, Signal
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
@@ -243,12 +243,11 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         super().show_recording(recording, hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
-            blocked = self.channel.blockSignals(True)
-            self.channel.clear()
-            for role in roles:
-                self.channel.addItem(role_text(role), role)
-            self.channel.setCurrentIndex(roles.index(RESPONSE) if RESPONSE in roles else len(roles) - 1)
-            self.channel.blockSignals(blocked)
+            with QSignalBlocker(self.channel):
+                self.channel.clear()
+                for role in roles:
+                    self.channel.addItem(role_text(role), role)
+                self.channel.setCurrentIndex(roles.index(RESPONSE) if RESPONSE in roles else len(roles) - 1)
 
     def retheme(self, theme: Theme) -> None:
         """Change the colours of the scales."""

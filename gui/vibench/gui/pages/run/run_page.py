@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QLabel,
     QSizePolicy,
-    QSplitter,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -32,7 +31,16 @@ from ...page.app_context import AppContext
 from ...page.kind_views import KIND_VIEWS, OF_A_BAND, LivePicture
 from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import ProgressBar, column, fill_box, label_for, paint_hint, push_button, row
+from ...widgets.boxes import (
+    ProgressBar,
+    column,
+    fill_box,
+    label_for,
+    paint_hint,
+    push_button,
+    row,
+    splitter,
+)
 from ...widgets.notice import FILES, RUN, clock, outcome_text
 from ...widgets.theme import Theme, Tone
 from ...widgets.units import SentenceLabel
@@ -521,14 +529,9 @@ class RunPage(Page):
             for picture in pictures:
                 picture.setAccessibleName(picture.title)
                 tabs.setTabToolTip(tabs.addTab(picture, picture.tab), picture.title)
-        below = QSplitter(Qt.Orientation.Horizontal)
-        below.addWidget(self.left_tabs)
-        below.addWidget(self.right_tabs)
-        below.setSizes([500, 500])
-        right = QSplitter(Qt.Orientation.Vertical)
-        right.addWidget(self.time_histories)
-        right.addWidget(below)
-        right.setSizes([600, 400])
+        across = Qt.Orientation.Horizontal
+        below = splitter("Pictures", self.left_tabs, self.right_tabs, (500, 500), across)
+        right = splitter("Time histories and pictures", self.time_histories, below, (600, 400))
         right.setStretchFactor(0, 3)
         right.setStretchFactor(1, 2)
         self._parts = SideAndPicture(self.context, RUN, left, right, self.arm_card.buttons)

@@ -472,12 +472,7 @@ class TestPage(Page):
 
     def _list_tests(self) -> None:
         self._tests = (*own_tests(self._own_folder), *shipped_tests())
-        self.choice.blockSignals(True)
-        self.choice.clear()
-        self.choice.addItem("load a test…")
-        for test in self._tests:
-            self.choice.addItem(printable(test.label))
-        self.choice.blockSignals(False)
+        self.choice.replace_items(["load a test…", *(printable(test.label) for test in self._tests)])
 
     @property
     def _own_folder(self) -> Path:
