@@ -162,10 +162,10 @@ def test_a_copy_under_another_name_is_shown_once(page, record_noise, tmp_path):
     page.context.noticed.connect(notices.append)
     path = record_noise(tmp_path, "noise", 2.0)
     copy = shutil.copy(path, tmp_path / "copy.h5")
-    for each in (path, copy):
-        page._recordings[each] = None
+    page._recordings = {path: None, copy: None}
+    for each in (path, copy, copy):
         page._compared(compare_recording(each, FrequencyResponseRequest(), Simulation.LEFT_OUT))
-    assert [each.what for each in notices] == [f"{copy} has the same samples as {path}."]
+    assert [each.what for each in notices] == 2 * [f"{copy} has the same samples as {path}."]
     assert {each.source for each in page.curves.curves} == {"noise"}
     assert set(page._recordings) == {path}
 
