@@ -289,20 +289,12 @@ def _gap(value: float, variance: float, unknown: float, side: Flags) -> FreeGap:
     return FreeGap(value, float(np.hypot(np.sqrt(variance), unknown)), int(side.sum()))
 
 
-@dataclass(frozen=True)
-class FreeNumbers:
-    """m1, c1 and linear parameters, found without a contact model."""
-
-    tracked: TrackedSpecimen
-    """The specimen with these parameters."""
-    sd: Reals
-    """Relative standard deviations in the order of `FITTED`."""
-    misfit: float
-
-
-def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeNumbers:
+def free_numbers(
+    described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]
+) -> tuple[TrackedSpecimen, Reals]:
     """Fit m1, c1, k0, k2, c0 and c2 to flights by Gauss-Newton on the innovations.
 
+    Return the specimen with these parameters, and relative standard deviations in the order of `FITTED`.
     Raises NotEnoughData when no stretch is long enough.
     """
     count = round(_FIT_STRETCH_S * motion.sample_rate_hz)
@@ -315,37 +307,20 @@ def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
         latent = [latent_motion(motion_model(current, motion), motion, each, count, share) for each in places]
         residual = _residuals(current, motion, latent)
         scale = max(1.0, 1.4826 * float(np.median(np.abs(residual))))
-        slopes = np.stack(
-            [
-                (
-                    _residuals(
-                        with_values(current, {each: value_of(current, each) * (1 + SEARCHES[each].step)}),
-                        motion,
-                        latent,
-                    )
-                    - residual
-                )
-                / (scale * SEARCHES[each].step)
-                for each in FITTED
-            ],
-            axis=1,
-        )
-        from_described = np.array(
-            [value_of(current, each) / value_of(described, each) - 1 for each in FITTED]
-        )
+        values = np.array([value_of(current, each) for each in FITTED])
+        slopes = np.empty((residual.size, len(FITTED)))
+        for n, each in enumerate(FITTED):
+            step = SEARCHES[each].step
+            moved = with_values(current, {each: float(values[n]) * (1 + step)})
+            slopes[:, n] = (_residuals(moved, motion, latent) - residual) / (scale * step)
+        from_described = values / np.array([value_of(described, each) for each in FITTED]) - 1
         curvature = slopes.T @ slopes + np.diag(prior**-2)
         pull = np.clip(residual / scale, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-        step = -np.linalg.solve(curvature, slopes.T @ pull + from_described / prior**2)
-        step = np.clip(step, -prior, prior)
-        current = with_values(
-            current,
-            {
-                each: value_of(current, each) * (1 + float(part))
-                for each, part in zip(FITTED, step, strict=True)
-            },
-        )
+        change = -np.linalg.solve(curvature, slopes.T @ pull + from_described / prior**2)
+        values *= 1 + np.clip(change, -prior, prior)
+        current = with_values(current, dict(zip(FITTED, values.tolist(), strict=True)))
     variance = np.diag(np.linalg.inv(curvature)) * max(1.0, float(np.mean(pull**2)))
-    return FreeNumbers(current, np.sqrt(variance), float(np.mean([each.misfit for each in latent])))
+    return current, np.sqrt(variance)
 
 
 def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequence[LatentMotion]) -> Reals:

@@ -212,17 +212,17 @@ def search_start(
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
     """Return start values found without a contact model, and their prior or the reason for having none."""
     rate = motion.sample_rate_hz
-    numbers = free_numbers(described, motion, firsts)
+    fitted, sds = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
     first = (motion.samples - count) // 2
-    free = free_motion(motion_model(numbers.tracked, motion), motion.part(first, first + count))
+    free = free_motion(motion_model(fitted, motion), motion.part(first, first + count))
     gaps = free_gaps(free.impacts)
     if not any(gaps):
-        gaps = _gaps_by_law(numbers.tracked, free.impacts)
+        gaps = _gaps_by_law(fitted, free.impacts)
     if not any(gaps):
         count = free.impacts.samples.size
         seen = f"{count} impacts that were found determine no gap" if count else "no impacts were found"
-        return numbers.tracked, (
+        return fitted, (
             f"{seen} without a contact model, so m1 hardly reached its stops in this motion or stayed at one "
             "of them, or the specimen's linear numbers are wrong; fit them to weak noise first"
         )
@@ -230,15 +230,14 @@ def search_start(
     known: dict[Hidden, FreeGap] = {
         side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
     }
-    start = with_values(numbers.tracked, {side: gap.value_m for side, gap in known.items()})
+    start = with_values(fitted, {side: gap.value_m for side, gap in known.items()})
     loss = free_loss(free.impacts)
     if loss is not None and loss > _TELLING_LOSS:
         start = with_values(start, {Hidden.LOSS: loss})
     near = {**NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
     near |= {
-        each: max(SEARCHES[each].least_sd, 3.0 * float(sd))
-        for each, sd in zip(FITTED, numbers.sd, strict=True)
+        each: max(SEARCHES[each].least_sd, 3.0 * float(sd)) for each, sd in zip(FITTED, sds, strict=True)
     }
     return start, searched_parameters(described, near)
 
