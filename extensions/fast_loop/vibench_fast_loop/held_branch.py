@@ -30,15 +30,9 @@ from vibench.analysis.report import STEPPED
 from vibench.analysis.signals.arrays import Reals
 from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
 from vibench.analysis.tables import Labelled, table
-from vibench.sim import (
-    Branch,
-    FrequencyPath,
-    Harmonic,
-    ShootingEnd,
-    Specimen,
-    periodic_branch_within,
-    periodic_orbit,
-)
+from vibench.sim import Branch, Specimen
+
+from .fast_loop import impact_branch
 
 _LEAST = 3
 """Fewest points in which a turn of the frequency can be found."""
@@ -78,13 +72,9 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
     stabilities = [by_point.get(each.point) for each in points]
     sizes = [(nan, nan) if each is None else (each.multiplier, each.multiplier_u) for each in stabilities]
     multiplier, multiplier_u = np.array(sizes, dtype=np.float64).reshape(-1, 2).T
+    of_points = ("frequency_hz", "base_m", "m0_m", "phase_deg", "residue", "residue_acceleration")
     return HeldBranch(
-        frequency_hz=np.array([each.frequency_hz for each in points]),
-        base_m=np.array([each.base_m for each in points]),
-        m0_m=np.array([each.m0_m for each in points]),
-        phase_deg=np.array([each.phase_deg for each in points]),
-        residue=np.array([each.residue for each in points]),
-        residue_acceleration=np.array([each.residue_acceleration for each in points]),
+        **{name: np.array([getattr(each, name) for each in points]) for name in of_points},
         stability=tuple("" if each is None else each.stability.value for each in stabilities),
         multiplier=multiplier,
         multiplier_u=multiplier_u,
@@ -169,13 +159,9 @@ def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:
     """Return the model's branch through the range of the held points; None without a motion at its start."""
     if not found.frequency_hz.size:
         return None
-    amplitude_m = float(np.median(found.base_m))
-    first_hz = float(found.frequency_hz[0])
-    low, high = float(found.frequency_hz.min()) - _ROOM_HZ, float(found.frequency_hz.max()) + _ROOM_HZ
-    orbit = periodic_orbit(specimen, Harmonic(first_hz, amplitude_m))
-    if orbit.outcome is not ShootingEnd.CONVERGED:
-        return None
-    return periodic_branch_within(orbit, FrequencyPath((amplitude_m,)), low, high)
+    amplitude_m, first_hz = float(np.median(found.base_m)), float(found.frequency_hz[0])
+    range_hz = float(found.frequency_hz.min()) - _ROOM_HZ, float(found.frequency_hz.max()) + _ROOM_HZ
+    return impact_branch(specimen, amplitude_m, first_hz, range_hz, "rest")
 
 
 def _model(axes: Axes, model: Branch, scale: float) -> None:
