@@ -265,22 +265,18 @@ class RecordingOverview:
         self, roles: Sequence[str], begin: int, end: int, columns: int, bin_samples: int
     ) -> Picture:
         first, last = begin // bin_samples, -(-end // bin_samples)
-        lows: list[Samples] = []
-        highs: list[Samples] = []
+        edges: list[tuple[Samples, Samples]] = []
         for role in roles:
             level = next(each for each in self.levels[role] if each.bin_samples == bin_samples)
-            low, high = (
-                envelope(level.low[first:last], columns)[0],
-                envelope(level.high[first:last], columns)[1],
-            )
+            low, _ = envelope(level.low[first:last], columns)
+            _, high = envelope(level.high[first:last], columns)
             reach = self._reach(role, first * bin_samples, last * bin_samples, low.size)
-            for edges, edge in zip((lows, highs), widen_extremes(low, high, reach), strict=True):
-                edges.append(edge)
+            edges.append(widen_extremes(low, high, reach))
         starts = first + column_starts(last - first, columns)
         time_s = starts.astype(np.float64) * (bin_samples / self.recording.sample_rate_hz)
         per_column = (last - first) * bin_samples / starts.size
-        low, high = np.asarray(lows, dtype=np.float32), np.asarray(highs, dtype=np.float32)
-        return Picture(time_s, low, high, per_column)
+        lows, highs = (np.asarray(each, dtype=np.float32) for each in zip(*edges, strict=True))
+        return Picture(time_s, lows, highs, per_column)
 
     def _reach(self, role: str, begin: int, end: int, columns: int) -> NDArray[np.int64]:
         """Return periods in columns, from the samples of some places.
@@ -397,11 +393,6 @@ def thumbnail(path: Path) -> Thumbnail | None:
             picture = overview_of(recording).picture((role,), 0, recording.samples, THUMBNAIL_COLUMNS)
     except RecordingError:
         return None
-    known = np.isfinite(picture.low[0]) & np.isfinite(picture.high[0])
-    if not known.any():
-        return None
-    low, high = (np.asarray(each[0], dtype=np.float32) for each in (picture.low, picture.high))
-    largest = max(float(np.max(np.abs(low[known]))), float(np.max(np.abs(high[known]))))
-    if largest <= 0:
-        return None
-    return Thumbnail(*(np.asarray(each / largest, dtype=np.float32) for each in (low, high)))
+    edges = np.asarray([picture.low[0], picture.high[0]], dtype=np.float32)
+    largest = float(np.max(np.abs(edges), where=np.isfinite(edges), initial=0.0))
+    return Thumbnail(*(edges / largest)) if largest > 0 else None

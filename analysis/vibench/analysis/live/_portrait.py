@@ -91,8 +91,10 @@ class PoincareSection:
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
-        self._displacement_m = np.empty(0)
-        self._velocity_m_per_s = np.empty(0)
+        self.displacement_m: Reals = np.empty(0)
+        """Displacement of the points, shape (points,)."""
+        self.velocity_m_per_s: Reals = np.empty(0)
+        """Velocity of the points, shape (points,)."""
         self._newest = -np.inf
 
     def add(self, found: Portrait) -> None:
@@ -101,18 +103,8 @@ class PoincareSection:
             return
         spacing = float(np.min(np.diff(found.strobe_sample))) if found.strobe_sample.size > 1 else 1.0
         fresh = found.strobe_sample > self._newest + 0.5 * spacing
-        self._displacement_m = np.append(self._displacement_m, found.strobe_displacement_m[fresh])
-        self._velocity_m_per_s = np.append(self._velocity_m_per_s, found.strobe_velocity_m_per_s[fresh])
-        self._displacement_m = self._displacement_m[-self._most :]
-        self._velocity_m_per_s = self._velocity_m_per_s[-self._most :]
+        displacement_m = np.append(self.displacement_m, found.strobe_displacement_m[fresh])
+        velocity_m_per_s = np.append(self.velocity_m_per_s, found.strobe_velocity_m_per_s[fresh])
+        self.displacement_m = displacement_m[-self._most :]
+        self.velocity_m_per_s = velocity_m_per_s[-self._most :]
         self._newest = max(self._newest, float(found.strobe_sample[-1]))
-
-    @property
-    def displacement_m(self) -> Reals:
-        """Displacement of the points, shape (points,)."""
-        return self._displacement_m
-
-    @property
-    def velocity_m_per_s(self) -> Reals:
-        """Velocity of the points, shape (points,)."""
-        return self._velocity_m_per_s

@@ -1,6 +1,6 @@
 """Live Responses I and II of a sine or a slow sweep."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
@@ -164,8 +164,7 @@ def sine_point(
     if _is_ramped_down(stretch[0], sample_rate_hz):
         return None
     middle_s = (window.stop_sample - 0.5 * count) / sample_rate_hz
-    point = _point(stretch, sample_rate_hz, tone.frequency_hz, quantity)
-    return None if point is None else replace(point, time_s=middle_s)
+    return _point(middle_s, stretch, sample_rate_hz, tone.frequency_hz, quantity)
 
 
 def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
@@ -178,7 +177,9 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
     return last.amplitude < _LEAST_KEPT * swept * first.amplitude
 
 
-def _point(stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity) -> SinePoint | None:
+def _point(
+    time_s: float, stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity
+) -> SinePoint | None:
     """Return a point with all quantities from one stretch, since they change together in a sweep."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
@@ -193,7 +194,7 @@ def _point(stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quan
     if displacement.size == 0 or amplitude_m == 0.0:
         return None
     return SinePoint(
-        time_s=0.0,
+        time_s=time_s,
         frequency_hz=frequency_hz,
         drive_amplitude_m=amplitude_m,
         lower=float(velocity.min()),

@@ -122,7 +122,7 @@ class LiveSpectra:
         if self._settings.segment_samples % 2 == 0:
             scale[-1] /= 2
         return LiveSpectrum(
-            frequency_hz=self._frequency_hz(),
+            frequency_hz=fft.rfftfreq(self._settings.segment_samples, 1 / self._rate_hz),
             amplitude_density=np.sqrt(power * scale),
             n_eff=effective_averages(self._taper, self._hop, used),
         )
@@ -190,9 +190,6 @@ class LiveSpectra:
         """Return which places contain a valid segment, oldest first."""
         known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)
-
-    def _frequency_hz(self) -> Reals:
-        return np.asarray(fft.rfftfreq(self._settings.segment_samples, 1 / self._rate_hz))
 
 
 _PIECE_SAMPLES = 2**18
