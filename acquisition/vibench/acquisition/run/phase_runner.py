@@ -1,6 +1,6 @@
 """Play phases while every block is read, recorded and checked against the limits."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from enum import Enum, auto
 from typing import Any, Protocol
@@ -325,7 +325,7 @@ class PhaseRunner:
     def _catch_up(self, into: Heard | None = None) -> Iterator[Progress]:
         return self._recorded(self.loop.catch_up(), into)
 
-    def _recorded(self, blocks: Iterator[Block], into: Heard | None = None) -> Iterator[Progress]:
+    def _recorded(self, blocks: Iterable[Block], into: Heard | None = None) -> Iterator[Progress]:
         for block in blocks:
             if into is not None:
                 into.append(block)
@@ -370,10 +370,7 @@ class PhaseRunner:
 
     def _read(self, duration_s: float, into: Heard | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
         for block in self.loop.read_for(duration_s, lead_s):
-            if into is not None:
-                into.append(block)
-            yield self._report_progress(block)
-            self._look(block)
+            yield from self._recorded([block], into)
             if self._switch.is_holding and self._look == self._go_on:
                 yield from self._held()
 
@@ -394,9 +391,7 @@ class PhaseRunner:
             if self._held_s > HOLD_LONGEST_S:
                 reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
                 raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
-            block = self.loop.linger(BLOCK_S)
-            yield self._report_progress(block)
-            self._look(block)
+            yield from self._recorded([self.loop.linger(BLOCK_S)])
         self._enter(before)
 
     def _go_on(self, block: Block) -> None:
