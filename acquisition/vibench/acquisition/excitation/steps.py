@@ -67,6 +67,11 @@ class Stream:
 Play: TypeAlias = Tone | Waveform | Stream | Sweep
 
 
+def full_level(play: Play | None) -> float:
+    """Return the fraction of the amplitude setting that a signal has after its ramp."""
+    return play.level if isinstance(play, Tone) else 1.0
+
+
 @dataclass(frozen=True)
 class Segment:
     """A named range of the recording for the analysis."""

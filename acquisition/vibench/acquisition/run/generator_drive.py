@@ -8,7 +8,7 @@ from itertools import takewhile
 import numpy as np
 
 from ..errors import AcquisitionError, ConfigurationError
-from ..excitation.steps import Play, Stream, Tone, Waveform
+from ..excitation.steps import Play, Stream, Tone, Waveform, full_level
 from ..instruments import FunctionGenerator, Sweep
 from ..plan import FEWEST_STAIRS, DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
@@ -164,7 +164,7 @@ class GeneratorDrive:
         match play:
             case Tone(frequency_hz, _):
                 if not self._is_on:
-                    self._setting_vpp = self._full_vpp(play)
+                    self._setting_vpp = self._amplitude_vpp * full_level(play)
                     self._generator.load_sine(frequency_hz, self._setting_vpp)
                     self._begin_bursts(play, self._check_s)
             case _:
@@ -264,16 +264,9 @@ class GeneratorDrive:
     @property
     def _due_vpp(self) -> float:
         """Setting for the current level and signal [V]."""
-        planned_vpp = self._full_vpp(self._play)
+        planned_vpp = self._amplitude_vpp * full_level(self._play)
         quiet_vpp = min(planned_vpp, self._quiet_vpp())
         return quiet_vpp + self._level * (planned_vpp - quiet_vpp)
-
-    def _full_vpp(self, play: Play | None) -> float:
-        match play:
-            case Tone(_, level):
-                return self._amplitude_vpp * level
-            case _:
-                return self._amplitude_vpp
 
     def _quiet_vpp(self) -> float:
         quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]

@@ -9,7 +9,7 @@ from math import ceil
 import numpy as np
 
 from ..errors import AcquisitionError, ConfigurationError
-from ..excitation.steps import Play, Stream, Tone, Waveform
+from ..excitation.steps import Play, Stream, Tone, Waveform, full_level
 from ..instruments import AnalogOutput, Samples, Sweep
 from ..plan import DriveSource, Measurement, Phase, half_cosine
 from .acquisition_loop import BLOCK_S
@@ -186,7 +186,8 @@ class StreamDrive:
     def perform(self, phase: Phase) -> Iterator[float]:
         """Write ahead while an earlier phase plays; yield how long to read until more fits."""
         self._is_playing = True
-        yield from self._listened(phase.duration_s, self._full_vpp(phase) * phase.end_level)
+        full_vpp = self._amplitude_vpp * full_level(phase.play)
+        yield from self._listened(phase.duration_s, full_vpp * phase.end_level)
 
     def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
         """Play the written samples, then fade by the device's clock; yield as in `perform`."""
@@ -217,13 +218,6 @@ class StreamDrive:
     def _played(self) -> int:
         """Return the number of played samples, from the time read."""
         return round(self._read_s * self._output.sample_rate_hz)
-
-    def _full_vpp(self, phase: Phase) -> float:
-        match phase.play:
-            case Tone(_, level):
-                return self._amplitude_vpp * level
-            case _:
-                return self._amplitude_vpp
 
     def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:
         """Yield a duration in parts, none longer than a block, and write ahead after each."""
