@@ -1,5 +1,6 @@
 """One thread for linear algebra, as for the command; and the window's tests wherever Qt can be loaded."""
 
+import gc
 import os
 import tempfile
 from importlib.util import find_spec
@@ -177,6 +178,13 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.markexpr = " and ".join(filter(None, (asked, *(f"not {mark}" for mark in left_out))))
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage from now on, and not among the modules: half a million objects that stay."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)
