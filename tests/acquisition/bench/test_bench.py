@@ -3,16 +3,14 @@
 import itertools
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import CheckFailed, ConfigurationError, InstrumentError, InstrumentLost, open_bench
+from tests.changed import changed
+from vibench.acquisition import CheckFailed, ConfigurationError, InstrumentLost, open_bench
 from vibench.acquisition.bench.bench import BenchKind
-from vibench.acquisition.drivers import AFG1022X, DaqmxDigitizer
 from vibench.acquisition.errors import DataLost, InstrumentBusy
-from vibench.acquisition.instruments import Digitizer, FunctionGenerator
 from vibench.acquisition.rig import (
     CalibrationRule,
     calibrations,
@@ -26,22 +24,15 @@ from vibench.acquisition.rig._knobs import confirm_by_asking
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
-ROOT = Path(__file__).parents[3]
-CONFIGS = ROOT / "hardware_configs"
 _serials = itertools.count(1)
 
 
 @pytest.fixture
 def rig():
     """The virtual rig at a low rate, with a generator of its own on the bus."""
-    rig = load_rig(CONFIGS / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     resource = f"USB0::0x0699::0x0353::B{next(_serials):04d}::INSTR"
-    return rig.model_copy(
-        update={
-            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
-            "generator": rig.generator.model_copy(update={"resource": resource}),
-        }
-    )
+    return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
 
 
 @pytest.fixture
@@ -53,9 +44,7 @@ def virtual(rig):
 @pytest.fixture
 def laboratory(rig, virtual):
     """The same rig as a laboratory sees it: instruments at addresses, nothing said of a simulation."""
-    return rig.model_copy(
-        update={"virtual": None, "daq": rig.daq.model_copy(update={"server": virtual.daq_address})}
-    )
+    return changed(rig, virtual=None, daq={"server": virtual.daq_address})
 
 
 @contextmanager
@@ -88,10 +77,6 @@ class TestOpening:
             assert bench.confirmations.knobs == rig.knobs
             assert [channel.role.value for channel in bench.channels] == list(bench.digitizer.roles)
 
-    def test_a_bench_opens_from_a_file(self):
-        with open_bench(CONFIGS / "virtual_rig.toml") as bench:
-            assert bench.digitizer.sample_rate_hz == 51200
-
     def test_the_converter_reads_the_output_of_the_generator(self, rig):
         with open_bench(rig) as bench:
             bench.generator.load_sine(160.0, 1.0)
@@ -101,17 +86,8 @@ class TestOpening:
             drive_v = bench.digitizer.read(5120).volts[0] * bench.channels[0].units_per_volt
         assert np.std(drive_v) * np.sqrt(2) == pytest.approx(0.5 * rig.generator.terminal_factor(), rel=2e-3)
 
-    def test_the_drivers_keep_the_contract_of_the_bench(self, rig):
-        with open_bench(rig) as bench:
-            generator: FunctionGenerator = bench.generator
-            digitizer: Digitizer = bench.digitizer
-            assert isinstance(generator, AFG1022X)
-            assert isinstance(digitizer, DaqmxDigitizer)
-
     def test_a_missing_converter_leaves_the_generator_free(self, laboratory, virtual):
-        lost = laboratory.model_copy(
-            update={"daq": laboratory.daq.model_copy(update={"server": "127.0.0.1:9"})}
-        )
+        lost = changed(laboratory, daq={"server": "127.0.0.1:9"})
         with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
             open_bench(lost, confirm_simulated, CalibrationRule.WAIVED)
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
@@ -166,11 +142,6 @@ class TestLeaving:
         assert caught.value is error
         assert output_of(virtual) == b"0\n"
 
-    def test_an_overrun_silences_the_generator(self, laboratory, virtual):
-        with pytest.raises(DataLost, match=r"has a hole and ends here"):
-            read_after(laboratory, virtual.faults.overrun)
-        assert output_of(virtual) == b"0\n"
-
     def test_a_dead_daq_server_silences_the_bench_and_notes_the_failed_close(self, laboratory, virtual):
         with pytest.raises(InstrumentLost) as caught:
             read_after(laboratory, virtual.faults.lose_daq_server)
@@ -223,14 +194,14 @@ class TestCalibration:
 
     def test_only_the_sensor_of_each_input_is_checked(self, rig):
         left = tuple(each for each in rig.daq.channels if each.role.value != "base_acceleration")
-        bare = rig.model_copy(update={"daq": rig.daq.model_copy(update={"channels": left})})
+        bare = changed(rig, daq={"channels": left})
         named = [each.what for each in calibrations(bare, rig.vibrometer.calibrated)]
         assert not any("IEPE" in each for each in named)
         assert any("PSV-500" in each for each in named)
 
     def test_playback_needs_no_valid_calibration(self, laboratory):
         old = aged(laboratory, "2001-01-01")
-        played = old.model_copy(update={"daq": old.daq.model_copy(update={"driver": "file"})})
+        played = changed(old, daq={"driver": "file"})
         with pytest.raises(ConfigurationError, match="none is named"):
             open_bench(played, confirm_simulated)
 
@@ -252,7 +223,7 @@ class TestKnobs:
     def test_a_knob_sheet_with_other_settings_is_refused(self, rig, tmp_path):
         path = tmp_path / "knobs.toml"
         save_knob_sheet(confirm_simulated(rig.knobs), path)
-        turned = rig.model_copy(update={"amplifier": rig.amplifier.model_copy(update={"gain_db": 20.0})})
+        turned = changed(rig, amplifier={"gain_db": 20.0})
         with pytest.raises(CheckFailed, match=r"does not confirm Bruel & Kjaer 2706 gain at 20 dB"):
             confirm_by_sheet(path)(turned.knobs)
 
@@ -269,19 +240,6 @@ class TestKnobs:
         with pytest.raises(CheckFailed, match=r"Nobody sits at this terminal") as caught:
             open_bench(laboratory, calibration=CalibrationRule.WAIVED)
         assert all(f"{knob.setting} at {knob.value}" in str(caught.value) for knob in laboratory.knobs)
-
-
-class TestConfigurationFiles:
-    def test_the_laboratory_configuration_is_valid_and_real(self):
-        assert load_rig(CONFIGS / "lab_rig.toml").virtual is None
-
-    def test_a_missing_file_is_named(self, tmp_path):
-        with pytest.raises(ConfigurationError, match=r"nowhere\.toml"):
-            open_bench(tmp_path / "nowhere.toml")
-
-    def test_the_laboratory_bench_names_the_missing_instrument(self):
-        with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver"):
-            open_bench(CONFIGS / "lab_rig.toml", confirm_simulated, CalibrationRule.WAIVED)
 
 
 def aged(rig, day):

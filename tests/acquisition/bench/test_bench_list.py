@@ -1,19 +1,15 @@
 """What can be put on a bench is found, and what cannot be searched is said."""
 
-from pathlib import Path
-
 import pytest
 
 from vibench.acquisition import list_instruments
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
 
-ROOT = Path(__file__).parents[3]
-
 
 @pytest.fixture
 def virtual():
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     generator = rig.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::L0001::INSTR"})
     with VirtualRig(rig.model_copy(update={"generator": generator})) as running:
         yield running

@@ -13,7 +13,7 @@ from vibench.acquisition.bench.bench import BenchLock
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.rig import load_rig
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "lab_rig.toml")
+RIG = load_rig("lab_rig")
 NOBODY = 65534
 posix = pytest.mark.skipif(not hasattr(os, "fork"), reason="modes and links as POSIX has them")
 

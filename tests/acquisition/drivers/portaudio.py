@@ -13,6 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from tests.changed import changed
 from vibench.acquisition.rig import OutputConfig
 from vibench.virtual_rig.world.wiring import Coupling, Input
 
@@ -55,13 +56,7 @@ def card_rig(rig, **options):
         "driver": "soundcard", "device": CARD, "product": "sound card", "sample_rate_hz": RATE_HZ,
         "channels": channels, "output": output, "options": given,
     }  # fmt: skip
-    return rig.model_copy(
-        update={
-            "generator": rig.generator.model_copy(update={"driver": "none", "resource": ""}),
-            "accelerometer": rig.accelerometer.model_copy(update={"iepe": "no"}),
-            "daq": rig.daq.model_copy(update=daq),
-        }
-    )
+    return changed(rig, generator={"driver": "none", "resource": ""}, accelerometer={"iepe": "no"}, daq=daq)
 
 
 class PortAudio:

@@ -51,13 +51,8 @@ class TestOpening:
         generator.close()
 
     def test_opening_resets_the_generator_to_a_quiet_sine(self, plugged):
-        for message in (
-            "SOUR1:VOLT 3VPP",
-            "SOUR1:VOLT:OFFS 0.5",
-            "SOUR1:FUNC RAMP",
-            "OUTP1 ON",
-        ):
-            plugged.instrument.execute(message.encode())
+        for message in (b"SOUR1:VOLT 3VPP", b"SOUR1:VOLT:OFFS 0.5", b"SOUR1:FUNC RAMP", b"OUTP1 ON"):
+            plugged.instrument.execute(message)
         plugged.instrument.configure(1, replace(plugged.instrument.settings(1), mode=RunMode.AM))
         generator = AFG1022X.open(plugged.config)
         state = plugged.instrument.settings(1)
@@ -283,9 +278,16 @@ class TestFaults:
         with pytest.raises(SettingRefused, match=r"1024 points were put in its memory.*1023 agree"):
             generator.load_waveform(SINE, 1.0, 0.1)
 
-    def test_a_corrupted_answer_is_an_error_and_silences(self, plugged, playing):
-        plugged.instrument.corrupt_next_reply()
-        with pytest.raises(InstrumentError, match=r"answered SYST:ERR\?"):
+    @pytest.mark.parametrize(
+        ("spoil", "said"),
+        [
+            (lambda instrument: instrument.corrupt_next_reply(), r"answered SYST:ERR\?"),
+            (lambda instrument: instrument.delay_next_reply(10.0), "did not answer"),
+        ],
+    )
+    def test_a_corrupted_or_late_answer_is_an_error_and_silences(self, plugged, playing, spoil, said):
+        spoil(plugged.instrument)
+        with pytest.raises(InstrumentError, match=said):
             playing.set_frequency(261.0)
         assert not plugged.is_on
 
@@ -301,12 +303,6 @@ class TestFaults:
         assert plugged.is_on
         assert plugged.instrument.settings(1).frequency_hz == 262.0
 
-    def test_a_late_answer_is_an_error_and_silences(self, plugged, playing):
-        plugged.instrument.delay_next_reply(10.0)
-        with pytest.raises(InstrumentError, match=r"did not answer"):
-            playing.set_frequency(261.0)
-        assert not plugged.is_on
-
     def test_a_pulled_cable_advises_the_operator_to_switch_the_amplifier_off(self, plugged, playing):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON.*Turn the amplifier"):
@@ -314,19 +310,12 @@ class TestFaults:
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"):
             playing.stop()
 
-    def test_a_short_disconnection_ends_in_silence(self, plugged, playing):
+    @pytest.mark.parametrize("act", [lambda generator: generator.set_amplitude(0.2), AFG1022X.close])
+    def test_a_lost_instrument_raises_and_a_later_stop_works(self, plugged, playing, act):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost):
-            playing.set_amplitude(0.2)
+            act(playing)
         assert plugged.is_on
-        plugged.usb.plug_cable()
-        playing.stop()
-        assert not plugged.is_on
-
-    def test_closing_a_lost_instrument_raises_and_a_later_stop_works(self, plugged, playing):
-        plugged.usb.pull_cable()
-        with pytest.raises(InstrumentLost):
-            playing.close()
         plugged.usb.plug_cable()
         playing.stop()
         assert not plugged.is_on

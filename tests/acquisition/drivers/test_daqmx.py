@@ -1,7 +1,6 @@
 """The DAQmx driver over the real nidaqmx client, against the virtual rig's DAQ."""
 
 from contextlib import ExitStack
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ from hypothesis import given, strategies as st
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
+from tests.changed import changed
 from vibench.acquisition import AcquisitionError, ConfigurationError, InstrumentError, InstrumentLost
 from vibench.acquisition.drivers import DaqmxDigitizer
 from vibench.acquisition.drivers._daqmx import linear_step_v
@@ -17,7 +17,6 @@ from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
 
-ROOT = Path(__file__).parents[3]
 RATE_HZ = 5120.0
 # Step in a sine of 100 Hz and 0.5 V where one sample is missing: 61 mV. Two clocks that differ by
 # some ppm leave 1.4 mV in half a second.
@@ -25,7 +24,7 @@ A_LOST_SAMPLE_V = 0.5 * 2 * np.pi * 100.0 / RATE_HZ
 
 
 def with_daq(rig, **changes):
-    return rig.model_copy(update={"daq": rig.daq.model_copy(update=changes)})
+    return changed(rig, daq=changes)
 
 
 def with_channel(rig, number, **changes):
@@ -36,12 +35,8 @@ def with_channel(rig, number, **changes):
 
 @pytest.fixture(scope="module")
 def configured():
-    rig = with_daq(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"), sample_rate_hz=RATE_HZ)
-    return rig.model_copy(
-        update={
-            "generator": rig.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::DAQ1::INSTR"})
-        }
-    )
+    rig = with_daq(load_rig("virtual_rig"), sample_rate_hz=RATE_HZ)
+    return changed(rig, generator={"resource": "USB0::0x0699::0x0353::DAQ1::INSTR"})
 
 
 @pytest.fixture(scope="module")
@@ -179,12 +174,6 @@ class TestStates:
         with pytest.raises(InstrumentError, match=r"closed"):
             digitizer.start()
 
-    def test_a_closed_device_is_free_again(self, rig):
-        for _ in range(3):
-            digitizer = DaqmxDigitizer.open(rig)
-            digitizer.start()
-            digitizer.close()
-
 
 class TestConfiguration:
     def test_coupling_and_sensor_current_reach_the_device(self, rig, digitizer):
@@ -194,24 +183,20 @@ class TestConfiguration:
         assert np.ptp(digitizer.read(1000).volts[2]) > 0
 
     @pytest.mark.parametrize(
-        ("change", "kind", "complaint"),
+        ("change", "complaint"),
         [
-            (lambda rig: with_daq(rig, device="Dev9"), ConfigurationError, r"no device of that name"),
-            (lambda rig: with_daq(rig, product="USB-6211"), ConfigurationError, r"is a NI 9234"),
-            (lambda rig: with_channel(rig, 0, physical="ai7"), ConfigurationError, r"no such channel"),
-            (lambda rig: with_channel(rig, 0, range_v=50.0), ConfigurationError, r"does not support"),
-            (lambda rig: with_channel(rig, 2, iepe_current_a=0.5), ConfigurationError, r"does not support"),
-            (lambda rig: with_daq(rig, sample_rate_hz=1e6), ConfigurationError, r"does not support"),
+            (lambda rig: with_daq(rig, device="Dev9"), r"no device of that name"),
+            (lambda rig: with_daq(rig, product="USB-6211"), r"is a NI 9234"),
+            (lambda rig: with_channel(rig, 0, physical="ai7"), r"no such channel"),
+            (lambda rig: with_channel(rig, 0, range_v=50.0), r"does not support"),
+            (lambda rig: with_channel(rig, 2, iepe_current_a=0.5), r"does not support"),
+            (lambda rig: with_daq(rig, sample_rate_hz=1e6), r"does not support"),
         ],
     )
-    def test_unsupported_settings_are_reported_when_the_bench_opens(self, rig, change, kind, complaint):
-        with pytest.raises(kind, match=complaint):
+    def test_unsupported_settings_are_reported_when_the_bench_opens(self, rig, change, complaint):
+        with pytest.raises(ConfigurationError, match=complaint):
             DaqmxDigitizer.open(change(rig))
         DaqmxDigitizer.open(rig).close()  # nothing stayed reserved
-
-    def test_no_server_is_a_lost_instrument(self, configured):
-        with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
-            DaqmxDigitizer.open(with_daq(configured, server="127.0.0.1:9"))
 
     def test_a_missing_driver_is_reported(self, configured):
         with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver.*daq\.server"):
@@ -301,15 +286,8 @@ class TestScaling:
     @pytest.mark.parametrize(
         "coefficients",
         [
-            (),
-            (0.0,),
-            (0.0, 0.0),
-            (0.0, -1e-6),
-            (0.0, 2e-9),
-            (3.3e-7, 6e-7),
-            (6e-7, 6e-7),
-            (0.0, 6e-7, 1e-13),
-            (0.0, 6e-7, 0.0, 1e-20),
+            *((), (0.0,), (0.0, 0.0), (0.0, -1e-6), (0.0, 2e-9), (3.3e-7, 6e-7), (6e-7, 6e-7)),
+            *((0.0, 6e-7, 1e-13), (0.0, 6e-7, 0.0, 1e-20)),
         ],
     )
     def test_a_shifted_or_bent_scaling_has_none(self, coefficients):

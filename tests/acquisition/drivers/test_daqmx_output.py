@@ -1,7 +1,6 @@
 """The streamed output over the real nidaqmx client, heard through the virtual rig's own inputs."""
 
 from contextlib import ExitStack
-from pathlib import Path
 
 import nidaqmx
 import numpy as np
@@ -16,7 +15,6 @@ from vibench.acquisition.instruments import AnalogOutput, IdleOutput
 from vibench.acquisition.rig import OutputConfig, load_rig
 from vibench.virtual_rig import VirtualRig
 
-ROOT = Path(__file__).parents[3]
 RATE_HZ = 12_800.0
 CONFIG = OutputConfig(physical="ao0", limit_v=2.0, sample_rate_hz=RATE_HZ, ahead_s=0.5, source="test")
 NOISE_V = 5e-3
@@ -30,7 +28,7 @@ def virtual(rig):
 
 @pytest.fixture
 def rig():
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     # Only the drive is wanted, and the USB-4431 feeds sensors with another current than the NI 9234.
     daq = rig.daq.model_copy(
         update={

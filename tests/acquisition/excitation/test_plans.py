@@ -101,10 +101,7 @@ def test_an_unknown_key_is_refused():
         (
             WhiteNoise,
             {"band_start_hz": 10, "band_stop_hz": 1000, "repetition_hz": 0.25},
-            (
-                "repetition_hz = 0.25 puts the first image of 1000 Hz at 1048 Hz, too near the band; "
-                "repetition_hz must be at least 0.3662"
-            ),
+            "the first image of 1000 Hz at 1048 Hz, too near the band; repetition_hz must be at least 0.3662",
         ),
         (
             WhiteNoise,
@@ -127,10 +124,7 @@ def test_an_unknown_key_is_refused():
         (
             OddMultisine,
             {"band_start_hz": 20, "band_stop_hz": 800, "excited_lines": (21, 22)},
-            (
-                "excited_lines has 22, which is not an odd harmonic in the band; "
-                "odd lines from 21 to 799 are allowed"
-            ),
+            "has 22, which is not an odd harmonic in the band; odd lines from 21 to 799 are allowed",
         ),
     ],
 )
@@ -300,16 +294,8 @@ class TestStreamedNoise:
         assert np.mean(samples**4) / np.mean(samples**2) ** 2 == pytest.approx(3.0, abs=0.1)
 
     def test_it_is_stationary_from_the_first_sample(self):
-        starts = [
-            StreamedNoise(amplitude_vpp=2, band_start_hz=50, band_stop_hz=800, duration_s=1, seed=seed)
-            .source.samples(0, 16, self.RATE)
-            .std()
-            for seed in range(200)
-        ]
-        later = [
-            StreamedNoise(amplitude_vpp=2, band_start_hz=50, band_stop_hz=800, duration_s=1, seed=seed)
-            .source.samples(5000, 16, self.RATE)
-            .std()
-            for seed in range(200)
-        ]
-        assert np.mean(starts) == pytest.approx(np.mean(later), rel=0.25)
+        draws = [self.PLAN.model_copy(update={"seed": seed}).source for seed in range(200)]
+        starts, later = (
+            np.mean([draw.samples(first, 16, self.RATE).std() for draw in draws]) for first in (0, 5000)
+        )
+        assert starts == pytest.approx(later, rel=0.25)

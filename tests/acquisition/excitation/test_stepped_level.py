@@ -1,7 +1,5 @@
 """Levels at one frequency: which ones, how long, how loud, and what is refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -9,8 +7,6 @@ from pydantic import ValidationError
 from vibench.acquisition import LimitExceeded
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SteppedLevel, phases, require_within_limits
 from vibench.acquisition.rig import load_rig
-
-ROOT = Path(__file__).parents[3]
 
 
 def plan(**changed):
@@ -46,7 +42,7 @@ def test_the_level_changes_without_a_ramp_and_without_a_break_in_phase():
 
 
 def test_limits_are_checked_at_the_highest_level():
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     loud = plan(amplitude_vpp=10.0, frequency_hz=20.0)
     with pytest.raises(LimitExceeded):
         require_within_limits(Measurement(name="level", excitation=loud), rig)

@@ -10,6 +10,14 @@ from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.host.toml_file import FrozenModel, load_toml
 
 
+def refusal(load, path, text, *kind):
+    """What is said of a file of that text."""
+    path.write_text(text)
+    with pytest.raises(ConfigurationError) as refused:
+        load(path, *kind)
+    return str(refused.value)
+
+
 class Steps(FrozenModel):
     start: PositiveFloat
     step: PositiveFloat
@@ -25,12 +33,9 @@ def test_a_key_named_as_a_kind_of_value_is_reported_by_its_name(tmp_path, key):
         (f'values = [1.0]\n"{key}" = 1\n', f"{key} is not a known key"),
         (f'[values]\nstart = 1.0\nstep = 1.0\n"{key}" = 1\n', f"values.{key} is not a known key"),
     ):
-        file = tmp_path / "plan.toml"
-        file.write_text(text)
-        with pytest.raises(ConfigurationError) as refused:
-            load_toml(file, Plan)
-        assert told in str(refused.value)
-        assert str(refused.value).count("known key") == 1
+        said = refusal(load_toml, tmp_path / "plan.toml", text, Plan)
+        assert told in said
+        assert said.count("known key") == 1
 
 
 @pytest.mark.parametrize(
@@ -42,12 +47,10 @@ def test_a_key_named_as_a_kind_of_value_is_reported_by_its_name(tmp_path, key):
     ],
 )
 def test_an_excitation_of_no_known_kind_is_refused_with_the_known_ones(tmp_path, excitation, told):
-    file = tmp_path / "campaign.toml"
-    file.write_text(f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n')
-    with pytest.raises(ConfigurationError) as refused:
-        load_campaign(file)
-    assert f": {told}" in str(refused.value)
-    assert "tag" not in str(refused.value)
+    text = f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n'
+    said = refusal(load_campaign, tmp_path / "campaign.toml", text)
+    assert f": {told}" in said
+    assert "tag" not in said
 
 
 @pytest.mark.parametrize(
@@ -65,11 +68,9 @@ def test_an_excitation_of_no_known_kind_is_refused_with_the_known_ones(tmp_path,
 )
 def test_the_intended_kind_determines_the_reported_key(tmp_path, text, told):
     file = tmp_path / "plan.toml"
-    file.write_text(text)
-    with pytest.raises(ConfigurationError) as refused:
-        load_toml(file, Plan)
-    assert str(refused.value).startswith(f"{file}: {told}")
-    assert ";" not in str(refused.value)
+    said = refusal(load_toml, file, text, Plan)
+    assert said.startswith(f"{file}: {told}")
+    assert ";" not in said
 
 
 @pytest.mark.parametrize(
@@ -83,12 +84,10 @@ def test_the_intended_kind_determines_the_reported_key(tmp_path, text, told):
 )
 def test_a_newcomers_campaign_is_refused_in_words_of_toml(tmp_path, change, told):
     given = {"name": '"mine"', change[0]: change[1]}
-    file = tmp_path / "campaign.toml"
-    file.write_text("\n".join(f"{key} = {value}" for key, value in given.items()))
-    with pytest.raises(ConfigurationError) as refused:
-        load_campaign(file)
-    assert told in str(refused.value)
-    assert "pattern" not in str(refused.value)
+    text = "\n".join(f"{key} = {value}" for key, value in given.items())
+    said = refusal(load_campaign, tmp_path / "campaign.toml", text)
+    assert told in said
+    assert "pattern" not in said
 
 
 @pytest.mark.parametrize(
@@ -116,7 +115,4 @@ def test_errors_describe_values_without_python_terms(tmp_path, text, told):
         began: AwareDatetime | None = None
 
     file = tmp_path / "words.toml"
-    file.write_text(text)
-    with pytest.raises(ConfigurationError) as refused:
-        load_toml(file, Words)
-    assert str(refused.value).startswith(f"{file}: {told}")
+    assert refusal(load_toml, file, text, Words).startswith(f"{file}: {told}")

@@ -202,7 +202,7 @@ class TestEstimates:
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_a_shipped_campaign_keeps_the_limits_of_the_virtual_rig(path):
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     for _, measurement in load_campaign(path).recordings():
         require_within_limits(measurement, rig)
 

@@ -16,7 +16,7 @@ QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.t
 
 @pytest.fixture(scope="module")
 def rig():
-    return load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    return load_rig("virtual_rig")
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -71,6 +71,6 @@ def test_holdable_growth_follows_from_the_feedback_loop_of_the_rig(rig):
 
 def test_a_fast_loop_branch_has_no_growth_time():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
-    fast = load_rig(ROOT / "hardware_configs" / "virtual_rig_controller.toml")
+    fast = load_rig("virtual_rig_controller")
     (branch,) = load_campaign(ROOT / "campaigns" / "branch.toml").measurements
     assert preview_measurement(branch, fast).least_growth_time_s is None

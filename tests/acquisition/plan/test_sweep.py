@@ -33,12 +33,7 @@ class TestOrder:
         plan = campaign(
             amplitude_vpp=[0.5, 1.5], frequency_hz=[200, 210], order=["frequency_hz", "amplitude_vpp"]
         )
-        assert names(plan) == [
-            "line-200hz-0p5vpp",
-            "line-200hz-1p5vpp",
-            "line-210hz-0p5vpp",
-            "line-210hz-1p5vpp",
-        ]
+        assert names(plan) == [f"line-{hz}hz-{level}vpp" for hz in (200, 210) for level in ("0p5", "1p5")]
 
     def test_repetitions_are_an_axis_like_others(self):
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
@@ -47,10 +42,7 @@ class TestOrder:
     def test_each_excitation_combines_template_and_own_values(self):
         plan = campaign(
             measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
-            excitations=[
-                SWEEP,
-                {"kind": "stepped_sine", "frequencies_hz": [200, 210]},
-            ],
+            excitations=[SWEEP, {"kind": "stepped_sine", "frequencies_hz": [200, 210]}],
             direction=["up", "down"],
         )
         by_name = {point.name: point.measurement.excitation for point in plan.points()}
@@ -82,13 +74,10 @@ excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s
         assert {point.measurement.ramp_s for point in points} == {0.7}
 
     def test_logarithmic_levels_have_equal_ratios(self):
-        plan = campaign(
-            amplitude_vpp={"start": 0.1, "stop": 1.0, "count": 3, "spacing": "logarithmic"},
-            frequency_hz=[200],
-        )
-        assert [point.measurement.excitation.amplitude_vpp for point in plan.points()] == pytest.approx(
-            [0.1, 0.1**0.5, 1.0]
-        )
+        levels = {"start": 0.1, "stop": 1.0, "count": 3, "spacing": "logarithmic"}
+        plan = campaign(amplitude_vpp=levels, frequency_hz=[200])
+        found = [point.measurement.excitation.amplitude_vpp for point in plan.points()]
+        assert found == pytest.approx([0.1, 0.1**0.5, 1.0])
 
 
 class TestChains:
@@ -168,40 +157,29 @@ class TestChains:
         assert load_campaign(path).points() == plan.points()
 
 
+def by(start, stop, step):
+    return {"start": start, "stop": stop, "step": step}
+
+
+POINT = {"frequency_hz": [200], "amplitude_vpp": [1]}
+
+
 @pytest.mark.parametrize(
     ("sweep", "said"),
     [
+        ({**POINT, "frequency_hz": [200, 200.00000001]}, "two measurements would be recorded as"),
         (
-            {"frequency_hz": [200, 200.00000001], "amplitude_vpp": [1]},
-            "two measurements would be recorded as",
-        ),
-        (
-            {
-                "frequency_hz": {"start": 1, "stop": 1000, "step": 1},
-                "amplitude_vpp": {"start": 0.1, "stop": 2, "step": 0.1},
-            },
+            {"frequency_hz": by(1, 1000, 1), "amplitude_vpp": by(0.1, 2, 0.1)},
             r"has 20000 points \(20 amplitude_vpp x 1000 frequency_hz\), allowed are 10000",
         ),
-        ({"frequency_hz": {"start": 1, "stop": 1000, "step": 1e-9}}, "values, allowed are 10000"),
-        ({"frequency_hz": {"start": 300, "stop": 200, "step": 1}}, "is not above start"),
+        ({"frequency_hz": by(1, 1000, 1e-9)}, "values, allowed are 10000"),
+        ({"frequency_hz": by(300, 200, 1)}, "is not above start"),
         ({"frequency_hz": [200]}, "line-200hz: excitation.dwell.amplitude_vpp is missing"),
         ({"frequency_hz": [200], "amplitude_vpp": [5000]}, "less than or equal to 1000"),
-        (
-            {"frequency_hz": [200], "amplitude_vpp": [1], "order": ["frequency_hz"]},
-            "leaves out 'amplitude_vpp'",
-        ),
-        (
-            {"frequency_hz": [200], "amplitude_vpp": [1], "continue_from_previous": "amplitude_vpp"},
-            "must be the innermost axis",
-        ),
-        (
-            {"frequency_hz": [200], "amplitude_vpp": [1], "continue_from_previous": "repetition"},
-            "is not an axis for a chain",
-        ),
-        (
-            {"frequency_hz": [200], "amplitude_vpp": [1], "direction": ["up"]},
-            "does not apply to the excitation 'dwell'",
-        ),
+        ({**POINT, "order": ["frequency_hz"]}, "leaves out 'amplitude_vpp'"),
+        ({**POINT, "continue_from_previous": "amplitude_vpp"}, "must be the innermost axis"),
+        ({**POINT, "continue_from_previous": "repetition"}, "is not an axis for a chain"),
+        ({**POINT, "direction": ["up"]}, "does not apply to the excitation 'dwell'"),
         (
             {
                 "measurement": {"excitation": SWEEP},
@@ -210,14 +188,10 @@ class TestChains:
             },
             "leads from dwell to dwell",
         ),
-        ({"frequency_hz": [200], "amplitude_vpp": [1], "name": "x" * 60}, "give the sweep a shorter name"),
-        ({"frequency_hz": [200], "amplitude_vpp": [1], "command": "rm"}, "command is not a known key"),
+        ({**POINT, "name": "x" * 60}, "give the sweep a shorter name"),
+        ({**POINT, "command": "rm"}, "command is not a known key"),
         (
-            {
-                "frequency_hz": {"start": 1, "stop": 1200, "step": 1},
-                "amplitude_vpp": [1],
-                "continue_from_previous": "frequency_hz",
-            },
+            {**POINT, "frequency_hz": by(1, 1200, 1), "continue_from_previous": "frequency_hz"},
             "a chain of 1200 points was given, allowed are 1000",
         ),
     ],

@@ -27,17 +27,9 @@ def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (
-            "gain_db = 10.0",
-            "gain_db = 100.0",
-            r"bench\.toml: amplifier\.gain_db = 100\.0: .*less than or equal to 60",
-        ),
+        ("gain_db = 10.0", "gain_db = 1e2", r"bench\.toml: amplifier\.gain_db = 100\.0: .*or equal to 60"),
         ("gain_db = 10.0", 'gain_db = "10 dB"', r"amplifier\.gain_db = '10 dB': give a number"),
-        (
-            "gain_db = 10.0",
-            "gain = 10.0",
-            r"amplifier\.gain_db is missing.*amplifier\.gain is not a known key",
-        ),
+        ("gain_db = 10.0", "gain = 10.0", r"gain_db is missing.*amplifier\.gain is not a known key"),
         ("low_cut_hz = 0.3", "low_cut_hz = 3e5", "low_cut_hz = 300000 must lie below high_cut_hz"),
         ("moving_mass_kg = 0.057", "moving_mass_kg = 1.7e308", "too large to be computed with"),
         ("delay_s = 8e-6", "delay_s = -1.0", r"vibrometer\.delay_s = -1\.0: .*greater than or equal to 0"),
@@ -66,13 +58,9 @@ def test_a_wrong_configuration_is_refused_with_its_key(tmp_path, old, new, said)
         (
             'plays = "tones_and_streams"',
             'plays = "all"',
-            r"daq\.output\.plays = 'all': .*'streams' or 'tones_and_streams'",
+            r"plays = 'all': .*'streams' or 'tones_and_streams'",
         ),
-        (
-            "sample_rate_hz = 51200\n# What",
-            "sample_rate_hz = 0\n# What",
-            r"output\.sample_rate_hz = 0: .*0",
-        ),
+        ("sample_rate_hz = 51200\n# What", "sample_rate_hz = 0\n# What", r"output\.sample_rate_hz = 0: .*0"),
     ],
 )
 def test_a_wrong_output_is_refused_with_its_key(tmp_path, old, new, said):

@@ -1,25 +1,22 @@
 """The chain without a specimen against closed forms; with one: tests/sim/shaker/test_linear_motion.py."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from tests.changed import changed
 from vibench.acquisition.rig import BaseQuantity, OnTable, RigModel, load_rig, shaker_of, suspended_mass_kg
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig("virtual_rig")
 MODEL = RigModel(RIG, OnTable.NOTHING)
 
 
 def with_amplifier(**changes):
-    return RigModel(
-        RIG.model_copy(update={"amplifier": RIG.amplifier.model_copy(update=changes)}), OnTable.NOTHING
-    )
+    return RigModel(changed(RIG, amplifier=changes), OnTable.NOTHING)
 
 
 def with_shaker(**changes):
-    return RigModel(RIG.model_copy(update={"shaker": RIG.shaker.model_copy(update=changes)}), OnTable.NOTHING)
+    return RigModel(changed(RIG, shaker=changes), OnTable.NOTHING)
 
 
 def test_a_direct_coupled_amplifier_holds_the_table_at_its_static_deflection():
