@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from tests.changed import changed
 from vibench.acquisition import Block, Identity
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.instruments import IdleOutput, Samples, Sweep
@@ -25,7 +26,6 @@ from vibench.acquisition.rig import (
     load_rig,
 )
 
-ROOT = Path(__file__).parent.parent.parent
 SAMPLE_RATE_HZ = 5120.0
 Fault = Callable[[], BaseException]
 
@@ -354,10 +354,8 @@ class LoopbackBench:
 @pytest.fixture(scope="session")
 def rig() -> Rig:
     """The default rig, sampling slowly; nobody can change it."""
-    shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
-    return shipped.model_copy(
-        update={"daq": shipped.daq.model_copy(update={"sample_rate_hz": SAMPLE_RATE_HZ})}
-    )
+    shipped = load_rig("virtual_rig")
+    return changed(shipped, daq={"sample_rate_hz": SAMPLE_RATE_HZ})
 
 
 @pytest.fixture
@@ -370,7 +368,7 @@ def bench(rig: Rig) -> LoopbackBench:
 def streaming_bench(rig: Rig) -> LoopbackBench:
     """The same loop with an analogue output."""
     output = OutputConfig(physical="ao0", limit_v=5.0, sample_rate_hz=SAMPLE_RATE_HZ, source="test")
-    with_output = rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
+    with_output = changed(rig, daq={"output": output})
     bench = LoopbackBench(with_output)
     bench.output = LoopbackOutput(bench.world)
     return bench

@@ -2,28 +2,22 @@
 
 import itertools
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
+from tests.changed import changed
 from vibench.acquisition import open_bench
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated, load_rig
 from vibench.virtual_rig import VirtualRig
 
-ROOT = Path(__file__).parents[3]
 _serials = itertools.count(1)
 
 
 @pytest.fixture
 def rig():
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = load_rig("virtual_rig")
     resource = f"USB0::0x0699::0x0353::R{next(_serials):04d}::INSTR"
-    return rig.model_copy(
-        update={
-            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
-            "generator": rig.generator.model_copy(update={"resource": resource}),
-        }
-    )
+    return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,6 @@ from vibench.acquisition.errors import CheckStopped, InstrumentError, RunStalled
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
-
-ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -196,7 +193,7 @@ def test_the_report_is_a_table_and_round_trips_through_json(checked, rig, tmp_pa
 
 
 def test_a_bench_with_an_output_for_sines_is_checked_through_that_output(tmp_path):
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig_streaming.toml")
+    rig = load_rig("virtual_rig_streaming")
     with open_bench(rig) as bench:
         report = bench_report(bench, tmp_path)
     assert failed(report) == set()

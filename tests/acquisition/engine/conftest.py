@@ -20,7 +20,6 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig, load_rig
 
-ROOT = Path(__file__).parent.parent.parent.parent
 PATIENCE_S = 60.0
 LOOK_S = 0.01
 """Between two looks: whoever asks without a pause takes the time of the process that it waits for."""
@@ -34,7 +33,7 @@ def own_state(tmp_path_factory, monkeypatch) -> None:
 
 @pytest.fixture
 def shipped_rig() -> Rig:
-    return load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    return load_rig("virtual_rig")
 
 
 @pytest.fixture
@@ -85,14 +84,15 @@ def until_state(client: EngineClient, *states: EngineState) -> EngineStatus:
     return until(client, lambda status: status.state in states)
 
 
+def opened(client: EngineClient, rig: Rig) -> EngineStatus:
+    """Let an engine open a bench, and wait for it."""
+    client.open(rig)
+    return until_state(client, EngineState.READY)
+
+
 def campaign(*names: str, duration_s: float = 600.0) -> Campaign:
     """Long dwells: far longer than any test lets them last."""
-    excitation = {
-        "kind": "dwell",
-        "amplitude_vpp": 1.5,
-        "frequency_hz": 260,
-        "settle_s": 0.2,
-        "duration_s": duration_s,
-    }
+    excitation = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2}
+    excitation["duration_s"] = duration_s
     each = [{"name": name, "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": excitation} for name in names]
     return Campaign.model_validate({"name": "trial", "measurements": each})

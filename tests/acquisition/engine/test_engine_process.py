@@ -20,7 +20,6 @@ from vibench.acquisition import (
     LimitExceeded,
     RecordingError,
     StopLevel,
-    open_bench,
     open_recording,
 )
 from vibench.acquisition.bench.bench import BenchLock
@@ -43,7 +42,7 @@ from vibench.acquisition.plan import Campaign
 from vibench.acquisition.recording import RecordingState
 from vibench.virtual_rig import VirtualRig
 
-from .conftest import campaign, until, until_state, until_there
+from .conftest import campaign, opened, until, until_state, until_there
 
 SILENT_V = 0.02
 """Of the recorded drive: its noise, and the last stair of a ramp."""
@@ -61,8 +60,7 @@ def on_server(rig, virtual):
 
 
 def running(client, rig, tmp_path, *names):
-    client.open(rig)
-    until_state(client, EngineState.READY)
+    opened(client, rig)
     client.arm(campaign(*names or ("run",)), tmp_path)
     client.start()
     return until(client, lambda status: status.run is not None and status.run.segment == "dwell")
@@ -82,8 +80,7 @@ class TestTheJob:
     @pytest.mark.thorough
     def test_a_bench_is_opened_checked_armed_run_and_closed(self, client, shipped_rig, tmp_path):
         assert client.status().state is EngineState.CLOSED
-        client.open(shipped_rig)
-        bench = until_state(client, EngineState.READY).bench
+        bench = opened(client, shipped_rig).bench
         assert bench.is_simulated
         assert bench.identities["generator"].startswith("TEKTRONIX,AFG1022")
         client.check(tmp_path)
@@ -94,14 +91,8 @@ class TestTheJob:
             compared = [each.name for each in until_state(client, EngineState.READY).check.findings]
             assert any("since last time" in name for name in compared) is not is_new
         plan = client.arm(campaign("run", duration_s=3.0), tmp_path / "new")
-        assert [line.partition(":")[0] for line in plan.lines] == [
-            "What",
-            "Level",
-            "Limits",
-            "How long",
-            "Saved in",
-            "If nobody looks",
-        ]
+        titles = ["What", "Level", "Limits", "How long", "Saved in", "If nobody looks"]
+        assert [line.partition(":")[0] for line in plan.lines] == titles
         # What may break, not the length of a ramp or the points of a period.
         assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
         assert re.fullmatch(
@@ -127,9 +118,7 @@ class TestTheJob:
         with open_recording(tmp_path / "run.h5") as recording:
             first, last = newest_samples.first_sample, newest_samples.first_sample + 10_000
             recorded = recording.read("m0_velocity", first, last)
-            per_volt = next(
-                each for each in recording.channels if each.role == "m0_velocity"
-            ).physical_per_volt
+            per_volt = recording.channel("m0_velocity").physical_per_volt
         np.testing.assert_allclose(newest_samples.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
 
     @pytest.mark.thorough
@@ -162,8 +151,7 @@ class TestTheJob:
 
 class TestACheckIsStopped:
     def test_any_client_can_stop_a_check(self, client, shipped_rig, tmp_path):
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         client.check(tmp_path)
         client.stop(StopLevel.ABORT, "smoke in the laboratory")
         status = until_state(client, EngineState.READY)
@@ -172,8 +160,7 @@ class TestACheckIsStopped:
 
     def test_a_check_without_attendance_is_stopped(self, client, shared_engine, shipped_rig, tmp_path):
         as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
-        client.open(shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
         client.check(tmp_path)
         with EngineClient.attach(shared_engine.address) as visitor:
             status = until_state(visitor, EngineState.READY)
@@ -184,8 +171,7 @@ class TestACheckIsStopped:
         ]
 
     def test_a_stopped_check_prevents_its_campaign(self, client, shipped_rig, tmp_path):
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
         client.arm_request(orders)
         client.start()
@@ -206,21 +192,17 @@ class TestRefusals:
         client.disarm()
 
     def test_a_plan_past_a_limit_is_refused_when_it_is_armed(self, client, shipped_rig, tmp_path):
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         low = campaign("low").measurements[0]
         hard = low.excitation.model_copy(update={"amplitude_vpp": 10.0, "frequency_hz": 20.0})
-        plan = campaign("low").model_copy(
-            update={"measurements": (low.model_copy(update={"excitation": hard}),)}
-        )
+        plan = Campaign(name="hard", measurements=(low.model_copy(update={"excitation": hard}),))
         with pytest.raises(LimitExceeded, match="the stroke"):
             client.arm(plan, tmp_path)
         assert client.status().state is EngineState.READY
 
     def test_nothing_is_overwritten(self, client, shipped_rig, tmp_path):
         (tmp_path / "run.h5").write_bytes(b"precious")
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
             client.arm(campaign("run"), tmp_path)
 
@@ -265,20 +247,11 @@ class TestRefusals:
             assert str(os.getpid()) in fault.what
             mine.close()
 
-    def test_two_scripts_cannot_open_one_bench(self, shipped_rig):
-        with VirtualRig(shipped_rig) as virtual:
-            served = on_server(shipped_rig, virtual)
-            mine = BenchLock.of(served)
-            with pytest.raises(InstrumentBusy, match=f"in use by process {os.getpid()}"):
-                open_bench(served)
-            mine.close()
-
 
 @pytest.mark.thorough
 def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, client, shipped_rig, tmp_path):
     """On a busy computer sixty sweeps took more than the five seconds of any answer; the window gave up."""
-    client.open(shipped_rig)
-    until_state(client, EngineState.READY)
+    opened(client, shipped_rig)
     sweeps = [
         {
             "name": f"s{number}",
@@ -311,8 +284,7 @@ class TestNobodyLooks:
     @pytest.mark.thorough
     def test_a_drive_far_from_its_limits_gets_the_granted_patience(self, client, shipped_rig, tmp_path):
         """And one at its limits half a second, whatever was granted."""
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         quiet, loud = campaign("run"), campaign("run").model_dump()
         plan = client.arm_request(CampaignRequest(campaign=quiet, folder=tmp_path, longest_patience_s=3.0))
         assert 1.0 < plan.patience_s <= 3.0
@@ -370,8 +342,7 @@ class TestNobodyLooks:
     def test_an_unattended_run_continues_alone(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         client.arm(campaign("run", duration_s=15.0), tmp_path)
         client.start()
         path = tmp_path / "run.h5"
@@ -382,8 +353,7 @@ class TestNobodyLooks:
     def test_an_armed_engine_disarms_itself_without_requests(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
-        client.open(shipped_rig)
-        until_state(client, EngineState.READY)
+        opened(client, shipped_rig)
         client.arm(campaign("run"), tmp_path)
         # Visitors may look, come and go: they attend to nothing.
         with EngineClient.attach(shared_engine.address) as visitor:
@@ -403,11 +373,8 @@ class TestNobodyLooks:
         try:
             assert viewer.stdout.readline() == "running\n"
             viewer.send_signal(number)
-            reason = {
-                signal.SIGKILL: "the program that started|nobody has looked",
-                signal.SIGSTOP: "nobody has looked",
-            }
-            kept(tmp_path / "run.h5", reason[number])
+            ended = "the program that started|" if number is signal.SIGKILL else ""
+            kept(tmp_path / "run.h5", f"{ended}nobody has looked")
         finally:
             viewer.kill()
             viewer.wait()

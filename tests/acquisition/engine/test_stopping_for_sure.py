@@ -37,7 +37,7 @@ from vibench.acquisition.stopping.program import engines_folder
 from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import stop_path, write_stop_file
 
-from .conftest import ROOT, campaign, until, until_state, until_there
+from .conftest import campaign, until, until_state, until_there
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and descriptors as Linux has them")
 
@@ -63,7 +63,7 @@ def own_state(one_state):
 def process(one_state):
     """An unattended engine with an open bench: to start one takes seconds."""
     with start_engine(Supervision.UNATTENDED) as process:
-        process.client.open(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"))
+        process.client.open(load_rig("virtual_rig"))
         until_state(process.client, EngineState.READY)
         yield process
 

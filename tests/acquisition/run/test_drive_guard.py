@@ -7,13 +7,7 @@ from time import monotonic
 
 import pytest
 
-from vibench.acquisition import (
-    AcquisitionError,
-    InstrumentLost,
-    StopLevel,
-    StopSwitch,
-    open_recording,
-)
+from vibench.acquisition import AcquisitionError, InstrumentLost, StopLevel, StopSwitch, open_recording
 from vibench.acquisition.errors import RunStalled
 from vibench.acquisition.host.beside import Beside
 from vibench.acquisition.plan import Dwell, Measurement, RunState

@@ -19,14 +19,7 @@ from vibench.acquisition.host.shipped import shipped
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.rig import Rig, load_rig, specimen_of
-from vibench.analysis import (
-    Simulation,
-    analyse,
-    analyse_files,
-    budget_sentences,
-    budgets_of,
-    other_responses,
-)
+from vibench.analysis import Simulation, analyse, analyse_files, budget_sentences, budgets_of, other_responses
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.response import derivative_kernel
 from vibench.analysis.report import write_report

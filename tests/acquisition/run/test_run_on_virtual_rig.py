@@ -8,18 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition import (
-    open_bench,
-    open_recording,
-    run_measurement,
-)
-from vibench.acquisition.plan import (
-    Dwell,
-    Measurement,
-    RunState,
-    SineSweep,
-    WhiteNoise,
-)
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep, WhiteNoise
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.run.silence_watch import sine_amplitude

@@ -6,7 +6,6 @@ taken along through time: what a driver believes does not count.
 
 import re
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,7 +32,6 @@ except ModuleNotFoundError:  # Windows has no limit on the size of files
     resource = None
 
 FULL_BYTES = 1_000_000
-STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
 AMPLITUDE_VPP = 4.0
 PLAN = Measurement(
     name="run",
@@ -50,7 +48,7 @@ SILENT_V = 1e-3
 
 @pytest.fixture
 def rig():
-    return load_rig(STREAMING)
+    return load_rig("virtual_rig_streaming")
 
 
 def passes(virtual, duration_s):

@@ -1,11 +1,11 @@
 """Streamed noise on the whole path: plan, unmodified nidaqmx, a simulated USB-4431, the file."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.changed import changed
 from vibench.acquisition import CheckFailed, open_bench, open_recording, run_measurement
 from vibench.acquisition.excitation.sine_sweep import Hold
 from vibench.acquisition.plan import Measurement, RunState, SineSweep, StreamedNoise
@@ -14,8 +14,7 @@ from vibench.acquisition.rig import OutputUse, load_rig
 from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.virtual_rig.world.conversion import GROUP_DELAY_SAMPLES
 
-STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
-RIG = load_rig(STREAMING)
+RIG = load_rig("virtual_rig_streaming")
 RATE_HZ = RIG.daq.sample_rate_hz
 TERMINAL = RIG.generator.terminal_factor()
 DELAY = GROUP_DELAY_SAMPLES - 0.5
@@ -35,12 +34,7 @@ PLAN = Measurement(
 def paced(pace):
     """The rig at a pace; on the wall clock a busy computer may pause for two seconds, as on a real one."""
     output = RIG.daq.output.model_copy(update={"ahead_s": {"free": 0.5, "wall": 2.0}[pace]})
-    return RIG.model_copy(
-        update={
-            "virtual": RIG.virtual.model_copy(update={"pace": pace, "speed": 1.0}),
-            "daq": RIG.daq.model_copy(update={"output": output}),
-        }
-    )
+    return changed(RIG, virtual={"pace": pace, "speed": 1.0}, daq={"output": output})
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +76,7 @@ def played(streamed):
     ramp, hold = round(PLAN.ramp_s * RATE_HZ), round(PLAN.excitation.playing_s * RATE_HZ)
     rise = 0.5 * (1 - np.cos(np.pi * np.arange(ramp) / ramp))
     envelope = np.concatenate([rise, np.ones(hold), 1 - rise])
-    length = PLAN.model_copy(
-        update={"excitation": PLAN.excitation.model_copy(update={"duration_s": envelope.size / RATE_HZ})}
-    )
+    length = changed(PLAN, excitation={"duration_s": envelope.size / RATE_HZ})
     preview = length.excitation.preview(RATE_HZ).volts
     return TERMINAL * preview * envelope
 
@@ -130,7 +122,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     )  # fmt: skip
     output = RIG.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
     plan = PLAN.model_copy(update={"excitation": sweep})
-    with open_bench(RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"output": output})})) as bench:
+    with open_bench(changed(RIG, daq={"output": output})) as bench:
         run_measurement(bench, plan, tmp_path / "run.h5", LowLevelCheck.RECENTLY_PASSED)
     with open_recording(tmp_path / "run.h5") as recording:
         drive = recording.read("drive_voltage")
@@ -151,7 +143,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
 
 
 def test_an_amplifier_turned_up_is_found_by_the_check_through_the_output(tmp_path):
-    turned = RIG.model_copy(update={"amplifier": RIG.amplifier.model_copy(update={"gain_db": 20.0})})
+    turned = changed(RIG, amplifier={"gain_db": 20.0})
     with open_bench(turned) as bench:
         bench.rig = RIG
         with pytest.raises(CheckFailed, match="check the amplifier's gain"):

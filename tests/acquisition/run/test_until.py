@@ -1,9 +1,8 @@
 """Recordings that last until their results are known: the virtual rig, and the analysis beside the run."""
 
-from pathlib import Path
-
 import pytest
 
+from tests.changed import changed
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import (
     Dwell,
@@ -20,14 +19,12 @@ from vibench.acquisition.run.until import UntilWatch
 from vibench.acquisition.stopping.stop import Cause, StopRequest, StopSwitch
 from vibench.analysis import analyse
 
-CONFIGS = Path(__file__).parents[3] / "hardware_configs"
-
 
 @pytest.fixture
 def rig():
     """Sampled seldom, so that looks are quick, and on the wall's clock, so that the run waits for none."""
-    rig = load_rig(CONFIGS / "virtual_rig.toml")
-    return rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall", "speed": 1.0})})
+    rig = load_rig("virtual_rig")
+    return changed(rig, virtual={"pace": "wall", "speed": 1.0})
 
 
 def measured(rig, folder, excitation, until, **more):
@@ -113,14 +110,9 @@ def test_noise_ends_after_a_whole_realisation_and_the_ramp_down(rig, tmp_path):
 
 @pytest.mark.thorough
 def test_a_stream_with_buffered_samples_ends_when_its_bound_is_met(tmp_path):
-    rig = load_rig(CONFIGS / "virtual_rig_streaming.toml")
+    rig = load_rig("virtual_rig_streaming")
     output = rig.daq.output.model_copy(update={"ahead_s": 2.0})
-    rig = rig.model_copy(
-        update={
-            "virtual": rig.virtual.model_copy(update={"pace": "wall", "speed": 1.0}),
-            "daq": rig.daq.model_copy(update={"output": output}),
-        }
-    )
+    rig = changed(rig, virtual={"pace": "wall", "speed": 1.0}, daq={"output": output})
     noise = StreamedNoise(amplitude_vpp=0.1, band_start_hz=50, band_stop_hz=600, duration_s=120, settle_s=0.5)
     outcome, recording, _ = measured(rig, tmp_path, noise, Until(resonance_hz=0.05, shortest_s=5.0))
     with recording:
