@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.changed import changed
 from vibench.acquisition import ConfigurationError, LimitExceeded, open_bench, open_recording, run_measurement
 from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.plan import (
-    Measurement,
-    RunState,
-)
+from vibench.acquisition.plan import Measurement, RunState
 from vibench.acquisition.recording import (
     BranchEnd,
     BranchEndNote,
@@ -69,12 +67,11 @@ def followed(rig, plan, path, true=None):
     with ExitStack() as stack:
         if true is not None:
             virtual = stack.enter_context(VirtualRig(true))
-            rig = rig.model_copy(
-                update={
-                    "virtual": None,
-                    "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
-                    "controller": rig.controller.model_copy(update={"resource": virtual.controller_resource}),
-                }
+            rig = changed(
+                rig,
+                virtual=None,
+                daq={"server": virtual.daq_address},
+                controller={"resource": virtual.controller_resource},
             )
         bench = stack.enter_context(open_bench(rig, confirm=confirm_simulated))
         outcome = run_measurement(bench, measurement(plan), path)
@@ -265,7 +262,7 @@ def test_a_branch_without_start_or_force_in_the_model_is_refused():
 def test_motions_with_impacts_are_held_behind_their_fold(tmp_path, rate_hz):
     """The paper's specimen: begun from above, at least 10 unstable motions, up to a multiplier of 2."""
     stops, plan = among_stops()
-    stops = stops.model_copy(update={"daq": stops.daq.model_copy(update={"sample_rate_hz": rate_hz})})
+    stops = changed(stops, daq={"sample_rate_hz": rate_hz})
     points, notes = followed(stops, plan, tmp_path / "stops.h5")
     # Where the model's multiplier is 2 and more, how far it is held depends on the noise.
     assert notes[-1].end in (BranchEnd.RANGE, BranchEnd.LOST), notes
@@ -294,11 +291,8 @@ def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tm
     true = hardening(rig, **{each: noise * getattr(rig.virtual, each) for each in NOISES})
     # The host believes in springs that are 10 % stiffer, and in a coil that pushes by 10 % more.
     stiffer = tuple(1.1**0.5 * each for each in true.specimen.single_frequencies_hz)
-    believed = true.model_copy(
-        update={
-            "shaker": true.shaker.model_copy(update={"force_constant_n_per_a": 1.1 * 6.78}),
-            "specimen": true.specimen.model_copy(update={"single_frequencies_hz": stiffer}),
-        }
+    believed = changed(
+        true, shaker={"force_constant_n_per_a": 1.1 * 6.78}, specimen={"single_frequencies_hz": stiffer}
     )
     plan = continuation(most_points=110, perturbation=0.02)
     points, notes = followed(believed, plan, tmp_path / "branch.h5", true)

@@ -8,14 +8,6 @@ from vibench.sim import RigidStops, Specimen, gong2025
 from vibench.sim.chain import Chain, chain_of
 
 
-def test_a_chain_of_one_cell_has_the_matrices_of_the_specimen():
-    specimen = gong2025()
-    chain = chain_of(specimen, 1)
-    np.testing.assert_array_equal(np.diag(chain.masses), specimen.mass_matrix)
-    np.testing.assert_array_equal(chain.stiffness_matrix, specimen.stiffness_matrix)
-    np.testing.assert_array_equal(chain.damping_matrix, specimen.damping_matrix)
-
-
 def test_only_the_link_to_the_base_resists_when_the_whole_chain_moves_as_one():
     specimen = gong2025()
     together = chain_of(specimen, 5).stiffness_matrix @ np.ones(15)

@@ -16,6 +16,8 @@ from vibench.sim.study._queue import StudyEnd
 from vibench.sim.study._results import results_of
 from vibench.sim.study._study import GivenStart
 
+from .conftest import SHORT
+
 
 class UnreliableExecutor:
     """Computes in the calling thread; answers in any order, forgets bundles, and breaks some off."""
@@ -54,9 +56,7 @@ def small():
         frequencies_hz=[200.0, 230.0, 260.0],
         amplitudes_m=[5e-6, 20e-6],
         starts=("rest", "up", "down"),
-        duration_s=0.2,
-        window_s=0.1,
-        budget_s=0.0,
+        **SHORT,
     )
 
 
@@ -98,14 +98,7 @@ def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
 
 
 def test_the_base_does_not_jump_where_a_chain_changes_frequency():
-    study = Study(
-        frequencies_hz=[201.3, 233.7, 260.1],
-        amplitudes_m=[5e-6],
-        starts=["down"],
-        duration_s=0.2,
-        window_s=0.1,
-        budget_s=0.0,
-    )
+    study = Study(frequencies_hz=[201.3, 233.7, 260.1], amplitudes_m=[5e-6], starts=["down"], **SHORT)
     results = solve_study(study, workers=1)
     phase = results.values(PHASE).ravel()
     frequency = np.array(study.frequencies_hz)
@@ -126,9 +119,7 @@ def test_a_given_start_is_the_start_of_every_point():
         frequencies_hz=[100.0, 130.0],
         amplitudes_m=[5e-6],
         starts=[GivenStart(label="kick", state=state)],
-        duration_s=0.2,
-        window_s=0.1,
-        budget_s=0.0,
+        **SHORT,
     )
     found = list(solve_study(study, workers=2).predictions())
     assert found[1].response_i == alone(130.0, 5e-6, Given(state)).response_i
