@@ -24,7 +24,7 @@ NAME = "engine"
 DESCRIPTORS_MORE = 24
 """Those of the viewers that it holds at most, and what a bench opens."""
 CAMPAIGN = load_campaign(ROOT / "campaigns" / "quick.toml").model_dump(mode="json")
-RIG = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml").model_dump(mode="json")
+RIG = load_rig("virtual_rig").model_dump(mode="json")
 REQUESTS: tuple[dict[str, Any], ...] = (
     {"ask": "open", "rig": RIG},
     {"ask": "close"},

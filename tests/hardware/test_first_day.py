@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.changed import changed
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.bench.result import Verdict
 from vibench.acquisition.check.admission import check_bench
@@ -22,7 +23,6 @@ from vibench.analysis import analyse
 
 pytestmark = [pytest.mark.hardware, pytest.mark.timeout(600)]
 
-ROOT = Path(__file__).resolve().parents[2]
 LABORATORY_SETTLE_S = 0.1
 SHARE = 0.02
 
@@ -32,13 +32,8 @@ def rig():
     given = os.environ.get("VIBENCH_BENCH")
     if given is not None:
         return load_rig(Path(given))
-    found = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
-    return found.model_copy(
-        update={
-            "generator": found.generator.model_copy(update={"settle_s": LABORATORY_SETTLE_S}),
-            "virtual": found.virtual.model_copy(update={"pace": "wall"}),
-        }
-    )
+    found = load_rig("virtual_rig")
+    return changed(found, generator={"settle_s": LABORATORY_SETTLE_S}, virtual={"pace": "wall"})
 
 
 def confirmed(knobs):

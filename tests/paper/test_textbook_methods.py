@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.independent_solution import independent_state, state_error
-from vibench.cli.paper.textbook_methods import (
-    ode45,
-    runge_kutta,
-    textbook_exponents,
-    textbook_states,
-)
+from vibench.cli.paper.textbook_methods import ode45, runge_kutta, textbook_exponents, textbook_states
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent
 
 DRIVE = Harmonic(130.0, 20e-6, 0.3)

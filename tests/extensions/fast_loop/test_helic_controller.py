@@ -16,9 +16,7 @@ from vibench.acquisition import (
     run_measurement,
 )
 from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.plan import (
-    Measurement,
-)
+from vibench.acquisition.plan import Measurement
 from vibench.acquisition.rig import confirm_simulated, load_rig
 from vibench_fast_loop.branch_continuation import BranchContinuation
 from vibench_fast_loop.contract import test_controller as contract

@@ -5,10 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from benchmarks.independent_solution import (
-    independent_state,
-    state_error,
-)
+from benchmarks.independent_solution import independent_state, state_error
 from vibench.sim import Accuracy, Harmonic, RigidStops, gong2025, integrate
 
 STILL = Harmonic(100.0, 0.0)

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from vibench.sim import (
-    BalanceOptions,
-    FrequencyPath,
-    PowerSpring,
-)
+from vibench.sim import BalanceOptions, FrequencyPath, PowerSpring
 from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.harmonic_balance import LinearStructure
 

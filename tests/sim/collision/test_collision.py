@@ -7,14 +7,7 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025
 from vibench.sim.engine.run import Watch
-from vibench.sim.engine.shapes import (
-    DEPTHS,
-    DURATION,
-    HALF_FORCE,
-    SOFTEST,
-    SPACING,
-    collision_shapes,
-)
+from vibench.sim.engine.shapes import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING, collision_shapes
 from vibench.sim.scene.followed_run import FollowedRun, Samples
 
 DRIVE, STILL = Harmonic(130.0, 20e-6), Harmonic(130.0, 0.0)

@@ -12,13 +12,7 @@ from native_calls import calls
 from vibench.sim import Harmonic, gong2025
 from vibench.sim.engine.batch import collision_fit
 from vibench.sim.engine.library import Engine, EngineError
-from vibench.sim.engine.scene import (
-    collision_structure,
-    fill_power,
-    fill_specimen,
-    power_structure,
-    scene_of,
-)
+from vibench.sim.engine.scene import collision_structure, fill_power, fill_specimen, power_structure, scene_of
 
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]

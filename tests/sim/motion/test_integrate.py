@@ -6,15 +6,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import simpson
 
 from tests.sim.as_written import as_written, distance, paper
-from vibench.sim import (
-    Accuracy,
-    Harmonic,
-    LinearSweep,
-    Outcome,
-    Sampled,
-    gong2025,
-    integrate,
-)
+from vibench.sim import Accuracy, Harmonic, LinearSweep, Outcome, Sampled, gong2025, integrate
 from vibench.sim.motion.integrate import HERMITE, sweep_interval_s
 
 PERIODIC = Harmonic(130.0, 20e-6)

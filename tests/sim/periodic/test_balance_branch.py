@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vibench.sim import (
-    PowerSpring,
-    first_order_states,
-    gong2025,
-    spring_of,
-    structure_of,
-)
+from vibench.sim import PowerSpring, first_order_states, gong2025, spring_of, structure_of
 from vibench.sim.periodic.balance_branch import BalanceOptions, balance, balance_branch_within
 from vibench.sim.periodic.branch import BifurcationKind
 from vibench.sim.periodic.branch_following import AmplitudePath, FrequencyPath

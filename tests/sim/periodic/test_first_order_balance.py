@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from vibench.sim import (
-    PowerSpring,
-    base_transmissibility,
-    first_order_states,
-    gong2025,
-    structure_of,
-)
+from vibench.sim import PowerSpring, base_transmissibility, first_order_states, gong2025, structure_of
 from vibench.sim.periodic.first_order_balance import fundamental_share
 from vibench.sim.periodic.harmonic_balance import LinearStructure, condense
 
