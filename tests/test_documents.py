@@ -186,7 +186,7 @@ def ordered_rooms():
 
 
 @pytest.mark.parametrize(("package", "rooms"), list(ordered_rooms()))
-def test_the_page_on_architecture_lists_the_packages_in_their_order_and_in_their_own_words(package, rooms):
+def test_the_page_on_architecture_lists_packages_in_order_with_their_docstrings(package, rooms):
     _, section = text_of(ROOT / "docs" / "architecture.md").split(f"### `{package}`\n")
     listed = re.findall(r"^\| `(\w+)` \| (.+) \|$", section.split("\n### ")[0].split("\n## ")[0], flags=re.M)
     said = [importlib.util.find_spec(f"{package}.{room}") for room in rooms]

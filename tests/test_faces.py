@@ -101,7 +101,7 @@ def trespasses(room, package, target, names):
     )
 
 
-def test_nobody_reaches_past_a_public_api():
+def test_no_import_reaches_past_a_public_api():
     found = [
         f"{path.relative_to(ROOT)}:{line}: {trespass}"
         for portion, _, room, path in sources()
@@ -148,7 +148,7 @@ def test_only_public_apis_load_their_names_on_first_use():
 
 
 @pytest.mark.parametrize("room", sorted({room for _, _, room, _ in sources()} - {"vibench"}))
-def test_a_package_states_what_it_is_for_and_every_name_in_its_public_api_is_there(room):
+def test_every_public_api_has_a_description_and_all_its_names(room):
     face = importlib.import_module(room)
     assert len(face.__doc__.split()) > 5
     names = getattr(face, "__all__", [])

@@ -76,7 +76,7 @@ def test_posix_only_functions_exist_on_this_system():
     assert int(ran("-c", program).stdout) > 25
 
 
-def test_a_bench_is_held_and_a_recording_marked(here):
+def test_a_run_can_be_held_and_its_recording_marked(here):
     said = ran("-c", LOCKS.format(folder=str(here))).stdout.splitlines()
     assert "is in use by process" in said[0]
     assert said[1:] == ["True b'\\x00\\x00abc\\x00\\x00\\x00'", "False"]

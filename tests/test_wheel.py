@@ -123,7 +123,7 @@ def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_importe
 
 
 @pytest.mark.thorough
-def test_a_script_beside_files_of_our_folders_names_imports_ours(python, users_folder):
+def test_a_script_beside_files_with_names_of_our_folders_imports_vibench(python, users_folder):
     script = users_folder / "script.py"
     script.write_text(f"{FACES}\nimport vibench.sim\nprint(vibench.sim.__file__)\n")
     imported = Path(run(python, script, cwd=users_folder).strip())

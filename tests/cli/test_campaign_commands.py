@@ -43,7 +43,7 @@ def test_a_campaign_is_catalogued_and_its_end_notified(vibench, tmp_path):
 
 
 @pytest.mark.thorough
-def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(answered, vibench_here, tmp_path):
+def test_only_settings_confirmed_at_a_check_apply_to_a_campaign(answered, vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
     answered("bench", "check", "--bench", bench, "--knobs", knobs)

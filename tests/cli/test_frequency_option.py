@@ -6,7 +6,7 @@ from vibench.analysis import InvalidRequest
 from vibench.cli.range_option import frequencies
 
 
-def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
+def test_a_number_is_one_frequency_and_a_range_includes_both_ends():
     assert frequencies("260") == (260.0,)
     assert frequencies("10:11:0.5") == (10.0, 10.5, 11.0)
     assert frequencies("10:10:1") == (10.0,)

@@ -51,6 +51,6 @@ def test_a_viewer_reads_the_bounds_of_an_engine():
     assert RunStatus.model_validate(without).until is None
 
 
-def test_the_run_page_shows_them():
+def test_the_run_page_shows_bounds_and_targets():
     run_page = pytest.importorskip("vibench.gui.pages.run.run_page", exc_type=ImportError)
     assert run_page._progress_text(RUN).endswith(f"left at most; {SAID}")

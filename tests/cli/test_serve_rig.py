@@ -112,7 +112,7 @@ def test_an_indefinite_length_block_ends_at_the_newline(served):
         assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
 
 
-def test_the_own_driver_works_over_the_socket(served):
+def test_our_driver_works_over_the_socket(served):
     rig = load_rig("virtual_rig")
     (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", served))
     config = rig.generator.model_copy(update={"resource": resource})

@@ -3,7 +3,7 @@
 import pytest
 
 
-def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(answered, tmp_path):
+def test_the_curve_of_a_scene_has_the_chosen_and_the_other_methods(answered, tmp_path):
     asked = ("tradeoff", "--amplitude", 5e-6, "--frequency", 100, "--model", "power:7", "--error", "0.1 %")
     points = answered(*asked, "--json", "--out", tmp_path / "new")["points"]
     (chosen,) = [each for each in points if each["is_chosen"]]

@@ -115,7 +115,7 @@ def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     assert gaps == ()
 
 
-def test_a_twin_whose_baseline_finds_no_room_goes_on_with_one_sentence(tmp_path, monkeypatch, capsys):
+def test_a_twin_continues_with_one_sentence_if_its_baseline_cannot_be_stored(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     rig = load_rig("virtual_rig")
     known = {Hidden.M1: KnownNumber(value=2.1e-3, low=2.0e-3, high=2.2e-3)}

@@ -42,7 +42,7 @@ def test_a_claim_is_named_by_its_function_and_states_its_docstring():
     assert (first_peak.key, first_peak.says, first_peak.draws) == ("first-peak", "The first peak is high.", 3)
 
 
-def test_a_number_within_its_bounds_holds_and_no_option_is_tried():
+def test_a_value_within_its_bounds_holds_without_testing_options():
     found = judge({2e-5: (95.4,)}, about("peak", "Hz", 95.0, 1.0))
     assert found.verdict is Verdict.HOLDS
     assert [each.case.name for each in found.findings] == [AS_CHOSEN]
@@ -55,14 +55,14 @@ def test_a_claim_that_holds_under_a_later_option_names_the_first_one_that_uphold
     assert len(found.findings) == 2
 
 
-def test_a_claim_that_no_option_upholds_fails_and_keeps_all_that_was_tried():
+def test_a_claim_that_no_option_upholds_fails_and_keeps_all_findings():
     found = judge({2e-5: (1.0,), 3e-5: (2.0,), 5e-5: (3.0,)}, at_most("share", "%", 0.5))
     assert found.verdict is Verdict.FAILS
     assert found.met_under is None
     assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
 
 
-def test_a_claim_that_some_starts_uphold_holds_for_a_share_of_them_and_no_option_is_tried():
+def test_a_claim_upheld_by_some_starts_holds_for_a_share_without_testing_options():
     last_hz = (310.0, 288.0, 291.0, 330.0)
     sweep = made(lambda r: (last_hz[r.case.draw],), about("last", "Hz", 290.0, 5.0), tried=(DAMPED,), draws=4)
     found = judgement(sweep, Evidence(no_studies), CASE)
@@ -72,7 +72,7 @@ def test_a_claim_that_some_starts_uphold_holds_for_a_share_of_them_and_no_option
     assert verdict_text(found) == "holds for a share of starts: 2 of 4 (15 to 85 %)"
 
 
-def test_a_claim_that_every_start_upholds_holds_and_one_that_none_does_is_tried_under_options():
+def test_a_claim_holds_if_every_start_upholds_it_and_tests_options_if_none_does():
     def measure(reading):
         return (100.0 + reading.case.draw if reading.case.damping_time_s == 3e-5 else 10.0,)
 
@@ -118,7 +118,7 @@ def test_a_measure_must_give_a_number_for_each_expectation():
         judge({2e-5: (1.0, 2.0)}, at_least("one", "", 0.0))
 
 
-def test_an_option_changes_what_it_names_and_nothing_else():
+def test_an_option_changes_only_its_own_setting():
     assert DAMPED.of(CASE) == replace(CASE, name=DAMPED.name, damping_time_s=3e-5)
     for alternative, changes in (
         (change("log", LogarithmOf.NORMALISED), {"logarithm_of": LogarithmOf.NORMALISED}),

@@ -27,7 +27,7 @@ def under(*said, **options):
     return case_with(FigureOptions(**options), said)
 
 
-def test_zeta_damps_every_mass_on_its_own_spring_by_that_ratio_and_the_study_too():
+def test_zeta_is_the_damping_ratio_of_every_mass_also_in_studies():
     case = under("zeta=0.0165")
     study = case.study(("hertz",), (5e-6,))
     for specimen in (case.specimen(), study.scene((0,) * 6, Rest()).specimen):
@@ -94,7 +94,7 @@ def test_exponents_by_ode45_match_its_steps_where_masses_collide():
     assert Reading(NOTHING, CASE).exponents_of(curve, 5e-6)[1] == 110.0
 
 
-def test_the_sum_and_the_logarithm_and_the_gap_are_taken_over():
+def test_options_for_sum_logarithm_and_gap_are_applied():
     case = under("sum=3@0.1+7@0.9", "log=m", "gap=30e-6")
     assert (case.sum_model, case.logarithm_of, case.gap_m) == (
         "power:3@0.1+7@0.9",
@@ -110,7 +110,7 @@ def test_every_option_takes_its_own_example():
 
 @pytest.mark.parametrize("name", ["zeta", "gap", "fit", "compared", "sweep-amplitude", "sweep-falls"])
 @pytest.mark.parametrize("value", ["-1", "nan", "inf", "", "much"])
-def test_a_number_that_is_not_allowed_is_one_sentence_that_names_it(name, value):
+def test_a_forbidden_number_gives_one_sentence_that_names_it(name, value):
     with pytest.raises(InvalidRequest) as refused:
         parse_option(f"{name}={value}")
     said = str(refused.value)
@@ -128,12 +128,12 @@ def test_a_number_that_is_not_allowed_is_one_sentence_that_names_it(name, value)
         ("sweep=sideways", "up or down"),
     ],
 )
-def test_a_word_that_is_not_known_is_answered_with_those_that_are(said, answer):
+def test_an_unknown_word_is_refused_with_the_known_words(said, answer):
     with pytest.raises(InvalidRequest, match=answer):
         parse_option(said)
 
 
-def test_claims_are_set_side_by_side_and_those_that_hold_everywhere_are_only_counted():
+def test_claims_that_hold_under_every_setting_are_only_counted():
     wanted = at_least("it", "", 1.0)
 
     @claim("", "", wanted)

@@ -58,7 +58,7 @@ def rows(page):
     }
 
 
-def test_the_verdicts_are_counted_and_written_with_what_they_rest_on(found):
+def test_verdicts_are_counted_and_written_with_their_values(found):
     page = reproduction_document(found)
     assert [found.count(each) for each in Verdict] == [1, 0, 1, 1]
     assert "Of 3 claims 1 hold under the defaults," in page
@@ -67,7 +67,7 @@ def test_the_verdicts_are_counted_and_written_with_what_they_rest_on(found):
     assert rows(page)["third"].endswith("| **does not hold** |")
 
 
-def test_of_the_options_tried_the_page_has_only_those_that_uphold_a_claim(found):
+def test_the_page_lists_only_options_that_uphold_a_claim(found):
     page = reproduction_document(found)
     assert "It holds under c = 3e-05 s · k: exponent: 130 1/s." in page
     assert "exponent: 60 1/s" not in page
@@ -80,7 +80,7 @@ def test_differences_from_the_paper_come_first_with_the_option_that_agrees(found
     assert "- **third**: It is so with third. It holds under none of 1 options tested." in summary
 
 
-def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
+def test_an_option_that_some_starts_uphold_is_reported_with_their_number():
     """A sweep downwards held for most starts, and the page said that it does not hold."""
 
     def measure(reading):
@@ -96,7 +96,7 @@ def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
     assert "Values for c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
 
 
-def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not(found):
+def test_the_score_names_the_best_damping_and_the_failed_claims(found):
     page = reproduction_document(found, (("A figure", "images/it.png"),))
     assert "most hold at 3e-05 s." in page
     assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second, third |" in page

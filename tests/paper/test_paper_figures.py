@@ -108,7 +108,7 @@ def test_figure_7_has_the_papers_rates_at_the_weakest_level(solved):
 
 
 @pytest.mark.thorough
-def test_what_the_logarithm_is_taken_of_is_an_option(solved):
+def test_the_argument_of_the_logarithm_is_an_option(solved):
     other = FigureOptions(
         accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED
     )

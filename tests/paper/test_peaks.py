@@ -27,7 +27,7 @@ def test_ripples_are_not_peaks_and_missing_points_are_skipped():
     np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
 
 
-def test_the_two_highest_are_ascending_and_the_third_is_measured_against_the_second():
+def test_the_two_highest_peaks_ascend_and_the_third_is_relative_to_the_second():
     first, second, following = two_highest(GRID, resonances(100.0, 300.0, 500.0, heights=(2.0, 9.0, 8.0)))
     assert (first, second) == (300.0, 500.0)
     assert following == pytest.approx(2.0 / 8.0, rel=0.05)

@@ -38,14 +38,14 @@ def test_the_linear_claims_follow_from_the_specimen_and_need_no_study():
 
 
 @pytest.mark.thorough
-def test_short_runs_already_show_what_collisions_do(evidence):
+def test_short_runs_show_the_effects_of_collisions(evidence):
     case = SHORT
     assert [each.key for each in claims(*HERTZ_KEYS) if not finding(each, evidence, case).is_met] == []
     asked = [each.study for each in evidence.studies]
     assert len(asked) == len(set(asked)) == 3
 
 
-def test_the_score_turns_on_the_damping_alone(evidence):
+def test_the_score_depends_only_on_the_damping(evidence):
     weak = replace(SHORT, highest_hz=25.0)
     found_scores = scores(claims("linear-resonances", "p-saturates"), evidence, weak)
     assert [each.damping_time_s for each in found_scores] == list(SCORED_S)

@@ -37,7 +37,7 @@ def test_the_classical_method_is_of_fourth_order():
     assert coarse / fine == pytest.approx(16.0, rel=0.1)
 
 
-def test_ode45_errs_as_its_tolerances_let_it():
+def test_ode45_has_errors_of_the_size_of_its_tolerances():
     specimen = gong2025(contact="power:5")
     truth = independent_state(specimen, DRIVE, 0.01, MOVING)
     errors = [

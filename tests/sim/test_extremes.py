@@ -203,7 +203,7 @@ def test_a_slow_pressed_contact_settles_where_its_springs_balance(contact):
 
 @pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.5", "rigid:1"])
 @pytest.mark.parametrize(("acceleration", "stays"), [(20.0, True), (17.0, False)])
-def test_a_rigid_stop_holds_what_is_pressed_on_it_and_nothing_else(contact, acceleration, stays):
+def test_m1_stays_on_a_rigid_stop_only_while_it_is_pressed_on_it(contact, acceleration, stays):
     specimen, base, start = pulled_away(contact, acceleration)
     # k1 gap / m1 = 17.8 m/s^2: below it the spring draws m1 off the stop.
     threshold = specimen.stiffnesses[1] * specimen.gap_m / specimen.masses[1]

@@ -84,9 +84,7 @@ def asked_enums():
 
 
 @pytest.mark.parametrize(("function", "parameter", "kind"), list(asked_enums()))
-def test_where_an_enum_is_requested_its_word_is_accepted_and_another_refused_with_those_allowed(
-    function, parameter, kind
-):
+def test_enum_arguments_accept_their_words_and_refuse_others_with_the_allowed_ones(function, parameter, kind):
     call = CALLS[function]
     call(**{parameter: next(iter(kind)).value})
     with pytest.raises(ValueError, match=f"'nonsense' is not allowed: give one of {', '.join(kind)}"):

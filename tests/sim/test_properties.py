@@ -176,7 +176,7 @@ def test_no_sampling_rate_changes_a_bit_of_any_motion(contact, rate):
 
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, cuts=st.lists(st.floats(0.0, 0.1), min_size=1, max_size=6))
-def test_a_run_cut_anywhere_ends_where_the_whole_does(contact, cuts):
+def test_a_run_split_anywhere_ends_in_the_same_state(contact, cuts):
     # Damped, and not driven into chaos: a run that is cut rounds anew at every cut.
     specimen = paper(contact, damping_time_s=1e-4)
     for drive in (Harmonic(95.0, 8e-6), LogarithmicSweep(90.0, 110.0, 0.1, 8e-6)):

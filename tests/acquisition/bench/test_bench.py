@@ -99,7 +99,7 @@ class TestOpening:
         virtual.faults.heal()
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
 
-    def test_a_knob_that_is_not_confirmed_leaves_everything_closed_and_silent(self, laboratory, virtual):
+    def test_an_unconfirmed_knob_keeps_the_bench_closed_and_silent(self, laboratory, virtual):
         with pytest.raises(CheckFailed, match=r"gain of the Bruel & Kjaer 2706 was not confirmed at 10 dB"):
             open_bench(laboratory, confirm_by_asking(lambda _: "no", "somebody"), CalibrationRule.WAIVED)
         assert output_of(virtual) == b"0\n"

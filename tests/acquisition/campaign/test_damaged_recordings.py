@@ -278,7 +278,7 @@ def test_a_forger_who_notes_another_recording_in_one_table_is_found(folder):
         assert recording.check_seal(SealDepth.WHOLE).state is SealState.DAMAGED
 
 
-def test_a_point_measured_again_under_a_deleted_name_is_intact_and_the_former_recording_is_not(bench, folder):
+def test_a_repeated_point_is_intact_and_its_deleted_predecessor_is_not(bench, folder):
     former = (folder / "two.h5").read_bytes()
     (folder / "two.h5").unlink()
     run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)

@@ -82,7 +82,7 @@ def _start_and_die(path):
         os._exit(9)
 
 
-def test_a_process_that_dies_in_a_transaction_leaves_the_one_before_it(journal):
+def test_a_process_killed_in_a_transaction_keeps_the_previous_one(journal):
     path = journal.path
     journal.close()
     child = multiprocessing.get_context("spawn").Process(target=_start_and_die, args=(path,))

@@ -178,7 +178,7 @@ class TestResuming:
         assert outcomes(point_results) == [("one", "kept"), ("two", "kept")]
         assert [point.reason_code for point in points(tmp_path)] == [ReasonCode.FOUND, ReasonCode.FOUND]
 
-    def test_two_programs_cannot_carry_out_one_campaign(self, bench, tmp_path):
+    def test_two_programs_cannot_run_one_campaign(self, bench, tmp_path):
         def second(progress):
             with pytest.raises(RecordingError, match="by another program"):
                 run_campaign(bench, campaign("one"), tmp_path, ExistingRecordings.RESUME)

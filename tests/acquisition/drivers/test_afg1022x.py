@@ -75,7 +75,7 @@ class TestOpening:
             AFG1022X.open(impostor.config)
         assert impostor.log.commands() == ["OUTP1:STAT OFF", "*CLS"]
 
-    def test_a_second_program_gets_an_error_that_the_first_one_holds_it(self, plugged, generator):
+    def test_a_second_program_gets_an_error_that_names_the_first(self, plugged, generator):
         with pytest.raises((InstrumentBusy, InstrumentLost), match=plugged.instrument.serial):
             AFG1022X.open(plugged.config)
         generator.load_sine(100.0, 1.0)

@@ -290,7 +290,7 @@ class TestScaling:
             *((0.0, 6e-7, 1e-13), (0.0, 6e-7, 0.0, 1e-20)),
         ],
     )
-    def test_a_shifted_or_bent_scaling_has_none(self, coefficients):
+    def test_a_shifted_or_nonlinear_scaling_has_no_step(self, coefficients):
         assert linear_step_v(coefficients, 5.0) is None
 
 

@@ -106,7 +106,7 @@ def test_a_recording_of_another_scale_is_refused(playing, rig):
         open_bench(playing().model_copy(update={"vibrometer": other}))
 
 
-def test_a_recording_is_not_checked_as_a_bench_and_needs_no_waiver(playing, tmp_path):
+def test_a_replayed_recording_needs_no_bench_check_and_no_waiver(playing, tmp_path):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         with pytest.raises(ConfigurationError, match="a recording is played back"):
             check_bench(bench, tmp_path)

@@ -20,7 +20,7 @@ def measured(*options, name="time_to_silence.py"):
 
 
 @pytest.mark.thorough
-def test_two_cells_of_the_table_meet_their_times_to_silence():
+def test_two_cells_of_the_safety_table_meet_their_times_to_silence():
     told = measured("--cells", "0.007", "--seed", "7")
     assert told.returncode == 0, told.stdout + told.stderr
     assert told.stdout.count(" s\n") == 2
@@ -39,13 +39,13 @@ def test_stops_and_kills_end_silent_and_are_measured_once(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_a_quarter_of_the_table_meets_its_times_to_silence():
+def test_a_quarter_of_the_safety_table_meets_its_times_to_silence():
     told = measured("--cells", "0.25", "--seed", "8")
     assert told.returncode == 0, told.stdout + told.stderr
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_a_living_engine_is_always_found():
+def test_a_running_engine_is_always_found():
     told = measured("--tries", "600", "--commands", "12")
     assert told.returncode == 0, told.stdout + told.stderr

@@ -58,7 +58,7 @@ def test_a_held_level_is_checked_against_the_setting_that_it_needs(plan, rig):
     assert check.is_kept
 
 
-def test_a_held_sweep_passes_the_frequencies_of_an_open_one():
+def test_a_held_sweep_has_the_frequencies_of_an_open_loop_sweep():
     shape = {"amplitude_vpp": 1.0, "start_hz": 150, "stop_hz": 350, "duration_s": 20}
     held = HeldSweep(**shape, base_level=BaseLevel(displacement_m=1e-6))
     played = [step.play.frequency_hz for step in held.steps()]

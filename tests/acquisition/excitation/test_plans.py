@@ -209,7 +209,7 @@ def test_a_logarithmic_sweep_passes_the_geometric_mean_at_half_time():
 
 
 @pytest.mark.parametrize(("hold", "power"), [("acceleration", 0), ("velocity", 1), ("displacement", 2)])
-def test_a_sweep_that_holds_a_motion_follows_that_power_of_frequency(hold, power):
+def test_the_amplitude_of_a_sweep_at_constant_motion_is_a_power_of_frequency(hold, power):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=20, hold=hold)
     tones = [step.play for step in sweep.steps()]
     for tone in tones:

@@ -34,6 +34,6 @@ def test_a_wrong_word_is_refused_with_the_allowed_words(tmp_path, asked, sentenc
         asked(tmp_path)
 
 
-def test_a_bench_opens_by_a_word_for_its_calibrations(rig):
+def test_a_bench_accepts_a_word_for_the_choice_of_calibration(rig):
     with open_bench(rig, calibration="waived") as bench:
         assert bench.rig == rig

@@ -64,7 +64,7 @@ def faults(kind, text):
 
 
 @pytest.mark.parametrize("kind", MODELS)
-def test_a_schema_is_draft_4_and_the_file_that_comes_with_vibench_is_it(kind):
+def test_a_schema_is_draft_4_and_equals_the_shipped_file(kind):
     pytest.importorskip(
         "vibench_fast_loop", reason="pip install -e extensions/fast_loop brings a kind of plan"
     )

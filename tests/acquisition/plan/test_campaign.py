@@ -130,7 +130,7 @@ class TestDefaults:
 
 
 class TestRefusals:
-    def test_a_bench_given_for_a_campaign_has_its_keys_refused_in_one_clause(self):
+    def test_a_bench_file_given_as_a_campaign_is_refused_in_one_clause(self):
         bench = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml"
         with pytest.raises(
             ConfigurationError, match="specimen, virtual are not known keys: check"
@@ -138,7 +138,7 @@ class TestRefusals:
             load_campaign(bench)
         assert str(refused.value).count("not known key") == 1
 
-    def test_the_file_the_key_and_what_is_allowed_are_named(self, tmp_path):
+    def test_errors_name_the_file_the_key_and_the_allowed_values(self, tmp_path):
         text = 'name = "c"\n' + DWELL_TABLE.replace("1.5", "5000")
         with pytest.raises(ConfigurationError) as refused:
             loaded(tmp_path, text)

@@ -70,7 +70,7 @@ def test_a_plan_of_an_older_version_has_no_until():
 
 
 @pytest.mark.parametrize(("kind", "most_s"), [("dwell", 60), ("streamed_noise", 60), ("stepped_sine", 2)])
-def test_a_first_look_after_the_end_is_refused(kind, most_s):
+def test_a_first_analysis_after_the_end_is_refused(kind, most_s):
     """Steps of less than the usual 2 s, which plans have that do not name it, are analysed at their end."""
     name = sorted(ALLOWED[kind])[0]
     assert plan(kind, {name: "1 %", "shortest_s": most_s}).until.shortest_s == most_s

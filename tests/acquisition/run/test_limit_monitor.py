@@ -115,7 +115,7 @@ def test_a_lasting_current_below_the_peak_limit_trips_the_rms_limit(rig):
     assert trip.time_s > 2.0
 
 
-def test_the_trip_names_the_first_sample_past_the_limit(rig):
+def test_the_limit_event_names_the_first_sample_past_the_limit(rig):
     volts = np.zeros((4, BLOCK))
     volts[2, 1234:1300] = 7.5
     trip, _ = trip_of(monitor_of(rig), [Block(0, np.zeros((4, BLOCK))), Block(BLOCK, volts)])
@@ -182,7 +182,7 @@ def test_checking_a_block_of_0_1_s_takes_less_than_a_millisecond(rig):
     assert np.median(spent_s) < 1e-3
 
 
-def test_a_trip_is_recorded_with_its_numbers(bench, tmp_path):
+def test_an_exceeded_limit_is_recorded_with_its_values(bench, tmp_path):
     plan = Measurement(
         name="run",
         excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1),

@@ -109,7 +109,7 @@ def test_the_samples_of_a_real_universal_file_have_the_levels_that_pyuff_reads(i
     assert found == pytest.approx([0.0790084, 0.3185365, 0.0792455, 0.1308404], abs=6e-8)
 
 
-def test_the_untried_mapping_reads_the_layout_of_its_loader(tmp_path):
+def test_the_untested_mapping_reads_the_layout_of_its_loader(tmp_path):
     untried = load_toml(MAPPINGS / "f16_sweep.toml", ImportMapping)
     known = np.random.default_rng(1).standard_normal((3, 108_477))
     content = {"Force": known[:1], "Voltage": known[:1], "Acceleration": known, "Fs": 400.0}

@@ -42,7 +42,7 @@ def test_unstable_motions_lie_below_the_stable_ones_and_fall_as_the_wind_rises(c
     assert means == sorted(means, reverse=True)
 
 
-def test_the_kept_samples_of_unstable_motions_are_more_invasive_than_their_authors_criterion(cycles):
+def test_published_unstable_motions_exceed_the_authors_criterion_of_invasiveness(cycles):
     """Their search ended by amplitudes before the samples were kept: a target that was changed once more."""
     for speed in UNSTABLE:
         found = cycles[f"unstable_v{speed}"]

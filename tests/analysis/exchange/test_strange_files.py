@@ -77,7 +77,7 @@ def test_dates_and_times_of_day_in_any_form_place_samples(tmp_path, form, start)
     is_right(imported(text(tmp_path / "a.csv", head, (clock, *signal(TIMES[kept])), ";")), lost=37)
 
 
-def test_a_record_that_goes_on_a_day_later_is_not_read_as_one(tmp_path):
+def test_a_record_continued_a_day_later_is_not_read_as_one(tmp_path):
     clock = [f"0{1 + k // 2000}.03.2026 12:00:{TIMES[k]:09.6f}" for k in range(TIMES.size)]
     with pytest.raises(InvalidRequest, match="intervals and"):
         imported(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";"))

@@ -128,7 +128,7 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     assert f"{found.overlay.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
 
-def test_dwells_stand_in_rows_weak_to_strong_with_their_responses_in_the_caption(dwell_file):
+def test_dwells_are_drawn_in_rows_by_level_with_responses_in_the_caption(dwell_file):
     strong, weak = result(dwell_file("strong")), result(dwell_file("weak"))
     drawn = dwells_figure([(each.analysis, each.overlay) for each in (strong, weak)])
     assert len(drawn.figure.axes) == 6
@@ -196,7 +196,7 @@ def test_every_excitation_can_be_shown_before_it_plays(plan):
     ("largest", "expected"),
     [(5e-6, (1e6, "µm")), (0.02, (1e3, "mm")), (3.0, (1.0, "m")), (1e-12, (1e9, "nm"))],
 )
-def test_quantities_get_the_prefix_in_which_they_read_one_to_a_thousand(largest, expected):
+def test_quantities_get_a_prefix_for_values_from_one_to_a_thousand(largest, expected):
     factor, unit = prefixed(largest, "m")
     assert factor == pytest.approx(expected[0])
     assert unit == expected[1]

@@ -294,7 +294,7 @@ def test_an_invalid_track_is_reported_and_not_shown(world_recording, described_o
 
 
 @pytest.mark.thorough
-def test_a_motion_that_meets_no_stop_determines_no_gap(world_recording):
+def test_a_motion_without_contact_determines_no_gap(world_recording):
     recorded = world_recording(260.0, 0.05, seed=44, duration_s=1.2)
     motion = told(recorded)
     gaps = [each for each in motion.parameters if each.what in {Hidden.LOWER_GAP, Hidden.UPPER_GAP}]

@@ -124,7 +124,7 @@ def test_only_motions_of_one_kind_are_compared():
     assert np.isfinite(found.z[1])
 
 
-def test_a_rate_of_escape_covers_the_true_one():
+def test_the_interval_of_the_escape_rate_contains_the_true_rate():
     rng = np.random.default_rng(6)
     per_s, record_s, trials = 0.2, 12.0, 1500
     covered = told = 0

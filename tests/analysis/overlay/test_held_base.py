@@ -45,7 +45,7 @@ def test_the_base_is_held_only_if_planned(name):
 
 
 @pytest.mark.parametrize(("name", "held_um"), HELD_UM.items())
-def test_the_predicted_base_motion_is_the_held_one(name, held_um):
+def test_the_predicted_base_motion_equals_the_held_level(name, held_um):
     excitation = SHIPPED[name].excitation
     base = base_motion(excitation, RIG, played_hz(excitation))
     np.testing.assert_allclose(1e6 * base.amplitude_m, held_um, rtol=2e-3)

@@ -21,7 +21,7 @@ def test_a_curve_is_wholly_similar_to_itself_even_where_its_logarithm_is_zero():
     assert similarity(one, one, LogarithmOf.NORMALISED).rate == 1
 
 
-def test_the_difference_is_the_one_of_equation_six():
+def test_the_difference_matches_equation_six():
     # 5 um times 2 is 0.01 mm, log -2; times 0.2 is 0.001 mm, log -3: they differ by half.
     found = similarity(curve([2.0, 2.0]), curve([0.2, 2.0]), LogarithmOf.MILLIMETRES)
     assert found.difference == pytest.approx([0.5, 0.0])

@@ -88,7 +88,7 @@ def point(model, frequency_hz, response, impacts=0):
     return SimulatedPoint(model, frequency_hz, response, response, impacts, "periodic", -3.5, 1e-6)
 
 
-def test_similarity_is_of_the_frequencies_that_both_models_have():
+def test_similarity_uses_the_frequencies_of_both_models():
     progress = SimulationProgress(5e-6, 10, "n")
     progress.add((point("a", 100.0, 2.0), point("a", 200.0, 4.0), point("b", 200.0, 4.0)))
     assert progress.similarity().rate == 1.0

@@ -22,7 +22,7 @@ def test_channels_together_have_the_values_of_the_signals_they_sample():
 
 
 @pytest.mark.parametrize("tiny", [0.0, 1e-18, -1e-18, 1e-12])
-def test_channels_together_are_each_alone_also_at_samples_and_beyond_the_ends(tiny):
+def test_combined_channels_equal_single_channels_at_samples_and_beyond_the_ends(tiny):
     samples = tones(np.arange(SAMPLES))
     positions = np.concatenate([np.arange(-80.0, SAMPLES + 80) + tiny, RNG.uniform(-80, SAMPLES + 80, 300)])
     together = interpolate(samples, positions)

@@ -34,7 +34,7 @@ def response(at_hz, decibel, noise, seed=0):
 
 @pytest.mark.parametrize("decibel", [-10.0, 3.0])
 @pytest.mark.parametrize("noise", [1e-3, 0.02])
-def test_the_bounds_hold_the_jump_and_nothing_else_is_found(decibel, noise):
+def test_the_bounds_contain_the_jump_and_no_other_jump_is_found(decibel, noise):
     for seed in range(10):
         at_hz = np.random.default_rng(seed).uniform(180, 320)
         found = jumps(TIME_S, FREQUENCY_HZ, response(at_hz, decibel, noise, seed))

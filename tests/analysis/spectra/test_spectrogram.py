@@ -24,7 +24,7 @@ def test_a_sine_has_its_amplitude_at_its_frequency_at_all_times():
     assert np.all(np.argmax(found.amplitude, axis=0) == row)
 
 
-def test_a_chirp_is_where_it_is_when_it_is_there():
+def test_the_spectrogram_of_a_chirp_has_its_frequency_at_every_time():
     time_s = np.arange(80_000) / RATE
     found = picture(np.sin(2 * np.pi * (100 * time_s + 0.5 * 40 * time_s**2)))
     loudest = found.frequency_hz[np.argmax(found.amplitude, axis=0)]

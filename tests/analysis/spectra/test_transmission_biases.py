@@ -17,7 +17,7 @@ def lagged_share(lag):
 
 
 @pytest.mark.parametrize("lag", [3, 40, 90])
-def test_a_delay_costs_the_share_of_the_segment_that_it_moves_out_of(lag):
+def test_a_delay_lowers_h1_by_the_share_of_the_segment_that_it_removes(lag):
     """E[h1] = rho(lag) exp(-i omega lag): what of a segment's response belongs to its own drive."""
     record = np.random.default_rng(41).standard_normal(600_000)
     found = transmissibility(record[lag:], record[:-lag], RATE, segment_samples=SEGMENT)
@@ -28,7 +28,7 @@ def test_a_delay_costs_the_share_of_the_segment_that_it_moves_out_of(lag):
     assert np.mean(straight.imag) == pytest.approx(0, abs=6 * own_error + 1e-4)
 
 
-def test_a_peak_narrower_than_the_resolution_is_the_peak_seen_through_the_windows_spectrum():
+def test_a_peak_narrower_than_the_resolution_has_the_shape_of_the_window_spectrum():
     """E[h1] = sum H |W|^2 / sum |W|^2 for a white drive: a half-power width of 8 Hz, lines 6 Hz wide."""
     omega, damping = 2 * np.pi * 260, 0.02
     section = signal.bilinear([2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2], fs=RATE)

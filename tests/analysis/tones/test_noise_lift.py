@@ -17,7 +17,7 @@ def test_noise_alone_reaches_four_and_a_half_standard_deviations_in_a_second():
 
 
 @pytest.mark.parametrize("noise_sd", [0.02, 0.2])
-def test_a_sine_is_lifted_as_repeated_draws_are(noise_sd):
+def test_noise_raises_the_maximum_of_a_sine_as_in_repeated_draws(noise_sd):
     rng = np.random.default_rng(1)
     motion = np.cos(2 * np.pi * 0.037 * np.arange(2000))
     drawn = [np.max(np.abs(motion + noise_sd * rng.standard_normal(2000))) - 1 for _ in range(400)]
@@ -34,7 +34,7 @@ def test_no_noise_no_bias_and_the_unit_does_not_matter():
     )
 
 
-def test_fewer_independent_values_lift_a_maximum_less():
+def test_fewer_independent_values_raise_a_maximum_less():
     assert noise_lift(np.zeros(5000), 1.0, 50).bias < noise_lift(np.zeros(5000), 1.0, 5000).bias
 
 
@@ -43,12 +43,12 @@ def test_fewer_independent_values_lift_a_maximum_less():
     noise_sd=st.floats(1e-6, 1e3),
     independent=st.floats(0.1, 100.0),
 )
-def test_no_maximum_is_lowered_by_noise_or_surer_than_its_lift(motion, noise_sd, independent):
+def test_noise_never_lowers_a_maximum_or_narrows_its_bound_below_the_increase(motion, noise_sd, independent):
     lift = noise_lift(motion, noise_sd, independent)
     assert 0.0 <= lift.bias <= lift.error < np.inf
 
 
-def test_the_error_of_a_maximum_is_its_scatter_and_its_lift():
+def test_the_error_of_a_maximum_includes_scatter_and_increase_by_noise():
     rng = np.random.default_rng(1)
     for motion in (np.cos(2 * np.pi * 0.037 * np.arange(2000)), np.eye(1, 50)[0]):
         drawn = [np.max(np.abs(motion + 0.1 * rng.standard_normal(motion.size))) - 1 for _ in range(2000)]
@@ -57,5 +57,5 @@ def test_the_error_of_a_maximum_is_its_scatter_and_its_lift():
         )
 
 
-def test_noise_that_is_not_known_leaves_its_lift_unknown():
+def test_unknown_noise_leaves_the_increase_of_a_maximum_unknown():
     assert np.isnan(noise_lift(np.ones(5), np.nan, 5)).all()

@@ -216,7 +216,7 @@ def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, 
             Contribution(Cause.NOISE, sd, "a bias, by mistake")
 
 
-def test_a_colliding_sweep_reports_scatter_known_only_from_draws(sweep_file):
+def test_a_colliding_sweep_reports_the_scatter_of_its_draws(sweep_file):
     (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
     whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
     (largest,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))

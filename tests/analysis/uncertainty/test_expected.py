@@ -26,7 +26,7 @@ NOISE = WhiteNoise(
 
 
 @pytest.mark.thorough
-def test_noise_is_known_as_well_as_was_stated_before(tmp_path):
+def test_the_uncertainty_of_noise_matches_its_prediction(tmp_path):
     plan = Measurement(name="weak", excitation=NOISE, ramp_s=0.3)
     expected = expected_uncertainty(plan, RIG)
     path = tmp_path / "weak.h5"
@@ -129,7 +129,7 @@ def test_an_uncomputable_motion_has_no_expected_uncertainty(monkeypatch):
 @pytest.mark.parametrize(
     ("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), pytest.param(300.0, 5.0, marks=pytest.mark.slow)]
 )
-def test_a_dwell_that_collides_is_known_as_well_as_was_stated_before(tmp_path, at_hz, level_vpp):
+def test_the_uncertainty_of_a_colliding_dwell_matches_its_prediction(tmp_path, at_hz, level_vpp):
     """One run under a base that does not yield told it up to 3.4 times too well."""
     plan = dwell(at_hz, level_vpp)
     said = {each.quantity: each.after(each.time_s) for each in expected_uncertainty(plan, RIG)}
@@ -142,7 +142,7 @@ def test_a_dwell_that_collides_is_known_as_well_as_was_stated_before(tmp_path, a
         assert 0.3 < said[name] / told[name] < 4.0, name
 
 
-def test_a_dwell_whose_base_is_held_is_reported_at_the_voltage_that_holds_it():
+def test_a_dwell_with_a_held_base_is_predicted_like_one_with_the_same_setting():
     """The same base by a setting and by feedback: the same promise."""
     by_setting = expected_uncertainty(dwell(260, 0.05), RIG)
     base_m = base_motion(dwell(260, 0.05).excitation, RIG, np.array([260.0])).amplitude_m
@@ -175,7 +175,7 @@ def test_a_dwell_of_every_shipped_specimen_is_reported_or_not_promised(name):
 
 
 @pytest.mark.parametrize(("duration_s", "window_s"), [(2.0, 2.0), (30.0, 5.0)])
-def test_a_dwell_is_looked_at_over_its_window_or_all_of_it(duration_s, window_s):
+def test_a_dwell_is_analysed_over_its_window_or_completely(duration_s, window_s):
     """Of four seconds it said "after 5 s as planned"."""
     dwell = Dwell(amplitude_vpp=0.05, frequency_hz=130.0, settle_s=1.0, duration_s=duration_s)
     found = expected_uncertainty(Measurement(name="dwell", excitation=dwell), RIG)

@@ -30,14 +30,14 @@ def noise_wish(time_s):
 
 
 @pytest.mark.thorough
-def test_the_time_to_a_wish_grows_with_the_square_of_its_sharpness():
+def test_the_time_to_a_target_grows_with_its_inverse_square():
     for time_s in (20.0, 80.0, 320.0):
         found_s = time_to_wishes_s(plan(NOISE, Until(resonance_hz=noise_wish(time_s))), RIG)
         assert found_s == pytest.approx(time_s, rel=1e-6)
 
 
 @pytest.mark.thorough
-def test_a_recording_is_predicted_to_end_at_a_look_and_at_its_longest_time():
+def test_a_recording_is_predicted_to_end_at_an_analysis_or_at_its_longest_time():
     times_s = [
         expected_recorded_s(plan(NOISE, Until(resonance_hz=noise_wish(time_s))), RIG)
         for time_s in (1.0, 12.0, 1000.0)

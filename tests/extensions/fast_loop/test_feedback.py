@@ -111,7 +111,7 @@ def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
 
 
 @pytest.mark.thorough
-def test_the_designed_gains_cost_less_than_none_or_twice_as_much():
+def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
     """All that is weighed, by simulation under its noises."""
     weights, model, rng = LawWeights(), plant(specimen=LINEAR), np.random.default_rng(5)
     step, volt = model.step
@@ -149,7 +149,7 @@ def test_a_delayed_law_that_destabilises_motions_is_reported():
     assert hold.at_hz == pytest.approx(112.0, abs=0.5)
 
 
-def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
+def test_no_law_holds_the_branch_with_a_latency_above_a_millisecond():
     unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     largest = [
         branch_multipliers(each, design_law(each), branch(), unstable).max()
@@ -180,7 +180,7 @@ def test_the_played_signal_moves_the_base_by_the_transfer_function():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("begin", "ratio"), [("rest", 0.42), ("above", 2.79)])
-def test_a_branch_among_stops_is_the_one_of_the_side_from_which_its_level_is_met(begin, ratio):
+def test_a_branch_with_stops_depends_on_the_direction_to_its_level(begin, ratio):
     branch = impact_branch(gong2025(), 1e-6, 97.5, (97.4, 97.6), begin)
     at = np.argmin(np.abs(branch.frequencies_hz - 97.5))
     assert branch.response_ii[at, 0] == pytest.approx(ratio, rel=0.02)

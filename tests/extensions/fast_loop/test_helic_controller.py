@@ -95,7 +95,7 @@ def test_frames_match_the_protocol_documents(installed):
     assert frame(6, 3, bytes.fromhex("0c0004030201")).hex(" ") == "48 4c 06 03 06 00 0c 00 04 03 02 01 08 d1"
 
 
-def test_a_law_of_two_gains_is_reported_exactly_and_any_other_is_refused_with_what_to_do(installed):
+def test_a_law_of_two_gains_is_read_exactly_and_other_laws_are_refused_with_advice(installed):
     from helic_signals import pd_gains
 
     rng = np.random.default_rng(22)

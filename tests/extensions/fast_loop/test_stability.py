@@ -87,7 +87,7 @@ def covers(each, size):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("index", [60, 300])
-def test_a_held_motion_is_reported_as_stable_or_not_though_only_its_base_and_m0_are_seen(index):
+def test_the_stability_of_a_held_motion_follows_from_base_and_m0(index):
     fitted, size = told(index, 6, 1.0, 1)
     assert sum(covers(each, size) for each in fitted) >= 5
     for each in fitted:

@@ -73,7 +73,7 @@ def recording(tmp_path):
     return synthetic.write_recording(tmp_path, plan, base, velocity, parts, name="branch")
 
 
-def test_the_package_is_missing_there_and_only_there(run):
+def test_the_package_is_missing_in_the_other_environment_only(run):
     assert vibench_fast_loop.__file__.startswith(str(ROOT))
     assert "No module named 'vibench_fast_loop'" in run("-c", "import vibench_fast_loop").stderr
 
@@ -82,7 +82,7 @@ def test_the_package_is_missing_there_and_only_there(run):
 @pytest.mark.parametrize(
     "given", [("branch",), ("quick", "--bench", "virtual_rig_controller")], ids=["plan", "bench"]
 )
-def test_nothing_is_measured(run, given, tmp_path):
+def test_a_measurement_that_needs_the_missing_package_is_refused(run, given, tmp_path):
     told = run("-m", "vibench.cli", "measure", *given, "--out", "out", "--estimate")
     assert told.returncode == 1
     assert SENTENCE in " ".join(told.stderr.split())
@@ -109,7 +109,7 @@ def test_an_old_recording_is_reported_by_command_and_report(run, recording, tmp_
 
 
 @pytest.mark.thorough
-def test_the_window_lists_every_other_test(run):
+def test_the_window_lists_tests_that_do_not_need_the_missing_package(run):
     code = (
         "from vibench.gui.pages.test.test_page import shipped_tests\n"
         "print(*sorted({each.measurement.excitation.kind for each in shipped_tests()}))"

@@ -15,7 +15,7 @@ def test_only_the_link_to_the_base_resists_when_the_whole_chain_moves_as_one():
     np.testing.assert_allclose(together[1:], 0.0, atol=1e-9)
 
 
-def test_a_link_pulls_on_the_outer_masses_of_its_own_cell_and_of_the_one_before():
+def test_a_coupling_spring_acts_on_m0_of_its_cell_and_of_the_previous_cell():
     specimen = gong2025()
     stiffness = chain_of(specimen, 3).stiffness_matrix
     assert stiffness[3, 0] == stiffness[6, 3] == -specimen.stiffnesses[0]

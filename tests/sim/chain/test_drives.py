@@ -102,7 +102,7 @@ def test_base_motion_stretches_only_the_first_link():
     np.testing.assert_array_equal(moved[:, 1], 0.0)
 
 
-def test_stops_hold_energy_only_where_they_are_pressed():
+def test_stops_store_energy_only_in_contact():
     cell = gong2025(gap_m=(30e-6, 60e-6))
     for contact in (cell.contact, HuntCrossley(cell.contact.stiffness, 0.3), LinearGap(2e5)):
         chain = chain_of(replace(cell, contact=contact), 1)

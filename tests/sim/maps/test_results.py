@@ -56,7 +56,7 @@ def several_starts():
     return solve_map(plan)
 
 
-def test_several_starts_show_how_many_motions_there_are(several_starts):
+def test_several_starts_reveal_the_number_of_motions(several_starts):
     counts = several_starts.motion_counts
     for place in np.ndindex(counts.shape):
         found = several_starts.motions_at(*place)

@@ -57,7 +57,7 @@ def test_equal_motions_of_two_starts_are_recognised(one, other, same):
     assert len(motions_among([one, other])) == (1 if same else 2)
 
 
-def test_a_motion_is_named_by_the_start_that_shows_it_best():
+def test_a_motion_is_reported_from_the_start_with_the_smallest_error():
     (motion,) = motions_among([reached(OPEN, None, 1.0, 1e-6), reached(TORUS, None, 1.0, 1e-6)])
     assert kind_among(motion, FORGETTING_S) is TORUS
 

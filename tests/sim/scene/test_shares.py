@@ -8,7 +8,7 @@ from vibench.sim.scene.shares import Count, escape_rate, shares_of, wilson_share
 
 
 @pytest.mark.parametrize(("count", "trials"), [(0, 16), (1, 16), (5, 16), (16, 16), (37, 64)])
-def test_the_interval_of_a_share_is_that_of_wilson(count, trials):
+def test_the_interval_of_a_share_is_the_wilson_interval(count, trials):
     found = wilson_share(count, trials)
     known = binomtest(count, trials).proportion_ci(0.95, method="wilson")
     assert found.share == count / trials

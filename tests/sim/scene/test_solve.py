@@ -41,7 +41,7 @@ def scene_of(contact, frequency_hz, amplitude_m, **options):
     return Scene(gong2025(contact=contact), Harmonic(frequency_hz, amplitude_m), **options)
 
 
-def test_the_closed_form_is_the_transmissibility_and_the_state_that_integration_ends_in():
+def test_the_closed_form_matches_transmissibility_and_final_state():
     found = solve_scene(scene_of("hertz", 200.0, 5e-6))
     x, _, _, p = np.abs(base_transmissibility(gong2025(), 200.0)[0])
     np.testing.assert_allclose(responses(found), [x, x, p, p], rtol=1e-12)

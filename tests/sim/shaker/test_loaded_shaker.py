@@ -93,7 +93,7 @@ def linear_motion():
     return drive, motion
 
 
-def test_base_and_specimen_answer_as_the_closed_form_of_the_loaded_rig(linear_motion):
+def test_base_and_specimen_move_as_in_the_closed_form_of_the_loaded_rig(linear_motion):
     drive, motion = linear_motion
     acceleration, velocity = per_volt(LINES_HZ.astype(float), gong2025())
     assert lines(motion.base_acceleration) / lines(drive) == pytest.approx(acceleration, rel=1e-3)

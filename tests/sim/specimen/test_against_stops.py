@@ -14,7 +14,7 @@ def test_free_response_is_the_transmissibility():
     np.testing.assert_array_equal(answer.free_p, truth[:, 3])
 
 
-def test_stuck_response_is_that_of_the_joined_masses():
+def test_the_stuck_response_equals_that_of_the_joined_masses():
     """A spring a million times stiffer between m1 and m2 leaves p nowhere to go."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses
@@ -39,7 +39,7 @@ def test_the_lever_gives_x_for_any_p(stiffer):
 
 @pytest.mark.parametrize("frequency_hz", [180.0, 200.0, 440.0])
 @pytest.mark.parametrize("amplitude_m", [80e-6, 300e-6])
-def test_a_large_motion_against_the_stops_is_about_the_fundamental_s(frequency_hz, amplitude_m):
+def test_the_fundamental_estimates_a_large_motion_against_the_stops(frequency_hz, amplitude_m):
     specimen = gong2025()
     settled = steady_response(specimen, Harmonic(frequency_hz, amplitude_m), duration_s=12.0, window_s=2.0)
     answer = base_response(specimen, frequency_hz)

@@ -26,7 +26,7 @@ def test_a_point_that_was_measured_is_not_estimated_again():
     assert 0 not in list(costs.learn(1, 7.0))
 
 
-def test_plans_without_a_measured_neighbour_are_scaled_by_how_far_plans_were_off():
+def test_plans_without_a_measured_neighbour_are_scaled_by_the_error_of_other_plans():
     costs = line_of([1.0, 1.0, 1.0, 2.0])
     is_missing = np.array([False, True, True, True])
     assert costs.left_s(is_missing) == pytest.approx(4.0)

@@ -12,12 +12,12 @@ def test_a_range_includes_its_stop_when_it_is_hit():
     assert len(frequency_range(1.0, 2.0, 0.1)) == 11
 
 
-def test_a_range_ends_before_a_stop_that_it_misses():
+def test_a_range_ends_before_its_stop_if_the_step_does_not_fit():
     assert frequency_range(1.0, 2.0, 0.4) == (1.0, 1.4, 1.8)
 
 
 @given(st.floats(0.1, 100.0), st.integers(0, 500), st.floats(1e-3, 10.0))
-def test_a_range_has_one_value_more_than_whole_steps_whatever_is_rounded(start, steps, step):
+def test_a_range_has_one_value_more_than_steps_despite_rounding(start, steps, step):
     values = frequency_range(start, start + steps * step, step)
     assert len(values) == steps + 1
     assert np.allclose(np.diff(values), step)

@@ -33,7 +33,7 @@ def test_the_weight_of_a_point_includes_all_points_that_wait_for_it():
     assert scheduler.take(0.1, 1) == (0,)
 
 
-def test_a_follower_waits_until_its_predecessor_is_finished():
+def test_a_point_waits_until_its_predecessor_is_finished():
     scheduler = scheduler_of([1.0, 2.0], after=[NOBODY, 0])
     assert scheduler.take(10.0, 10) == (0,)
     assert scheduler.take(10.0, 10) == ()
@@ -41,7 +41,7 @@ def test_a_follower_waits_until_its_predecessor_is_finished():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_a_follower_of_a_finished_point_may_begin_at_once():
+def test_the_successor_of_a_finished_point_can_start_at_once():
     scheduler = scheduler_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
     assert scheduler.take(10.0, 10) == (1,)
 

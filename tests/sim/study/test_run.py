@@ -113,7 +113,7 @@ def test_predictions_state_where_they_began(truth):
     assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
 
 
-def test_a_given_start_is_the_start_of_every_point():
+def test_every_point_begins_at_the_requested_start():
     state = (0.0, 2e-5, 0.0, 0.0, 0.05, 0.0)
     study = Study(
         frequencies_hz=[100.0, 130.0],

@@ -148,7 +148,7 @@ def test_sessions_state_who_computed_which_point(small, tmp_path):
 
 
 @pytest.mark.thorough
-def test_resuming_computes_what_is_missing_and_nothing_else(study, tmp_path, require_equal):
+def test_resuming_computes_only_missing_points(study, tmp_path, require_equal):
     path = tmp_path / "a.h5"
     make_file(path, study)
     count = itertools.count()
@@ -189,7 +189,7 @@ def test_another_study_is_refused_with_the_differences(small, tmp_path, change, 
 
 
 @pytest.mark.thorough
-def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small, tmp_path):
+def test_a_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     path = tmp_path / "a.h5"
     with FileStore.created(path, small):
         with pytest.raises(StudyError, match="is being written by another run"):

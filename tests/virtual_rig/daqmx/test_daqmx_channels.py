@@ -60,7 +60,7 @@ def test_excitation_needs_ac_coupling(task):
         verify(task)
 
 
-def test_a_current_the_device_does_not_have_is_refused_with_those_it_has(task):
+def test_an_unsupported_sensor_current_is_refused_with_the_supported_ones(task):
     excited(task, 0.004)
     with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"0\.004\nPossible Values: 0, 0\.002"):
         verify(task)
@@ -115,7 +115,7 @@ def test_a_terminal_configuration_the_device_does_not_have_is_refused(task):
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0, 100.0, 51201.0])
-def test_a_rate_out_of_reach_is_refused_with_the_rates_there_are(task, rate_hz):
+def test_an_unreachable_rate_is_refused_with_the_available_rates(task, rate_hz):
     task.ai_channels.add_ai_voltage_chan(MODULE)
     task.timing.cfg_samp_clk_timing(rate_hz)
     with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"1651\.61 to 51200"):

@@ -35,7 +35,7 @@ def test_every_n_samples_the_callback_can_read_n_samples_without_a_gap(task):
     task.stop()
 
 
-def test_a_callback_that_does_not_read_is_not_called_for_ever(task):
+def test_a_callback_that_does_not_read_is_not_called_without_end(task):
     task.timing.cfg_samp_clk_timing(10000, sample_mode=AcquisitionType.CONTINUOUS)
     calls = queue.Queue()
 

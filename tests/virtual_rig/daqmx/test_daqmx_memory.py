@@ -19,7 +19,7 @@ def task(daq):
     return daq.inputs("Dev1/ai1")
 
 
-def test_a_buffer_or_a_read_of_more_than_there_is_memory_for_is_refused(daq, task):
+def test_buffers_and_reads_larger_than_the_memory_are_refused(daq, task):
     task.timing.cfg_samp_clk_timing(10_000, samps_per_chan=GIANT)
     with refused(DAQmxErrors.PAL_MEMORY_FULL):
         task.start()

@@ -97,7 +97,7 @@ def test_a_finite_task_that_a_read_starts_can_be_read_again_and_again(daq):
     np.testing.assert_allclose(second, expected((1,), 200, 200)[0], atol=1e-9)
 
 
-def test_polling_for_samples_makes_them_come(task):
+def test_polling_for_samples_advances_the_rig(task):
     task.start()
     questions = 0
     while task.in_stream.avail_samp_per_chan < 100:
@@ -106,7 +106,7 @@ def test_polling_for_samples_makes_them_come(task):
     assert len(task.read(READ_ALL_AVAILABLE)[0]) >= 100
 
 
-def test_polling_for_the_end_makes_it_come(daq):
+def test_polling_for_the_end_advances_the_rig(daq):
     task = daq.inputs("Dev1/ai1", 1000, samples=500)
     task.start()
     questions = 0

@@ -37,7 +37,7 @@ def test_the_samples_around_an_edge_on_a_line_are_kept_whenever_it_comes(daq, ta
         task.stop()
 
 
-def test_an_edge_that_comes_before_there_is_enough_to_keep_is_ignored(daq, task):
+def test_a_trigger_before_the_pretrigger_samples_are_complete_is_ignored(daq, task):
     by_line(task)
     task.start()
     daq.server.let_pass((BEFORE - 1) / RATE_HZ)
@@ -49,7 +49,7 @@ def test_an_edge_that_comes_before_there_is_enough_to_keep_is_ignored(daq, task)
     assert np.shape(task.read(SAMPLES)) == (2, SAMPLES)
 
 
-def test_an_edge_that_never_comes_leaves_the_task_to_be_stopped(daq, task):
+def test_a_task_whose_trigger_never_comes_can_be_stopped(daq, task):
     by_line(task)
     task.start()
     caught = []

@@ -67,7 +67,7 @@ def test_a_cleared_task_is_gone(daq):
         interpreter.start_task(handle)
 
 
-def test_a_second_task_of_a_name_is_refused_or_joined_as_the_program_wishes(daq, task):
+def test_a_second_task_of_the_same_name_is_refused_or_joined_as_requested(daq, task):
     def options(behavior):
         return GrpcSessionOptions(daq.options.grpc_channel, "", initialization_behavior=behavior)
 
@@ -97,7 +97,7 @@ def test_a_missing_trigger_times_out_without_samples(daq, task):
     assert np.shape(task.read(10)) == (2, 10)
 
 
-def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
+def test_a_task_on_the_clock_of_another_task_starts_with_it(daq, task):
     output = daq.outputs("Dev1/ao0", 1)
     output.timing.cfg_samp_clk_timing(1000, source="/Dev1/ai/SampleClock")
     output.write(np.ones(1000), auto_start=True)
@@ -121,7 +121,7 @@ def test_a_chassis_shows_its_trigger_terminal_once_it_is_reserved(daq):
     assert task.triggers.start_trigger.term == "/cDAQ1/ai/StartTrigger"
 
 
-def test_a_world_that_cannot_begin_leaves_the_device_free(daq):
+def test_a_world_that_cannot_start_leaves_the_device_free(daq):
     daq.world.slowest_hz = 2000.0
     task = daq.inputs("Dev1/ai0")
     task.timing.cfg_samp_clk_timing(1000)

@@ -24,7 +24,7 @@ def restart(daq):
     daq.server.faults.remove(gone)
 
 
-def test_tasks_of_a_vanished_client_are_there_until_the_restart(daq):
+def test_tasks_of_a_disconnected_client_remain_until_the_restart(daq):
     leaked = Task("leaked", grpc_options=daq.options)
     leaked.ai_channels.add_ai_voltage_chan("Dev1/ai0")
     leaked.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
@@ -54,7 +54,7 @@ def test_messages_of_many_megabytes_are_accepted(daq):
     assert np.shape(task.read(400_000)) == (2, 400_000)
 
 
-def test_a_restart_of_the_server_frees_a_reader_that_waits_for_ever(connect):
+def test_a_restart_of_the_server_ends_a_blocked_read(connect):
     daq = connect()
     task = Task(grpc_options=daq.options)
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1")

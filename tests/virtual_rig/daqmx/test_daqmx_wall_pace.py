@@ -78,7 +78,7 @@ def test_a_partial_read_of_two_channels_leaves_every_row_in_its_place(connect, c
     np.testing.assert_allclose(block[1, :50], 0.5 + 3 * np.sin(2 * np.pi * 120 * time_s), atol=1e-9)
 
 
-def test_a_reader_that_comes_too_late_has_lost_samples_and_is_reported(connect, clock):
+def test_a_reader_that_is_too_late_loses_samples_with_an_error(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
     task.in_stream.input_buf_size = 500

@@ -47,7 +47,7 @@ def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served):
         RemoteUsbDevice(address)
 
 
-def test_a_bench_with_the_token_is_let_in(served, monkeypatch):
+def test_a_bench_with_the_token_is_accepted(served, monkeypatch):
     virtual, address = served
     monkeypatch.setenv(TOKEN_VARIABLE, virtual.token)
     with bench_on(connected(virtual, address)) as bench:

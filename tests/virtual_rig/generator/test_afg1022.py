@@ -152,7 +152,7 @@ def test_phase_is_in_radians_and_kept_in_whole_degrees():
     assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
 
 
-def test_a_shape_that_cannot_go_so_fast_lowers_the_frequency():
+def test_a_shape_with_a_lower_limit_lowers_the_frequency():
     device = generator()
     device.execute(b"FREQ 20MHz;:FUNC SQU")
     assert ask(device, "FREQ?") == "1.25E+07"
@@ -239,7 +239,7 @@ class TestQuirks:
         assert ask(device, "VOLT?;:FREQ?") == "1.0E+00;1.0E+06"
         assert errors(device) == []
 
-    def test_the_load_may_be_a_matter_of_the_panel_alone(self):
+    def test_the_load_may_be_settable_at_the_panel_only(self):
         device = generator(replace(PLAIN, panel_load_ohm=50.0))
         device.execute(b"OUTP:IMP INF")
         assert errors(device) == [-113]
@@ -257,7 +257,7 @@ def test_a_corrupted_reply_is_followed_by_a_sound_one():
     assert device.execute(b"*IDN?").data == sound
 
 
-def test_the_duty_is_set_and_complained_about():
+def test_setting_the_duty_succeeds_with_error_minus_102():
     device = generator()
     device.execute(b"PULS:DCYC 20")
     assert ask(device, "PULS:DCYC?") == "2.0E+01"

@@ -30,7 +30,7 @@ def test_a_message_of_endless_queries_is_carried_out_and_its_answers_are_dropped
     assert asked(afg, b"*IDN?").startswith(b"TEKTRONIX")
 
 
-def test_waveforms_of_ever_new_names_end_when_the_memory_is_full():
+def test_waveforms_of_new_names_are_refused_when_the_memory_is_full():
     generator = Keysight33500B(lambda: 0.0)
     codes = np.zeros(400_000, dtype=">i2").tobytes()
     told = []

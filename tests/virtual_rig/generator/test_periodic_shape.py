@@ -57,5 +57,5 @@ def test_a_stretch_far_below_the_resolution_of_a_point_still_reads_the_point():
     assert mean(TABLE, 0.3, 1e-15) == mean(TABLE, 0.3, 0.0)
 
 
-def test_a_sine_averages_to_nothing_over_a_whole_cycle():
+def test_a_sine_averages_to_zero_over_a_whole_cycle():
     assert mean(Sine(), 0.3, 1.0) == pytest.approx(0, abs=1e-15)

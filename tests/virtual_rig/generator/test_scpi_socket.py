@@ -32,7 +32,7 @@ def instrument(server):
     resources.close()
 
 
-def test_a_session_asks_and_sets(instrument):
+def test_a_session_answers_queries_and_accepts_settings(instrument):
     assert instrument.query("*IDN?").startswith("TEKTRONIX,AFG1022,")
     instrument.write("SOUR1:FREQ 1.5kHz")
     assert float(instrument.query("SOUR1:FREQ?")) == 1500
@@ -100,7 +100,7 @@ def test_commands_from_many_threads_and_rendering_never_mix_up_replies(generator
     assert generator.execute(b"SYST:ERR?").data.startswith(b"0,")
 
 
-def test_a_client_that_leaves_without_reading_disturbs_nobody(server, instrument, capsys):
+def test_a_client_that_disconnects_without_reading_affects_no_other_client(server, instrument, capsys):
     for _ in range(5):
         with socket.create_connection(("127.0.0.1", server.port), timeout=5) as leaving:
             leaving.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))

@@ -124,7 +124,7 @@ def test_arbitrary_means_are_exact_where_an_interval_is_a_whole_number_of_points
     assert np.abs(rig.render(2048, interval_s) - expected).max() < 1e-12
 
 
-def test_a_waveform_changed_in_memory_is_heard_at_once():
+def test_a_waveform_changed_in_memory_is_played_at_once():
     rig = Rig()
     rig.upload([0, 0])
     rig.send("FUNC EMEM;:FREQ 10;:VOLT 2;:OUTP ON")

@@ -114,14 +114,14 @@ class TestTime:
         full = np.flatnonzero(shown[0] > 3.9) / 51_200
         assert (full[0], full[-1]) == pytest.approx((0.5, 0.6), abs=2e-3)
 
-    def test_a_rig_on_the_walls_clock_plays_its_script_too(self, scripted):
+    def test_a_rig_in_real_time_also_runs_its_fault_script(self, scripted):
         text = fault("overrun", 0.3)
         with open_bench(scripted(text, pace="wall", speed=3.0)) as bench:
             bench.digitizer.start()
             with pytest.raises(DataLost):
                 read_for(bench, 2.0)
 
-    def test_a_rig_lives_on_while_its_bench_is_closed_and_opened(self, scripted):
+    def test_a_virtual_rig_continues_while_its_bench_is_closed_and_opened(self, scripted):
         with RigPower(scripted(fault("corrupt_reply", 1.0))) as power:
             for _ in range(3):
                 with open_bench(power.rig, power=power) as bench:
@@ -173,7 +173,7 @@ class TestEffects:
                     refusals += 1
             assert refusals == 4  # the first at once, a second each after it
 
-    def test_a_device_taken_by_another_program_is_named_as_such_until_it_is_given_back(self, scripted):
+    def test_a_device_used_by_another_program_is_reported_until_it_is_released(self, scripted):
         with ReconnectingBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.5)  # a task that runs goes on

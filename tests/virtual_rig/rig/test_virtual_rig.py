@@ -165,7 +165,7 @@ def test_the_usb_cable_is_served_on_the_daq_port_and_the_socket_answers(switch_o
     socket.close()
 
 
-def test_a_rig_on_the_wall_clock_delivers_as_time_passes(switch_on):
+def test_a_rig_in_real_time_delivers_samples_as_time_passes(switch_on):
     fast = changed(RIG, virtual={"pace": "wall", "speed": 5.0})
     program = switch_on(fast)
     program.play(160, 0.2)

@@ -15,7 +15,7 @@ GRID_RATE_HZ = USUAL_GRID.rate_hz
     st.lists(st.floats(-3.5, 3.5), min_size=1, max_size=50),
     st.lists(st.integers(1, 200), min_size=1, max_size=5),
 )
-def test_the_integral_of_what_is_played_matches_what_was_queued(rate_hz, volts, blocks):
+def test_the_integral_of_the_played_signal_matches_the_queued_signal(rate_hz, volts, blocks):
     output, step = AnalogueOutput(), 0
     output.queue(np.array(volts), rate_hz, 0)
     played = []
@@ -34,7 +34,7 @@ def test_every_sample_is_held_for_its_period():
     assert output.render(100, 8) == pytest.approx([1, 1, -2, -2, 3, 3, 0, 0])
 
 
-def test_queued_in_parts_it_plays_without_a_gap():
+def test_a_signal_queued_in_parts_plays_without_a_gap():
     output = AnalogueOutput()
     output.queue(np.array([1.0, 2.0]), GRID_RATE_HZ / 2, 0)
     first = output.render(0, 3)
@@ -42,7 +42,7 @@ def test_queued_in_parts_it_plays_without_a_gap():
     assert np.concatenate([first, output.render(3, 6)]) == pytest.approx([1, 1, 2, 2, 3, 3, 4, 4, 0])
 
 
-def test_it_counts_what_is_left():
+def test_the_output_counts_its_unplayed_steps():
     output = AnalogueOutput()
     output.queue(np.ones(4), GRID_RATE_HZ / 2, 0)
     assert [output.unplayed(step) for step in (0, 1, 2, 7, 8, 9)] == [4, 4, 3, 1, 0, 0]
@@ -51,7 +51,7 @@ def test_it_counts_what_is_left():
     assert np.all(output.render(2, 4) == 0)
 
 
-def test_after_a_pause_it_begins_at_once():
+def test_a_signal_after_a_pause_begins_at_once():
     output = AnalogueOutput()
     output.queue(np.ones(1), GRID_RATE_HZ, 0)
     output.render(0, 50)

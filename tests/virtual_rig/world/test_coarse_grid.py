@@ -41,7 +41,7 @@ def moved(frequency_hz, amplitude_v, grid):
 
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0, WATCHED_HZ])
-def test_the_coarsest_grid_moves_the_base_within_its_stated_error_and_the_specimen_as_it_should(frequency_hz):
+def test_the_coarsest_grid_has_its_stated_error_at_the_base_and_a_right_specimen(frequency_hz):
     coarse, fine = (moved(frequency_hz, 5e-3, TimeGrid(rate_hz)) for rate_hz in (COARSE.rate_hz, 409_600.0))
     # Near 266 Hz the specimen pushes back with its whole resonance.
     allowed = max(level_error(frequency_hz, COARSE.rate_hz), 6e-3)
@@ -88,7 +88,7 @@ def test_a_coarse_grid_is_refused_for_a_sample_rate_that_it_does_not_carry():
         world.sample((), 51_200.0)
 
 
-def test_a_plan_above_what_a_coarse_grid_carries_is_refused_before_anything_moves():
+def test_a_plan_above_the_band_of_a_coarse_grid_is_refused_before_output():
     def dwell(frequency_hz):
         excitation = Dwell(frequency_hz=frequency_hz, amplitude_vpp=0.1, duration_s=1)
         return Measurement(name="dwell", excitation=excitation)

@@ -129,7 +129,7 @@ def test_an_input_beyond_its_range_clips_and_reports_it_once():
     assert within.overloaded().tolist() == [False] * 4
 
 
-def test_asking_for_overloads_forgets_them():
+def test_reading_the_overloads_clears_them():
     world = World(QUIET, Silence())
     sampler = world.sample((Input("cDAQ1Mod1/ai2", 5.0, Coupling.DC, 0.002),), 51_200.0)
     sampler.read(100)
@@ -234,7 +234,7 @@ def test_a_fast_converter_clock_shows_every_instrument_slow():
     assert USUAL_GRID.physical_step_s(100.0) == pytest.approx(STEP_S * (1 - 1e-4), rel=1e-7)
 
 
-def test_a_rate_that_is_not_possible_is_refused_with_those_that_are():
+def test_an_impossible_rate_is_refused_with_the_possible_rates():
     with pytest.raises(ConfigurationError, match=r"100 Hz is not possible.*500 to 250000 Hz"):
         World(QUIET, Silence()).sample(INPUTS, 100.0)
 

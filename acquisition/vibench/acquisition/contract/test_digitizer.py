@@ -10,7 +10,7 @@ KIND = PlugInKind.DIGITIZER
 BLOCK = 256
 
 
-def test_it_says_who_it_is_what_it_reads_and_how_fast(bench: Bench) -> None:
+def test_it_reports_its_identity_channels_and_rate(bench: Bench) -> None:
     digitizer = bench.digitizer
     assert digitizer.identity.model
     assert digitizer.identity.reply
@@ -52,7 +52,7 @@ def test_reading_without_a_start_and_starting_twice_are_refused(bench: Bench) ->
         bench.digitizer.read(0)
 
 
-def test_volts_are_whole_counts_where_it_tells_the_step(bench: Bench) -> None:
+def test_volts_are_whole_counts_if_the_step_is_known(bench: Bench) -> None:
     steps_v = bench.digitizer.volts_per_count
     assert len(steps_v) == len(bench.digitizer.roles)
     bench.digitizer.start()

@@ -42,7 +42,7 @@ def test_it_is_described_before_it_is_opened(rig: Rig) -> None:
     assert can.highest_sine_hz > 0
 
 
-def test_it_says_who_it_is_and_what_must_be_confirmed(bench: Bench) -> None:
+def test_it_reports_its_identity_and_the_settings_to_confirm(bench: Bench) -> None:
     identity = bench.generator.identity
     assert identity.model
     assert identity.reply
@@ -59,7 +59,7 @@ def test_it_is_silent_when_it_has_been_opened(bench: Bench) -> None:
     assert is_quiet(bench)
 
 
-def test_a_sine_has_the_amplitude_and_frequency_that_were_asked_for(bench: Bench) -> None:
+def test_a_sine_has_the_requested_amplitude_and_frequency(bench: Bench) -> None:
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
     bench.digitizer.start()
     assert is_quiet(bench), "load_sine must leave the output as it is"
@@ -136,7 +136,7 @@ def test_a_burst_plays_its_cycles_and_ends_by_itself(bench: Bench) -> None:
     assert tone_v(bench, TONE_HZ) == pytest.approx(terminal_v(bench), rel=SAME)
 
 
-def test_a_sweep_of_its_own_waits_for_its_trigger_and_ends_where_it_should(bench: Bench) -> None:
+def test_a_built_in_sweep_waits_for_its_trigger_and_ends_at_its_stop(bench: Bench) -> None:
     sweep = Sweep(TONE_HZ, 1.25 * TONE_HZ, 2.0)
     can = generator_driver(bench.rig.generator).describe(bench.rig.generator)
     if can.longest_sweep_s < sweep.duration_s:
@@ -158,7 +158,7 @@ def test_a_sweep_of_its_own_waits_for_its_trigger_and_ends_where_it_should(bench
     assert tone_v(bench, sweep.stop_hz) == pytest.approx(terminal_v(bench), rel=SAME)
 
 
-def test_a_setting_takes_a_time_that_was_measured(bench: Bench) -> None:
+def test_the_bench_check_measures_the_time_of_a_setting(bench: Bench) -> None:
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
     assert 0 < bench.generator.measured_latency_s() < 5.0
 

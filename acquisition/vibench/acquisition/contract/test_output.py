@@ -43,7 +43,7 @@ def playing(bench: Bench) -> Iterator[None]:
     output.stop()
 
 
-def test_it_says_who_it_is_and_how_far_ahead_it_is_written(bench: Bench) -> None:
+def test_it_reports_its_identity_and_its_lead_time(bench: Bench) -> None:
     output = output_of(bench)
     assert output.identity.reply
     assert output.identity == output.identity
@@ -53,7 +53,7 @@ def test_it_says_who_it_is_and_how_far_ahead_it_is_written(bench: Bench) -> None
     assert output.idle in IdleOutput
 
 
-def test_a_tone_is_heard_as_it_was_written_from_the_first_sample_on(bench: Bench) -> None:
+def test_a_tone_appears_at_the_terminal_from_its_first_sample(bench: Bench) -> None:
     with playing(bench):
         rate_hz = bench.digitizer.sample_rate_hz
         share = output_of(bench).ahead_samples / output_of(bench).sample_rate_hz
@@ -73,12 +73,12 @@ def test_a_sample_past_the_limit_is_refused_and_nothing_plays(bench: Bench, peak
         output.write(np.array([0.0, peak * bench.rig.daq.output.limit_v, 0.0]))
 
 
-def test_there_must_be_something_to_play(bench: Bench) -> None:
+def test_a_plan_without_a_signal_is_refused(bench: Bench) -> None:
     with refused():
         output_of(bench).arm()
 
 
-def test_stop_is_zero_at_any_time_and_the_next_stream_is_a_new_one(bench: Bench) -> None:
+def test_stop_outputs_zero_at_any_time_and_allows_another_stream(bench: Bench) -> None:
     output_of(bench).stop()
     with playing(bench):
         bench.digitizer.read(256)

@@ -55,7 +55,7 @@ def answered(block: LoopBlock, of_base: bool) -> complex:  # noqa: FBT001 - whic
     return complex_of(block.base if of_base else block.m0)[1]
 
 
-def test_it_says_who_it_is_and_what_its_configuration_says_of_it(bench: Bench) -> None:
+def test_it_reports_its_identity_and_its_configuration(bench: Bench) -> None:
     facts, config = controller_of(bench).facts, bench.rig.controller
     assert controller_of(bench).identity.reply
     assert controller_of(bench).identity == controller_of(bench).identity
@@ -68,7 +68,7 @@ def test_it_says_who_it_is_and_what_its_configuration_says_of_it(bench: Bench) -
     assert controller_of(bench).report().state is LoopState.SILENT
 
 
-def test_a_series_is_heard_at_the_terminal_as_it_was_told(bench: Bench) -> None:
+def test_a_fourier_series_appears_at_the_terminal_as_requested(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
     volts, blocks = listened(bench, 0.8)
@@ -80,7 +80,7 @@ def test_a_series_is_heard_at_the_terminal_as_it_was_told(bench: Bench) -> None:
     assert [each.end_s for each in blocks] == sorted(each.end_s for each in blocks)
 
 
-def test_the_coefficients_are_those_of_what_is_played_and_of_what_its_sensors_show(bench: Bench) -> None:
+def test_the_coefficients_match_the_played_signal_and_the_sensors(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
     volts, blocks = listened(bench, 1.2)
@@ -94,7 +94,7 @@ def test_the_coefficients_are_those_of_what_is_played_and_of_what_its_sensors_sh
         assert abs(complex_of(coefficients)[1]) == pytest.approx(shown, rel=0.05)
 
 
-def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
+def test_a_law_responds_to_its_samples_beside_the_series(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
     _, blocks = listened(bench, 0.8)
@@ -112,7 +112,7 @@ def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
     assert abs(complex_of(block.output)[1] - wanted) < 0.1 * LAW * level_v(bench)
 
 
-def test_it_falls_silent_when_nobody_talks_to_it_and_says_why(bench: Bench) -> None:
+def test_it_falls_silent_without_requests_and_gives_the_reason(bench: Bench) -> None:
     controller = controller_of(bench)
     bench.digitizer.start()
     controller.play(series(bench))
@@ -125,7 +125,7 @@ def test_it_falls_silent_when_nobody_talks_to_it_and_says_why(bench: Bench) -> N
     assert controller.report().state is LoopState.PLAYING, "it may be told to play again"
 
 
-def test_silence_is_legal_at_any_time_and_is_heard(bench: Bench) -> None:
+def test_silence_is_allowed_at_any_time_and_reaches_the_terminal(bench: Bench) -> None:
     controller_of(bench).silence(0.0)
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
