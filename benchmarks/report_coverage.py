@@ -28,7 +28,7 @@ from twin_agreement import random_rig
 
 import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import LimitExceeded, open_bench, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
+from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep, SteppedSine, WhiteNoise
 from vibench.acquisition.rig import Rig, specimen_of
 from vibench.analysis import AnalysisError, Simulation, analyse_files, budgets_of
 from vibench.analysis.frequency_response.distortion import scatters_beyond_noise
@@ -190,7 +190,11 @@ def named(quantity: str, specimen: Specimen) -> str | None:
 def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float, float]], object]:
     """Measure once; return value and expanded uncertainty by quantity, and the analysis."""
     with open_bench(rig) as bench:
-        run_measurement(bench, Measurement(name="measured", excitation=plan, ramp_s=0.3), path)
+        ended = run_measurement(bench, Measurement(name="measured", excitation=plan, ramp_s=0.3), path)
+    if ended.state is not RunState.FINISHED:
+        print(f"measured again, for the run {ended.state.value}: {ended.reason}", file=sys.stderr, flush=True)
+        path.unlink()
+        return measured(rig, plan, path)
     done = analyse_files([path], "measured", Simulation.LEFT_OUT)
     if not done.results:
         raise AnalysisError(str(done.failures))

@@ -189,7 +189,12 @@ def estimate_sentence(response: NoiseResponse) -> str:
     found = response.frequency_response
     how = found.settings
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"
-    if response.periodic is None:
+    if response.hits is not None:
+        fineness = (
+            f"hits of {how.segment_s:.3g} s under a window exp(-{how.decay_per_s:.3g} t), whose damping "
+            "widens the lines, but not the resonances"
+        )
+    elif response.periodic is None:
         fineness = (
             f"{how.window} segments of {how.segment_samples / how.sample_rate_hz:.3g} s overlapping by "
             f"{100 * how.overlap:g} %, lines {found.resolution_hz:.3g} Hz wide"
@@ -199,7 +204,7 @@ def estimate_sentence(response: NoiseResponse) -> str:
     text = f"Estimator {how.estimator.value}{ratio}; {fineness}."
     if not response.left_out:
         return text
-    parts = "segments" if response.periodic is None else "realisations"
+    parts = "realisations" if response.periodic else "hits" if response.hits else "segments"
     return (
         f"{text} Left out: {response.left_out} {parts}, for {response.lost_samples} lost and "
         f"{response.overloaded_samples} overloaded samples, or because they were cut short."

@@ -53,7 +53,8 @@ class Resonance:
     @property
     def is_explained(self) -> bool:
         """Whether the fitted modes describe the lines about this one, within their scatter."""
-        return self.reduced_chi_square <= max(self.chi_square_limit, WELL_FITTED)
+        # Not a number for a single hit, whose lines have no known scatter.
+        return not self.reduced_chi_square > max(self.chi_square_limit, WELL_FITTED)
 
     @property
     def remark(self) -> str:
@@ -154,8 +155,8 @@ class Leakage:
 
 
 def leakage_of(found: FrequencyResponse) -> Leakage | None:
-    """Return the leakage of a transmission; None for whole periods."""
-    if found.resolution_hz == 0.0:
+    """Return the leakage of a transmission; None for whole periods and for hits that decay."""
+    if found.resolution_hz == 0.0 or found.settings.decay_per_s is not None:
         return None
     how = found.settings
     window, segment_s = Window(how.window), how.segment_samples / how.sample_rate_hz
@@ -250,6 +251,8 @@ class Lines:
         self.frequency_hz, self.value = band.frequency_hz[usable], band.value[usable]
         self._spread = spread[usable]
         self._leakage = leakage_of(band)
+        # Under an exponential window, lines show the response at a complex frequency.
+        self._off_hz = -0.5j / np.pi * (band.settings.decay_per_s or 0.0)
         slope = band.drive_slope_per_hz
         self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
         # A scatter that is smoothed over lines counts as one from more averages.
@@ -292,7 +295,7 @@ class Lines:
     def modes(self, poles: Reals) -> Complexes:
         """Return the shapes of modes including leakage; see `mode_shapes`."""
         if self._leakage is None:
-            return mode_shapes(self.frequency_hz, poles)
+            return mode_shapes(self.frequency_hz + self._off_hz, poles)
         columns = []
         for log_frequency, log_damping in poles.reshape(-1, 2):
             natural, damping = 2 * np.pi * np.exp(log_frequency), np.exp(log_damping)
@@ -307,7 +310,7 @@ class Lines:
         return np.reshape(columns, (-1, self.frequency_hz.size)).T
 
 
-def mode_shapes(frequency_hz: Reals, poles: Reals) -> Complexes:
+def mode_shapes(frequency_hz: Reals | Complexes, poles: Reals) -> Complexes:
     """Return two shapes with real factors for each mode, shape (lines, 2 modes), scaled to order one.
 
     2 zeta / (1 - r^2 + 2 i zeta r) and i r times it, with r = w / w0; `poles` are ln w0 / 2 pi and ln zeta.

@@ -15,15 +15,22 @@ from ..recordings.checks import AbstractAnalysis
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import relative_sd, student_half_width
 from ..signals.quantity import Quantity
+from ..signals.window import Window
 from ..spectra.spectra import DensitySums
 from ..tables import Labelled, columns
 from ..tones.sine_fit import NoiseDriveLevel, noise_drive_level
 from .distortion import Distortion, distortion, scatters_beyond_noise
+from .hits import Hits, HitSpectra, find_hits, hit_spectra, weighted_alike, without_bounds
 from .modal_fit import Resonance
 from .periodic import PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .request import FrequencyResponseRequest
 from .resonance import resonances, scattered_resonances
-from .results import Estimator, FrequencyResponse, converted_frequency_response
+from .results import (
+    Estimator,
+    FrequencyResponse,
+    FrequencyResponseSettings,
+    converted_frequency_response,
+)
 from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
@@ -69,6 +76,12 @@ class NoiseResponse(Labelled):
     """Lost samples during the noise."""
     overloaded_samples: int
     """Samples during the noise with a channel near full scale."""
+
+    @property
+    def hits(self) -> int | None:
+        """Number of averaged hits; None for noise."""
+        found = self.frequency_response
+        return None if found.settings.decay_per_s is None else found.segments_used
 
     @property
     def median_coherence(self) -> float:
@@ -227,12 +240,16 @@ def _least_squares(
 def streamed_response(
     channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest = DEFAULT_REQUEST
 ) -> NoiseResponse:
-    """Estimate the transmission from all usable non-periodic noise.
+    """Estimate the transmission from all usable non-periodic noise, or from all hits of a hammer.
 
-    Raises NotEnoughData when less than two segments are left.
+    Raises NotEnoughData when less than two segments of noise, or no hit, are left.
     """
     rate = channels.sample_rate_hz
     stretch = only_stretch(channels, SegmentLabel.NOISE)
+    band = (noise.band_start_hz, noise.band_stop_hz)
+    hits = find_hits(channels, stretch, band, request.segment_s)
+    if hits is not None:
+        return _response_to_hits(channels, hits, band, request)
     segment = request.segment_samples(stretch.samples, rate)
     if segment < round(rate / noise.band_start_hz):
         raise NotEnoughData(
@@ -259,7 +276,6 @@ def streamed_response(
         # The sums expect base, response and reference (the drive), in this order.
         sums.add(data[[1, 2, 0]], valid)
         level.add(data[1], valid)
-    band = (noise.band_start_hz, noise.band_stop_hz)
 
     def by(estimator: Estimator) -> FrequencyResponse:
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
@@ -279,6 +295,54 @@ def streamed_response(
         periodic=None,
         used_s=stretch.samples / rate,
         left_out=chosen.segments_excluded,
+        lost_samples=bad.lost,
+        overloaded_samples=bad.overloaded,
+    )
+
+
+def _response_to_hits(
+    channels: Channels, hits: Hits, band_hz: tuple[float, float], request: FrequencyResponseRequest
+) -> NoiseResponse:
+    rate, size, bad = channels.sample_rate_hz, hits.segment_samples, _Unusable()
+    usable = []
+    for start in hits.starts:
+        data = channels.read(start, start + size)
+        if bad.valid(data, channels.overloaded(start, start + size)).all():
+            usable.append(data)
+    if not usable:
+        raise NotEnoughData(f"none of {len(hits.starts)} hits is without a fault{bad.text}; measure again")
+    data = np.array(usable)
+    settings = FrequencyResponseSettings(request.estimator, rate, size, "", 0.0, request.confidence)
+    spectra = hit_spectra(data, hits, settings, band_hz[1], fades=request.window is not Window.BOXCAR)
+    decay_per_s = spectra.settings.decay_per_s or 0.0
+
+    def by(estimator: Estimator, given: HitSpectra = spectra) -> FrequencyResponse:
+        noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
+        found = given.response(estimator, noise_ratio).without_delay(channels.response_delay_s)
+        inside = found.between(*band_hz)
+        # The response is known at i w + decay, where velocity over acceleration differs by this factor, too.
+        shift = 1 + decay_per_s / (2j * np.pi * inside.frequency_hz)
+        return as_displacements(inside).without_gain(channels.response_gain(inside.frequency_hz) / shift)
+
+    chosen = by(request.estimator)
+    found = _resonances(chosen)
+    if spectra.count > 1:
+        without = (_resonances(by(request.estimator, each)) for each in spectra.without_each())
+        found = scattered_resonances(found, tuple(without))
+    power = 2 * np.mean(np.abs(np.fft.rfft(data[:, 1])) ** 2, axis=0) / size**2
+    line_hz = np.fft.rfftfreq(size, 1 / rate)
+    inside = (line_hz >= band_hz[0]) & (line_hz <= band_hz[1])
+    motion = np.sqrt([np.sum(power[inside] / (2 * np.pi * line_hz[inside]) ** each) for each in (0, 4)])
+    return NoiseResponse(
+        frequency_response=chosen,
+        h1=by(Estimator.H1),
+        h2=by(Estimator.H2),
+        resonances=found,
+        base_level=NoiseDriveLevel(*band_hz, *motion.tolist(), relative_sd=np.nan),
+        bias=_bias(chosen, by(Estimator.DRIVE), found),
+        periodic=None,
+        used_s=spectra.count * size / rate,
+        left_out=hits.left_out + len(hits.starts) - spectra.count,
         lost_samples=bad.lost,
         overloaded_samples=bad.overloaded,
     )
@@ -320,7 +384,10 @@ def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse
 
 def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
     low, high = float(frequency_response.frequency_hz[0]), float(frequency_response.frequency_hz[-1])
-    return resonances(frequency_response, low_hz=low, high_hz=high)
+    if frequency_response.n_eff > 1:
+        return resonances(frequency_response, low_hz=low, high_hz=high)
+    found = resonances(weighted_alike(frequency_response), low_hz=low, high_hz=high)
+    return tuple(without_bounds(each) for each in found)
 
 
 @dataclass(frozen=True, eq=False)

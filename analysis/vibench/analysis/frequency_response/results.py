@@ -45,6 +45,9 @@ class FrequencyResponseSettings:
     """S_nn / S_mm for hv."""
     delay_s: float = 0.0
     """Delay of the response channel behind the drive channel, removed from the phase."""
+    decay_per_s: float | None = None
+    """Decay of the exponential window over hits [1/s], 0 without one; None for noise. Resonances are free of
+    its damping, lines are not."""
 
     @property
     def segment_s(self) -> float:

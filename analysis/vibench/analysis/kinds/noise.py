@@ -30,12 +30,14 @@ Estimate = Callable[[Channels, Any, FrequencyResponseRequest], Estimated]
 
 
 def _warnings(found: NoiseResponse) -> Iterator[Check]:
-    """Warn of resonances that the fit does not describe, of a biased estimator and of drift."""
+    """Warn of poor fits of resonances, of a biased estimator, of drift and of a single hit."""
     drift = found.periodic and found.periodic.drift
+    alone = "there is one hit, and its scatter is not known, so no result has bounds; hit five times or more"
     for what, remarks in (
         ("Resonances", [each.remark for each in found.resonances]),
         ("Estimator", [found.bias]),
         ("Drift", [drift.text] if drift else []),
+        ("Hits", [alone] if found.hits == 1 else []),
     ):
         if any(remarks):
             yield Check(what, Verdict.WARNING, "; ".join(filter(None, remarks)))

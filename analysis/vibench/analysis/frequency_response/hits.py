@@ -1,0 +1,194 @@
+"""Hits of a hammer: the frequency response over them, under an exponential window of known damping."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import NotEnoughData
+from ..recordings.channels import Channels, Stretch
+from ..signals.arrays import Complexes, Reals
+from ..signals.window import Window
+from ..spectra.spectra import SpectralAverages
+from .modal_fit import Resonance
+from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
+from .transmissibility import frequency_response_of
+
+_BLOCK = 1 << 19
+_PIECE_S, _FEWEST_PIECES = 0.01, 100
+"""Usual length of the pieces whose energies are compared [s], and their least number."""
+_SHORT, _MOST_ENERGY = 0.05, 0.9
+"""A drive of hits has this share of its energy in this share of the time; Gaussian noise has 0.06."""
+_TRIGGER = 0.1
+"""Least peak of a hit relative to the hardest one."""
+_LEAD_PERIODS = 2.0
+"""Start of a segment before the trigger, in periods of the highest frequency."""
+_REMAINDER = 1e-3
+"""Size of the windowed response at the end of a segment relative to its largest part."""
+_PARTS = 20
+"""Parts of a segment whose levels show the decay."""
+_NOTHING = 1e-300
+EXPONENTIAL = "exponential"
+_ASSUMED_SD = 0.01
+"""Scatter relative to a line and to the largest one, which only weights the lines of a single hit."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Segments of a record that each begin with a hit."""
+
+    starts: tuple[int, ...]
+    """First samples."""
+    segment_samples: int
+    left_out: int
+    """Number of hits whose segment is cut short by the next hit or by the end."""
+
+
+def find_hits(
+    channels: Channels, stretch: Stretch, band_hz: tuple[float, float], segment_s: float | None
+) -> Hits | None:
+    """Find the hits in the drive; None if the drive does not consist of hits.
+
+    Pulses within a period of the lowest frequency count as one hit. Without a given length, segments have the
+    length that leaves most recorded time of two hits or more.
+
+    Raises NotEnoughData when no hit has a segment of the given length.
+
+    Parameters
+    ----------
+    channels, stretch
+        The record, and its part to search.
+    band_hz
+        Lowest and highest frequency of the analysis.
+    segment_s
+        Length of a segment, if given.
+    """
+    rate, low_hz, high_hz = channels.sample_rate_hz, *band_hz
+    blocks = range(stretch.start, stretch.stop, _BLOCK)
+    piece = max(1, min(round(_PIECE_S * rate), stretch.samples // _FEWEST_PIECES))
+    energies = np.concatenate(
+        [_energies(_drive(channels, first, min(first + _BLOCK, stretch.stop)), piece) for first in blocks]
+    )
+    short = np.sort(energies)[::-1][: max(1, int(_SHORT * energies.size))]
+    if not np.sum(short) > _MOST_ENERGY * np.sum(energies):
+        return None
+    drive = _drive(channels, stretch.start, stretch.stop)
+    above = np.flatnonzero(np.abs(drive) > _TRIGGER * np.max(np.abs(drive)))
+    firsts = above[np.diff(above, prepend=-drive.size) > rate / low_hz]
+    starts = stretch.start + np.maximum(firsts - round(_LEAD_PERIODS * rate / high_hz), 0)
+    clear = np.diff(starts, append=stretch.stop)
+    segment = _longest(clear) if segment_s is None else round(segment_s * rate)
+    kept = starts[clear >= segment]
+    if not kept.size or segment < rate / low_hz:
+        raise NotEnoughData(
+            f"{starts.size} hits were found with up to {np.max(clear) / rate:.3g} s after one, and segments "
+            f"of {segment / rate:.3g} s; one must fit before the next hit and contain a period of "
+            f"{low_hz:g} Hz: request another segment length, or wait longer between hits"
+        )
+    return Hits(tuple(int(each) for each in kept), int(segment), int(starts.size - kept.size))
+
+
+def _drive(channels: Channels, start: int, stop: int) -> Reals:
+    """Return the drive without its offset; lost samples are zero."""
+    drive = np.nan_to_num(channels.read(start, stop)[0])
+    return np.asarray(drive - np.median(drive))
+
+
+def _energies(drive: Reals, piece: int) -> Reals:
+    return np.asarray(np.add.reduceat(drive**2, np.arange(0, drive.size, piece)))
+
+
+def _longest(clear: Reals) -> int:
+    """Return the segment length that leaves most recorded time beyond the first hit, else the longest."""
+    kept_s = [(np.count_nonzero(clear >= each) - 1) * each for each in clear]
+    return int(clear[int(np.argmax(kept_s))] if max(kept_s) > 0 else np.max(clear))
+
+
+@dataclass(frozen=True, eq=False)
+class HitSpectra:
+    """Spectra of the hits under an exponential window, from which responses are estimated.
+
+    The window turns H(i w) into H(i w + decay), since it multiplies cause and effect alike. Its decay is the
+    least that takes the response to a thousandth by the end of a segment; none with ``Window.BOXCAR``.
+    """
+
+    settings: FrequencyResponseSettings
+    spectra: Complexes
+    """Base, response and drive of each hit, shape (hits, 3, lines)."""
+    left_out: int
+
+    @property
+    def count(self) -> int:
+        """Number of hits."""
+        return len(self.spectra)
+
+    def response(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
+        """Estimate response over base; the bounds of a single hit are infinite, since it has no scatter."""
+        products = np.einsum("kif,kjf->ijf", np.conj(self.spectra), self.spectra) / self.count
+        averages = SpectralAverages(
+            products, self.count, self.left_out, max(self.count, 2.0), self.settings.segment_samples,
+            Window.BOXCAR, 0.0, 1.0, 1.0,
+        )  # fmt: skip
+        settings = replace(self.settings, estimator=estimator, noise_ratio=noise_ratio)
+        added_hz = (settings.decay_per_s or 0.0) / np.pi
+        found = replace(frequency_response_of(averages, settings), resolution_hz=added_hz)
+        if self.count > 1:
+            return found
+        unknown = np.full(found.frequency_hz.size, np.inf)
+        return replace(
+            found, n_eff=1.0, relative_sd_magnitude=unknown, sd_phase_rad=unknown, half_width=unknown,
+            coherence_significance=1.0, steady_relative_sd=None,
+        )  # fmt: skip
+
+    def without_each(self) -> tuple["HitSpectra", ...]:
+        """Return the spectra without each of the hits in turn."""
+        return tuple(
+            replace(self, spectra=np.delete(self.spectra, each, axis=0)) for each in range(self.count)
+        )
+
+
+def hit_spectra(
+    data: Reals, hits: Hits, settings: FrequencyResponseSettings, high_hz: float, *, fades: bool
+) -> HitSpectra:
+    """Transform the segments of hits.
+
+    Parameters
+    ----------
+    data
+        Drive, base and response of each usable hit, shape (hits, 3, samples).
+    hits
+        Their places.
+    settings
+        Settings of the response; window and decay are filled in.
+    high_hz
+        Highest frequency to keep.
+    fades
+        Whether to apply an exponential window where the response lasts to the end of a segment.
+    """
+    rate, size = settings.sample_rate_hz, hits.segment_samples
+    data = data - np.median(data, axis=2, keepdims=True)
+    levels = np.sqrt([np.mean(part**2) for part in np.array_split(data[:, 2], _PARTS, axis=1)])
+    lasting = np.log(max(levels[-1] / max(np.max(levels), _NOTHING) / _REMAINDER, 1.0)) if fades else 0.0
+    decay_per_s = float(lasting) * rate / size
+    lines = int(high_hz * size / rate) + 1
+    windowed = data[:, [1, 2, 0]] * np.exp(-decay_per_s * np.arange(size) / rate)
+    chosen = replace(
+        settings, segment_samples=size, window=EXPONENTIAL if lasting else Window.BOXCAR.value, overlap=0.0,
+        decay_per_s=decay_per_s,
+    )  # fmt: skip
+    return HitSpectra(chosen, np.fft.rfft(windowed)[..., :lines], hits.left_out)
+
+
+def weighted_alike(response: FrequencyResponse) -> FrequencyResponse:
+    """Return the response to a single hit with an assumed scatter, for a fit without bounds."""
+    # The same noise on all lines of a velocity, and the same relative error.
+    size = response.magnitude / response.frequency_hz
+    assumed = _ASSUMED_SD * np.hypot(1.0, np.max(size) / np.maximum(size, _NOTHING))
+    return replace(
+        response, relative_sd_magnitude=assumed, coherence_significance=0.0, reference_coherence=None
+    )
+
+
+def without_bounds(found: Resonance) -> Resonance:
+    """Return a resonance of unknown uncertainty."""
+    unknown = {f"sd_{name}": np.inf for name in ("frequency_hz", "damping_ratio", "peak_magnitude")}
+    return replace(found, **unknown, reduced_chi_square=np.nan, overlap=1.0)

@@ -1,0 +1,94 @@
+"""Hits of a hammer in an imported recording: bounds hold, and an exponential window leaves no damping."""
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from vibench.analysis import FrequencyResponseRequest, Simulation, analyse, analyse_files, budgets_of
+from vibench.analysis.exchange import ImportMapping, import_recording
+
+RATE = 5120.0
+MODES = ((80.0, 0.01, 2.0), (210.0, 0.01, 1.0))
+"""Natural frequency [Hz], damping ratio and modal mass [kg]."""
+MAPPING = {
+    "started_utc": "2026-03-01T12:00:00Z",
+    "sample_rate_hz": RATE,
+    "channels": [
+        {"source": "force", "role": "drive_voltage"},
+        {"source": "force", "role": "base_acceleration"},
+        {"source": "velocity", "role": "m0_velocity"},
+    ],
+    "measurement": {
+        "name": "hits",
+        "excitation": {
+            "kind": "streamed_noise", "amplitude_vpp": 1.0, "band_start_hz": 40, "band_stop_hz": 400,
+            "settle_s": 0,
+        },
+    },
+}  # fmt: skip
+
+
+def mobility(frequency_hz):
+    s = 2j * np.pi * np.asarray(frequency_hz)
+    return sum(s / m / (s**2 + 2 * d * w * s + w**2) for hz, d, m in MODES for w in [2 * np.pi * hz])
+
+
+def hammered(count, seed, apart_s=1.5, noise=0.002):
+    """Force of half sines of 2 ms at slightly irregular times, and the velocity, exact at the samples."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(round((count * apart_s + 0.2) * RATE)) / RATE
+    force = np.zeros(time_s.size)
+    for number in range(count):
+        at = time_s - 0.1 - apart_s * number - rng.uniform(0, 0.1)
+        force += rng.uniform(100, 300) * np.where((at > 0) & (at < 2e-3), np.sin(np.pi * at / 2e-3), 0)
+    velocity = np.zeros(time_s.size)
+    # The circular convolution of a record that ends at rest, padded by its own length.
+    lines_hz = np.fft.rfftfreq(8 * time_s.size, 1 / RATE)
+    velocity = np.fft.irfft(np.fft.rfft(force, 8 * time_s.size) * mobility(lines_hz))[: time_s.size]
+    return force, velocity + noise * np.max(np.abs(velocity)) * rng.standard_normal(time_s.size)
+
+
+def imported(folder, force, velocity):
+    savemat(folder / "hits.mat", {"force": force, "velocity": velocity})
+    mapping = ImportMapping.model_validate(MAPPING)
+    plan = mapping.measurement.excitation.model_copy(update={"duration_s": force.size / RATE})
+    measurement = mapping.measurement.model_copy(update={"excitation": plan})
+    mapping = mapping.model_copy(update={"measurement": measurement})
+    return import_recording(folder / "hits.mat", mapping, folder / "hits.h5")
+
+
+MAPPING["measurement"]["excitation"]["duration_s"] = 1.0
+
+
+def test_a_single_hit_has_resonances_without_bounds(tmp_path):
+    """It had bounds from the segments without a hit, which did not hold."""
+    (result,) = analyse_files([imported(tmp_path, *hammered(1, 1))], "hits", Simulation.LEFT_OUT).results
+    found = result.analysis.response
+    assert np.all(np.isinf(found.frequency_response.half_width))
+    assert not found.frequency_response.is_significant.any()
+    for each, (frequency_hz, damping, _) in zip(found.resonances, MODES, strict=True):
+        assert each.frequency_hz == pytest.approx(frequency_hz, rel=1e-3)
+        assert each.damping_ratio == pytest.approx(damping, rel=0.1)
+        assert np.isinf(each.sd_damping_ratio)
+    budgets = budgets_of(result)
+    assert len(budgets) == 3 * len(MODES)
+    assert all("noise" in [cause.value for cause in each.not_stated] for each in budgets)
+    (said,) = (each.text for each in result.analysis.checks if each.what == "Hits")
+    assert "no result has bounds" in said
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_damping_of_the_window_is_taken_out(tmp_path, seed):
+    """Segments end before the response does: an exponential window adds twice the damping of mode 1."""
+    request = FrequencyResponseRequest(segment_s=0.3)
+    found = analyse(imported(tmp_path, *hammered(6, seed)), request).response
+    assert found.hits == 6
+    how = found.frequency_response.settings
+    assert how.decay_per_s / (2 * np.pi * 80.0) > 2 * 0.01
+    for each, (frequency_hz, damping, _) in zip(found.resonances, MODES, strict=True):
+        assert abs(each.frequency_hz - frequency_hz) < 3 * each.sd_frequency_hz
+        assert abs(each.damping_ratio - damping) < 3 * each.sd_damping_ratio
+        assert each.sd_damping_ratio < 0.1 * damping
+        about_hz = np.arange(0.98, 1.02, 1e-5) * frequency_hz
+        peak = np.max(2 * np.pi * about_hz * np.abs(mobility(about_hz)))
+        assert abs(each.peak_magnitude - peak) < 3 * each.sd_peak_magnitude
