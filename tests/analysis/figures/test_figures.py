@@ -128,6 +128,23 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     assert f"{found.overlay.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
 
+def test_frequencies_above_a_sweep_lie_within_it(sweep_file):
+    figure = sweep_figure(result(sweep_file, Simulation.LEFT_OUT).analysis).figure
+    (top,) = figure.axes[0].child_axes
+    figure.draw_without_rendering()
+    low, high = top.get_xlim()
+    beyond = [each for each in top.xaxis.get_majorticklocs() if not low <= each <= high]
+    places = top.transScale.transform([(each, 0.0) for each in (low - 10.0, *beyond, high + 10.0)])
+    assert not np.isfinite(places[:, 0]).any(), f"{beyond} Hz are drawn at the ends of {low:g} to {high:g} Hz"
+
+
+def test_collisions_throughout_a_sweep_are_one_phrase(sweep_file):
+    found = result(sweep_file, Simulation.LEFT_OUT).analysis.collisions
+    (region,) = found.regions
+    whole = replace(region, reaches_start=True, reaches_stop=True)
+    assert regions_text(replace(found, regions=(whole,))) == "the masses collide during the whole sweep"
+
+
 def test_dwells_are_drawn_in_rows_by_level_with_responses_in_the_caption(dwell_file):
     strong, weak = result(dwell_file("strong")), result(dwell_file("weak"))
     drawn = dwells_figure([(each.analysis, each.overlay) for each in (strong, weak)])

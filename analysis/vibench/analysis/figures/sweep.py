@@ -69,14 +69,15 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None)
 
 
 def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
-    """Add a frequency axis above the time axis."""
+    """Add a frequency axis above the time axis; ticks beyond the sweep have no time and are not drawn."""
     order = np.argsort(found.frequency_hz)
+    known = found.frequency_hz[order], found.time_s[order]
 
     def to_frequency(time_s: ArrayLike) -> Reals:
         return np.asarray(np.interp(np.asarray(time_s), found.time_s, found.frequency_hz))
 
     def to_time(frequency_hz: ArrayLike) -> Reals:
-        return np.asarray(np.interp(np.asarray(frequency_hz), found.frequency_hz[order], found.time_s[order]))
+        return np.asarray(np.interp(np.asarray(frequency_hz), *known, left=np.nan, right=np.nan))
 
     top = axes.secondary_xaxis("top", functions=(to_frequency, to_time))
     top.set_xlabel("drive frequency [Hz]")
@@ -143,14 +144,13 @@ def regions_text(found: Collisions) -> str:
         return f"no collisions were found{unclear}" if unclear else "the masses did not collide"
     parts = []
     for region in found.regions:
-        start, stop = region.start, region.stop
-        middle_hz = 0.5 * (start.upper_hz + start.lower_hz)
-        begin = plus_minus(middle_hz, start.upper_hz - middle_hz) + " Hz"
+        whole = region.reaches_start and region.reaches_stop
+        low_hz, high_hz = region.start.lower_hz, region.start.upper_hz
+        middle = plus_minus(0.5 * (low_hz + high_hz), 0.5 * (high_hz - low_hz))
+        begin = "the sweep's beginning" if region.reaches_start else f"{middle} Hz"
         # The end of collisions is random, so that of one run has no bounds.
-        end = f"{stop.frequency_hz:.1f} Hz in this run"
-        first = "the sweep's beginning" if region.reaches_start else begin
-        last = "the sweep's end" if region.reaches_stop else end
-        parts.append(f"from {first} to {last}")
+        end = "the sweep's end" if region.reaches_stop else f"{region.stop.frequency_hz:.1f} Hz in this run"
+        parts.append("during the whole sweep" if whole else f"from {begin} to {end}")
     return f"the masses collide {' and '.join(parts)}{unclear}"
 
 
