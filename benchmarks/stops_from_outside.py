@@ -107,9 +107,10 @@ class Found:
             allowed = {0} if what == "stop" else {1, 3, 130} if self.cell.cause == "Ctrl-C twice" else {1, 3}
             if what == "stop" and may_have_ended:
                 allowed = {0, 1}
-            if what == "measure" and self.cell.cause == "limit passed":
-                # No limit applies during the ramp of a stop, so this run counts as stopped by a person.
-                allowed = {3} if self.cell.state == "ramping_down" else {1}
+            is_over_limit = what == "measure" and self.cell.cause == "limit passed"
+            # No limit applies during the ramp of a stop, so such a run counts as stopped by a person.
+            if is_over_limit and self.cell.state != "ramping_down":
+                allowed = {1}
             elif what == "measure" and not may_have_ended and self.cell.cause != "Ctrl-C twice":
                 allowed = {3}
             if code not in allowed:
