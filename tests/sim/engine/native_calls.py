@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine.run import cubic_tables, start_on_cubics
+from vibench.sim.engine.run import cubic_tables, start_at
 from vibench.sim.engine.scene import collision_structure, fill_cell, fill_drive, power_structure
 
 LAWS = (
@@ -97,9 +97,7 @@ def shaker_of(engine, draws, drive):
     """A table with a specimen that strikes its stops, or nearly does, and what a stretch fills."""
     specimen = gong2025(contact=str(draws.choice(LAWS)))
     tables, state = cubic_tables(engine, specimen, 1e-5), engine.new("State")
-    start_on_cubics(
-        engine, tables, specimen, state, [2e-5, 4.4e-5, 0.0, 0.0, draws.uniform(-0.5, 0.5), 0.0], 3e-7
-    )
+    start_at(engine, tables, specimen, state, [2e-5, 4.4e-5, 0.0, 0.0, draws.uniform(-0.5, 0.5), 0.0], 3e-7)
     moved = {name: np.zeros(STEPS) for name in ("amplifier_voltage", "base_acceleration", "m0_velocity")}
     moved["ends"], moved["begun"] = np.zeros((STEPS // 2, 9)), np.zeros(4)
     lags = {"low_decay": 0.99, "low_mean": 0.995, "high_decay": 0.3, "high_mean": 0.6}

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..specimen.modes import angular_frequencies
 from ..specimen.specimen import Specimen
 from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
@@ -145,16 +146,14 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     -------
     Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell over U; time goes as exp(+i w t).
     """
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
-        raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
-    cells = [reduce_to_m0(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
+    omega = angular_frequencies(frequency_hz)
+    cells = [reduce_to_m0(cell, omega) for cell in chain.cells]
     # From the free end: reduce each cell and all cells behind it to one stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
         seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))
-    moved = np.zeros((len(frequency), chain.size, 4), dtype=np.complex128)
-    x = np.ones(len(frequency), dtype=np.complex128)
+    moved = np.zeros((len(omega), chain.size, 4), dtype=np.complex128)
+    x = np.ones(len(omega), dtype=np.complex128)
     for place, (cell, stiffness) in enumerate(zip(cells, reversed(seen), strict=True)):
         x = x * cell.link / (cell.link + stiffness)
         moved[:, place, :MASSES_PER_CELL] = np.column_stack([x, x * cell.inner, x * cell.middle])

@@ -130,7 +130,21 @@ class RunRecord:
         return complex(self.structure["line_p"])
 
 
-class NativeRun:
+class _Run:
+    _state: Structure
+
+    @property
+    def motion(self) -> Floats:
+        """x, y, z, vx, vy, vz now, shape (6,)."""
+        return np.array(self._state["motion"])
+
+    @property
+    def time_s(self) -> float:
+        """Return the current time of the motion [s]."""
+        return float(self._state["clock_high"])
+
+
+class NativeRun(_Run):
     """One motion with its state and small changes (tangent vectors)."""
 
     def __init__(
@@ -162,10 +176,7 @@ class NativeRun:
 
         Raises ValueError when the motion is inside a rigid stop.
         """
-        self._state["motion"] = motion
-        refuse_inside_a_stop(self._state["motion"], self.specimen)
-        if self.engine.start(self._tables, self._state, self.tolerance) != 0:
-            raise ValueError(f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1.")
+        start_at(self.engine, self._tables, self.specimen, self._state, motion, self.tolerance)
 
     def apart(self, tolerance: float | None = None) -> Self:
         """Return a copy; a copy with another tolerance has no small changes."""
@@ -215,19 +226,9 @@ class NativeRun:
         )
 
     @property
-    def motion(self) -> Floats:
-        """x, y, z, vx, vy, vz now, shape (6,)."""
-        return np.array(self._state["motion"])
-
-    @property
     def addresses(self) -> tuple[int, int]:
         """Addresses of tables and state for a batch; valid as long as the run."""
         return self._tables.ctypes.data, self._state.ctypes.data
-
-    @property
-    def time_s(self) -> float:
-        """Return the current time of the motion [s]."""
-        return float(self._state["clock_high"])
 
     def pass_over(self, length_s: float) -> None:
         """Advance only the time, by a period after which the motion repeats."""
@@ -337,19 +338,20 @@ def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Table
     return engine.prepare_cubics(scene)
 
 
-def start_on_cubics(
+def start_at(
     engine: Engine, tables: Tables, specimen: Specimen, state: Structure, motion: ArrayLike, tolerance: float
 ) -> None:
     """Set a `State` to x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,), and find any contact.
 
-    Raises ValueError when the motion is inside a rigid stop.
+    Raises ValueError when the motion is inside a rigid stop, or the tolerance is not allowed.
     """
     state["motion"] = motion
     refuse_inside_a_stop(state["motion"], specimen)
-    engine.start(tables, state, tolerance)
+    if engine.start(tables, state, tolerance) != 0:
+        raise ValueError(f"A tolerance of {tolerance} is not allowed: it must lie between 0 and 1.")
 
 
-class CubicRun:
+class CubicRun(_Run):
     """One motion, advanced interval by interval."""
 
     def __init__(
@@ -370,7 +372,7 @@ class CubicRun:
         self._interval_s = interval_s
         self._tolerance = tolerance
         self._state = engine.new("State", clock_high=start_time_s)
-        start_on_cubics(engine, self._tables, specimen, self._state, initial_state, tolerance)
+        start_at(engine, self._tables, specimen, self._state, initial_state, tolerance)
 
     def advance(
         self, pieces: Floats, record: RunRecord, *, first_from_s: float = 0.0, last_to_s: float | None = None
@@ -407,16 +409,6 @@ class CubicRun:
         if code < 0:
             raise ValueError("The native engine refuses these intervals: their ends must lie within them.")
         return Outcome(code)
-
-    @property
-    def motion(self) -> Floats:
-        """x, y, z, vx, vy, vz now, shape (6,)."""
-        return np.array(self._state["motion"])
-
-    @property
-    def time_s(self) -> float:
-        """Return the current time of the motion [s]."""
-        return float(self._state["clock_high"])
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
-from ..engine.run import cubic_tables, native_engine, start_on_cubics
+from ..engine.run import cubic_tables, native_engine, start_at
 from ..specimen.accuracy import Accuracy
 from ..specimen.specimen import Specimen
 
@@ -235,7 +235,7 @@ class LoadedShaker:
     def _place(self, specimen: Specimen, motion: ArrayLike) -> None:
         engine = native_engine()
         tables, state = cubic_tables(engine, specimen, self.step_s), engine.new("State")
-        start_on_cubics(engine, tables, specimen, state, motion, _CONTACT_TOLERANCE)
+        start_at(engine, tables, specimen, state, motion, _CONTACT_TOLERANCE)
         engine.fill(self.structure, tables=tables, specimen=state)
 
     def move(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .specimen import JOIN, Specimen, bound_matrices
-from .state import VX, VZ, Complex, Table, Vector, X, Z
+from .state import VX, VZ, Complex, Floats, Table, Vector, X, Z
 
 
 def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
@@ -33,6 +33,14 @@ def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
     return system
 
 
+def angular_frequencies(frequency_hz: ArrayLike) -> Floats:
+    """Return 2 pi f of a row of frequencies [rad/s]; refuse negative and infinite ones."""
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
+        raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
+    return 2.0 * np.pi * frequency
+
+
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
     """Return the transmissibility without contact: displacements of the masses and p over the base's.
 
@@ -50,10 +58,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     -------
     Complex, shape (n, 4): x, y, z and p = y - z over U; time goes as exp(+i w t).
     """
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
-        raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
-    omega = 2.0 * np.pi * frequency
+    omega = angular_frequencies(frequency_hz)
     (m0, m1, m2), squared = specimen.masses, omega**2
     springs, dampers = specimen.stiffnesses, specimen.dampings
     k0, k1, k2 = (k + 1j * omega * c for k, c in zip(springs, dampers, strict=True))
@@ -220,7 +225,7 @@ class BaseResponse:
 def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
     """Return the response of x and p at each frequency, shape (n,) [Hz]; zero and above."""
     free = base_transmissibility(specimen, frequency_hz)
-    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    omega = angular_frequencies(frequency_hz)
     dynamic = (
         specimen.stiffness_matrix
         - omega[:, None, None] ** 2 * specimen.mass_matrix
