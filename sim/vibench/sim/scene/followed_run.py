@@ -80,17 +80,17 @@ class Stretch:
     outcome: Outcome
     impacts: int
     """Contacts that began."""
-    peak_x_m: float
-    """Largest abs(x); zero if not observed."""
-    peak_p_m: float
-    area_x: complex
-    """Integral of x exp(-i (omega t + phase)) [m s]; zero if not observed."""
-    area_p: complex
     samples: Samples
     """Which states were kept."""
     states: Floats
     """Kept states, shape (n, 6)."""
-    growth: float
+    peak_x_m: float = 0.0
+    """Largest abs(x); zero if not observed."""
+    peak_p_m: float = 0.0
+    area_x: complex = 0j
+    """Integral of x exp(-i (omega t + phase)) [m s]; zero if not observed."""
+    area_p: complex = 0j
+    growth: float = math.nan
     """Natural logarithm of the growth of a small change; NaN without a tangent."""
 
     @property
@@ -165,19 +165,8 @@ class FollowedRun:
         """Return the stretch from an instant until now, followed in a batch."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
         self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
-        return Stretch(
-            start_s=start_s,
-            end_s=self.time_s,
-            outcome=self.outcome,
-            impacts=motion.impacts,
-            peak_x_m=0.0,
-            peak_p_m=0.0,
-            area_x=0j,
-            area_p=0j,
-            samples=Samples(start_s + 1.0 / frequency_hz, frequency_hz, count),
-            states=motion.states,
-            growth=math.nan,
-        )
+        samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, count)
+        return Stretch(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states)
 
     def follow_tangent(self) -> None:
         """Propagate a small change in a generic direction from now on."""

@@ -76,9 +76,10 @@ use."""
 
 
 class _Clock:
-    """Clock for the requested time."""
+    """Clock for the requested time, and reports about the target."""
 
     def __init__(self, target: Target) -> None:
+        self._target = target
         self._began_s = time.monotonic()
         self.limit_s = LONGEST_S if target.time_s is None else target.time_s
 
@@ -89,6 +90,20 @@ class _Clock:
     @property
     def is_over(self) -> bool:
         return self.taken_s > self.limit_s
+
+    def report(
+        self,
+        found: ScenePrediction,
+        starts: int = 1,
+        needed: tuple[float, float, float] | None = None,
+        windows: int = 1,
+    ) -> ScenePrediction:
+        """Add how the target is met so far."""
+        error, target = found.error_estimate, self._target
+        is_met = error is not None and (target.error is None or error <= target.error)
+        taken_s = self.taken_s
+        report = TargetReport(target.error, target.time_s, error, taken_s, starts, windows, is_met, needed)
+        return replace(found, target=report)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +150,7 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     if plan_of(scene, motion).method is Method.CLOSED_FORM:
         found = in_closed_form(scene, motion, Question.ANSWER)
-        yield _reported(found, scene.target, clock, 1, None)
+        yield clock.report(found)
         return
     yield from _Refinement(scene, motion, clock).answers()
 
@@ -356,7 +371,7 @@ class _Refinement:
             memory=StartMemory.KEPT,
             section=self._section(orbit.section),
         )
-        return _reported(found, self._target, self._clock, 1, None)
+        return self._clock.report(found)
 
     def _section(self, states: Floats) -> Floats | None:
         """Return states once per drive period if they are observed."""
@@ -402,7 +417,7 @@ class _Refinement:
             integration_error=float(off.max()),
             section=self._section(states_of(window.stretches)),
         )
-        return _reported(found, self._target, self._clock, 1, None)
+        return self._clock.report(found)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
         """Return the result in a stated window for a non-repeating motion that its start determines."""
@@ -530,7 +545,7 @@ class _Refinement:
             off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
             about_s = max(0.0, self._clock.taken_s + more * per_s * part_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
-        return _reported(found, self._target, self._clock, len(starts), needed, windows)
+        return self._clock.report(found, len(starts), needed, windows)
 
     def _kind_of_others(self, begin: FollowedRun) -> MotionKind:
         """Return the kind of a motion that does not repeat, by the growth of a small change in one window."""
@@ -553,7 +568,7 @@ class _Refinement:
         run = self._main
         found = self._prediction(np.full(4, math.nan), np.full(4, math.nan), run.time_s, 0.0, 0)
         found = replace(found, ended=run.outcome.text, outcome=run.outcome)
-        return _reported(found, self._target, self._clock, 0, None)
+        return self._clock.report(found, 0)
 
     def _prediction(
         self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
@@ -585,17 +600,3 @@ class _Refinement:
             memory=StartMemory.KEPT if is_free else StartMemory.UNKNOWN,
         )
         return with_errors(found, errors)
-
-
-def _reported(
-    found: ScenePrediction,
-    target: Target,
-    clock: _Clock,
-    starts: int,
-    needed: tuple[float, float, float] | None,
-    windows: int = 1,
-) -> ScenePrediction:
-    error = found.error_estimate
-    is_met = error is not None and (target.error is None or error <= target.error)
-    report = TargetReport(target.error, target.time_s, error, clock.taken_s, starts, windows, is_met, needed)
-    return replace(found, target=report)

@@ -103,7 +103,7 @@ class StatesAlone:
             # The last part of a period is followed without a check.
             end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
-            self.repeats = self._noted(stretch)
+            self.repeats = self.note(stretch)
             if self.repeats is not None:
                 since = wandered_until(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
                 self._settled_s = run.time_s - (len(self.recent) - since) / frequency_hz
@@ -126,15 +126,8 @@ class StatesAlone:
                 return
             self.follow((run.periods + 1) / run.drive.frequency_hz)
 
-    def note(self, stretch: Stretch) -> bool:
-        """Keep the states of a batched stretch; return whether the motion seems to repeat.
-
-        `follow` then checks it without a batch.
-        """
-        return self._noted(stretch) is not None
-
-    def _noted(self, stretch: Stretch) -> Repetition | None:
-        """Keep the states of a stretch; return whether the motion repeats."""
+    def note(self, stretch: Stretch) -> Repetition | None:
+        """Keep the states of a stretch; return the repetition, which `follow` checks after a batch."""
         if self._every is not None:
             self.path.append(stretch.thinned(self._every))
         self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
@@ -218,5 +211,5 @@ def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
     return [
         each
         for (each, _), stretch in zip(ready, found, strict=True)
-        if stretch is not None and not each.note(stretch)
+        if stretch is not None and each.note(stretch) is None
     ]
