@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.batch import batches_pay
-from ..scene.cost import longest_cost_s, pilot_cost_s
+from ..scene.cost import pilot_cost_s
 from ..scene.prediction import MotionKind, state_of
 from ..scene.refinement import LONGEST_S
 from ..scene.scene import Given, Scene
@@ -248,7 +248,7 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
     first, count = points.wanted_first, plan.grid.size
     if plan.target is None:
         work_s, first_s = float(points.planned_s.sum()), float(points.planned_s[first].sum())
-        longest_s = float(points.times_s(longest_cost_s).sum())
+        longest_s = float(points.times_s(may_repeat=False).sum())
     else:
         each_s = pilot_cost_s(points.unchained, count)
         work_s, first_s = count * each_s, len(first) * each_s

@@ -210,28 +210,15 @@ def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> No
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 
 
-def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
-    """Return the expected time of a solver for a scene, from recent runs [s].
+def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: bool = True) -> float:
+    """Return the expected time of a solver for a scene, from its recent runs or those of `solve_scene` [s].
 
     Raises ValueError when the specimen cannot be simulated.
     """
     plan = plan_scene(scene)
-    return _expected_cost(plan, solver, plan.planned_s).time_s
-
-
-def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
-    """Return the expected time of a solver for a scene whose motion never repeats, from recent runs [s].
-
-    Raises ValueError when the specimen cannot be simulated.
-    """
-    plan = plan_scene(scene)
-    return _expected_cost(plan, solver, plan.longest_planned_s).time_s
-
-
-def _expected_cost(plan: ScenePlan, solver: Solver, planned_s: float) -> Expected:
-    """Return the expected time from a solver's runs, else from those of `solve_scene`."""
+    planned_s = plan.planned_s if may_repeat else plan.longest_planned_s
     own = cost_ledger().expected(_kind(plan, solver), planned_s)
-    return own if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s)
+    return own.time_s if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s).time_s
 
 
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:

@@ -4,7 +4,7 @@ import heapq
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
 from functools import cached_property
 
@@ -240,14 +240,14 @@ class Points(ABC):
     @cached_property
     def planned_s(self) -> Floats:
         """Planned time of each point, shape (points,)."""
-        return self.times_s(expected_cost_s)
+        return self.times_s()
 
-    def times_s(self, cost_s: Callable[[Scene, Solver], float]) -> Floats:
-        """Return the time of each point by a function, shape (points,); 0 for scenes that are not allowed."""
+    def times_s(self, *, may_repeat: bool = True) -> Floats:
+        """Return the expected time of each point, shape (points,); 0 for scenes that are not allowed."""
 
         def time_s(number: int) -> float:
             try:
-                return cost_s(self.unchained(number), self._solver)
+                return expected_cost_s(self.unchained(number), self._solver, may_repeat=may_repeat)
             except ValueError:
                 return 0.0
 
