@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_256,
-    "analysis": 32_557,
+    "analysis": 32_549,
     "cli": 5_069,
     "extensions": 2_698,
     "gui": 12_466,

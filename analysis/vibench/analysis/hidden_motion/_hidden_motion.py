@@ -25,7 +25,7 @@ from ._contact_free import (
     free_motion,
     join_collisions,
 )
-from ._filtering import motion_model
+from ._filtering import MotionModel, motion_model
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit, without_values
 from ._measured_masses import MassCheck, MeasuredMass, measured_masses
 from ._parameters import Hidden, Numbers
@@ -259,7 +259,7 @@ def hidden_motion_of(
     """Apply both methods to a prepared motion, and check the track by the sensors of ``masses``."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
-    followed = _tracked_motion(motion, tracked, found, lambda sample: on_read(sample, motion.samples), masses)
+    followed = _tracked_motion(motion, model, found, lambda sample: on_read(sample, motion.samples), masses)
     found_checks = (each.check(followed.innovation_level) for each in masses)
     checks = tuple(each for each in found_checks if each is not None)
     why_not = _fault_of_numbers(followed, checks)
@@ -299,12 +299,11 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
 
 def _tracked_motion(
     motion: PreparedMotion,
-    tracked: TrackedSpecimen,
+    model: MotionModel,
     found: FoundSpecimen | None,
     on_progress: Callable[[int], None],
     masses: Sequence[MeasuredMass],
 ) -> TrackedMotion:
-    model = motion_model(tracked, motion)
     # Single precision is enough and halves the memory.
     p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(3))
     collisions: list[Collisions] = []
@@ -327,14 +326,7 @@ def _tracked_motion(
     level = squared / used if used else float("nan")
     sd *= np.float32(np.sqrt(max(1.0, level if used else 1.0)))
     np.hypot(sd, np.float32(_gap_sd(found)), out=sd)
-    return TrackedMotion(
-        p,
-        rate,
-        sd,
-        join_collisions(collisions),
-        tuple(lost),
-        level,
-    )
+    return TrackedMotion(p, rate, sd, join_collisions(collisions), tuple(lost), level)
 
 
 def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> str:
