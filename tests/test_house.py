@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_256,
+    "acquisition": 28_255,
     "analysis": 32_549,
     "cli": 5_069,
     "extensions": 2_698,
@@ -20,7 +20,7 @@ LINES_AT_MOST = {
     "native": 6_625,
     "sim": 20_437,
     "studies": 3_182,
-    "virtual_rig": 7_571,
+    "virtual_rig": 7_562,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

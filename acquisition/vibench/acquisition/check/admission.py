@@ -74,17 +74,17 @@ def _read(path: Path) -> CheckResult | None:
         return None
 
 
-def keep(result: CheckResult) -> Path:
+def keep(result: CheckResult) -> None:
     """Store a result atomically in place of the last one.
 
     Raises RecordingError when the state folder cannot be written.
     """
     if result.verdict is not Verdict.FAIL:
         _write(result, passed=True)
-    return _write(result, passed=False)
+    _write(result, passed=False)
 
 
-def _write(result: CheckResult, *, passed: bool) -> Path:
+def _write(result: CheckResult, *, passed: bool) -> None:
     try:
         path = archive_path(result.rig, passed=passed)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -95,7 +95,6 @@ def _write(result: CheckResult, *, passed: bool) -> Path:
             f"The result of the bench check cannot be kept in {error.filename} ({error.strerror}). The bench "
             "is as it was; make its folder writable, or name another one in VIBENCH_STATE_DIR"
         ) from error
-    return path
 
 
 DRIFT_DB = Bounds(0.5, 3.0)
@@ -245,7 +244,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
             )
 
 
-def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
+def require_on_record(bench: Bench) -> None:
     """Admit a bench by its last check without playing anything; a virtual one needs none.
 
     Raises CheckFailed when a real bench has no valid check.
@@ -253,7 +252,7 @@ def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
     if bench.rig.plays_back:
         return
     last = last_check(bench.rig.name)
-    complaint = why_not(last, bench.rig, clock())
+    complaint = why_not(last, bench.rig, utc_now())
     if complaint is None:
         bench.last_check = last
     elif bench.kind is BenchKind.REAL:

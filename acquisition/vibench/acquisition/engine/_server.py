@@ -216,12 +216,12 @@ class _Viewer:
 class Server:
     """Answers requests through a request handler; every connection needs the token."""
 
-    def __init__(self, handler: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
+    def __init__(self, handler: RequestHandler, host: str = LOOPBACK) -> None:
         self._handler = handler
         self._token = secrets.token_urlsafe(32)
         self._viewers: dict[int, _Viewer] = {}
         self._coming_and_going = Lock()
-        self._listening = socket.create_server((host, port))
+        self._listening = socket.create_server((host, 0))
         self._admission = Admission(self._listening, self._token, self._welcome, self._make_room)
 
     @property

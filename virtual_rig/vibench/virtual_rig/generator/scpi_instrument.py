@@ -357,7 +357,7 @@ class ScpiDevice(Protocol):
 
 
 class ScpiSocket:
-    """A server, by default for this computer only; a context manager.
+    """A server for this computer only, since SCPI has no password; a context manager.
 
     Parameters
     ----------
@@ -365,13 +365,11 @@ class ScpiSocket:
         The instrument; several clients may use it at once.
     port
         0 selects a free one; see ``port`` and ``resource_name``.
-    host
-        Address to listen on. SCPI has no password: anyone who can reach the port controls the generator.
     """
 
-    def __init__(self, device: ScpiDevice, port: int = 0, host: str = LOOPBACK) -> None:
+    def __init__(self, device: ScpiDevice, port: int = 0) -> None:
         self._closing = threading.Event()
-        self._server = _server(device, (host, port), self._closing)
+        self._server = _server(device, (LOOPBACK, port), self._closing)
         self._thread = threading.Thread(target=self._server.serve_forever, name="scpi-socket", daemon=True)
         self._thread.start()
 

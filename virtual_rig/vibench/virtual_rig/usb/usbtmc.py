@@ -112,16 +112,9 @@ class _Flight:
 class UsbTmcInstrument:
     """An instrument at a USB cable that can be disconnected."""
 
-    def __init__(
-        self,
-        device: AFG1022,
-        packet_bytes: int = 64,
-        usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID),
-    ) -> None:
+    def __init__(self, device: AFG1022, usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID)) -> None:
         self._device = device
-        self.identification = Identification(
-            *usb_ids, device.maker, device.model, device.serial, packet_bytes
-        )
+        self.identification = Identification(*usb_ids, device.maker, device.model, device.serial)
         self._lock = threading.RLock()
         self._is_plugged_in = True
         self._is_hung = False
