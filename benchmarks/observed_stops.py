@@ -21,7 +21,7 @@ from vibench.sim import Harmonic
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.periodic.shooting import PeriodMap
 from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
-from vibench_fast_loop.law import LawWeights, design_law
+from vibench_fast_loop.law import NOISE, PUSH_N, VOLT, design_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 SUBSTEPS = 40
@@ -55,12 +55,12 @@ def struck(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
     """Return the Kalman gain at each sample of a period, shape (samples, n, 2), scaled as ``moved`` is."""
-    weights, scale = LawWeights(), plant.scales
+    scale = plant.scales
     step, volt = plant.step[0] * scale / scale[:, None], plant.step[1] / scale
     shown, pushed = plant.shown * scale, step @ (plant.spring[0] / scale) * plant.timing.step_s
-    unknown = np.outer(pushed, pushed) * weights.push_n**2 + np.outer(volt, volt) * weights.volt**2
+    unknown = np.outer(pushed, pushed) * PUSH_N**2 + np.outer(volt, volt) * VOLT**2
     unknown += 1e-12 * np.eye(plant.size)
-    noise = np.diag([weights.acceleration**2, weights.velocity**2])
+    noise = np.diag(np.square(NOISE))
     covariance = solve_discrete_are(step.T, shown.T, unknown, noise)
     gains = np.empty((len(moved), plant.size, 2))
     for k in [*range(len(moved))] * TURNS:

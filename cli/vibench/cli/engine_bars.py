@@ -108,10 +108,9 @@ class Watching:
     After a stop, it prints on standard error who stopped the engine, and whether the output is off.
     """
 
-    def __init__(self, ask: Callable[[], EngineStatus], engine: Engine, on: Console = console) -> None:
+    def __init__(self, ask: Callable[[], EngineStatus], engine: Engine) -> None:
         self._ask = ask
         self._engine = engine
-        self._on = on
         self._ending = Event()
         self._thread = Thread(target=self._draw, name="progress", daemon=True)
 
@@ -125,7 +124,7 @@ class Watching:
         self._thread.join(timeout=2.0)
 
     def _draw(self) -> None:
-        with EngineBars(self._on) as bars:
+        with EngineBars() as bars:
             while not self._ending.wait(INTERVAL_S):
                 bars.draw(self._ask())
             bars.draw(self._ask())

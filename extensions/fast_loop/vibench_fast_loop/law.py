@@ -17,21 +17,15 @@ from vibench.sim.specimen.state import Table, Vector
 
 from .plant import SampledPlant
 
-
-@dataclass(frozen=True)
-class LawWeights:
-    """Weights of the design: sizes of motion, voltage and noise."""
-
-    relative_m: float = 3e-5
-    """Motion of p that costs as much as a tenth of a volt of control [m]."""
-    push_n: float = 3e-3
-    """Unknown force between m1 and m2 assumed by the filter, rms over a step [N]."""
-    volt: float = 1e-2
-    """Unknown voltage assumed by the filter [V]."""
-    acceleration: float = 0.2
-    """Noise of a base acceleration sample [m/s2]."""
-    velocity: float = 1e-4
-    """Noise of an m0 velocity sample [m/s]."""
+# Weights of the design: sizes of motion, voltage and noise.
+RELATIVE_M = 3e-5
+"""Motion of p that costs as much as a tenth of a volt of control [m]."""
+PUSH_N = 3e-3
+"""Unknown force between m1 and m2 assumed by the filter, rms over a step [N]."""
+VOLT = 1e-2
+"""Unknown voltage assumed by the filter [V]."""
+NOISE = 0.2, 1e-4
+"""Noise of a sample: of the base acceleration [m/s2] and of the m0 velocity [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +42,7 @@ class LinearLaw:
     """Shape (1, 2)."""
 
 
-def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> LinearLaw:
+def design_law(plant: SampledPlant) -> LinearLaw:
     """Return the law that damps the spring between m1 and m2.
 
     Linear-quadratic Gaussian control (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch.
@@ -58,11 +52,10 @@ def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Linea
     ----------
     plant
         The known plant; the law includes its latency.
-    weights
-        Weights of the design.
     """
-    step, volt, shown, cost, unknown, noise = _weigh(plant, weights)
-    gain = _gain(step, volt[:, None], cost, np.eye(1))
+    step, volt, shown, cost, unknown, noise = _weigh(plant)
+    value = solve_discrete_are(step, volt[:, None], cost, np.eye(1))
+    gain = (volt @ value @ step)[None, :] / (1.0 + volt @ value @ volt)
     covariance = solve_discrete_are(step.T, shown.T, unknown + 1e-12 * np.eye(plant.size), noise)
     filtered = np.linalg.solve(shown @ covariance @ shown.T + noise, shown @ covariance).T
     kept = np.eye(plant.size) - filtered @ shown
@@ -70,7 +63,7 @@ def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Linea
     return LinearLaw(closed @ kept, closed @ filtered, -gain @ kept, -gain @ filtered)
 
 
-def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights()) -> LinearLaw:
+def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
     """Return the law of two gains with the lowest cost of `design_law`, for controllers that allow no other.
 
     ``u = -(kp s + kd d)`` of one sample s and its rate of change behind a low-pass ``d += a ((s - before) /
@@ -83,12 +76,10 @@ def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights())
         The known plant; the law includes its latency.
     sample
         Sample that is fed back: 0 the base's acceleration, 1 m0's velocity.
-    weights
-        Weights of the design.
     """
-    problem, step_s = _weigh(plant, weights), plant.timing.step_s
+    problem, step_s = _weigh(plant), plant.timing.step_s
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
-    size = 0.1 / weights.relative_m / omega ** (2 - sample)
+    size = 0.1 / RELATIVE_M / omega ** (2 - sample)
 
     def law(unknowns: Vector) -> LinearLaw:
         share = step_s / (abs(unknowns[2]) / omega + step_s)
@@ -117,7 +108,7 @@ class _WeightedPlant(NamedTuple):
     noise: Table
 
 
-def _weigh(plant: SampledPlant, weights: LawWeights) -> _WeightedPlant:
+def _weigh(plant: SampledPlant) -> _WeightedPlant:
     scale = plant.scales
     step, volt = plant.step
     step = step * scale / scale[:, None]
@@ -126,10 +117,10 @@ def _weigh(plant: SampledPlant, weights: LawWeights) -> _WeightedPlant:
     fast = np.zeros(plant.size)
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
     fast[7], fast[8] = scale[7] / omega, -scale[8] / omega
-    cost = (np.outer(relative, relative) + np.outer(fast, fast)) * (0.1 / weights.relative_m) ** 2
+    cost = (np.outer(relative, relative) + np.outer(fast, fast)) * (0.1 / RELATIVE_M) ** 2
     pushed = step @ into * plant.timing.step_s
-    unknown = np.outer(pushed, pushed) * weights.push_n**2 + np.outer(volt, volt) * weights.volt**2
-    noise = np.diag([weights.acceleration**2, weights.velocity**2])
+    unknown = np.outer(pushed, pushed) * PUSH_N**2 + np.outer(volt, volt) * VOLT**2
+    noise = np.diag(np.square(NOISE))
     return _WeightedPlant(step, volt, plant.shown * scale, cost, unknown, noise)
 
 
@@ -148,11 +139,6 @@ def _expected_cost(problem: _WeightedPlant, law: LinearLaw) -> float:
     covariance = solve_discrete_lyapunov(closed, noise)
     direct = (law.direct @ problem.noise @ law.direct.T).item()
     return float(np.trace(covariance[:own, :own] @ problem.cost) + answer @ covariance @ answer + direct)
-
-
-def _gain(step: Table, volt: Table, cost: Table, price: Table) -> Table:
-    value = solve_discrete_are(step, volt, cost, price)
-    return np.asarray(np.linalg.solve(price + volt.T @ value @ volt, volt.T @ value @ step))
 
 
 def loop_multiplier(
@@ -182,7 +168,7 @@ def loop_multiplier(
     stretches = _tables_of_step(plant, law, parts)
     into, relative = (np.pad(each, (0, len(stretches[0]) - plant.size)) for each in plant.spring)
     rate, part_s = np.roll(relative, 3), plant.timing.step_s / parts
-    springs, dampers = np.broadcast_arrays(np.asarray(stiffness) - plant.stiffness, damping)
+    springs, dampers = np.broadcast_arrays(stiffness, damping)
     free = reduce(lambda before, stretch: stretch @ before, stretches)
     moved = np.eye(len(free))
     for spring, damper in zip(springs.reshape(-1, parts), dampers.reshape(-1, parts), strict=True):

@@ -52,20 +52,16 @@ class SampledPlant:
     shaker: Shaker
     specimen: Specimen
     timing: LoopTiming
-    stiffness: float = 0.0
-    """Added to the spring between m1 and m2: mean effect of the stops on a motion [N/m]."""
 
     @cached_property
     def equations(self) -> tuple[Table, Vector]:
         """System matrix of table and specimen, (9, 9), and the effect of a volt at the amplifier, (9,)."""
         table = self.shaker.equations()
         specimen, mass = self.specimen, np.asarray(self.specimen.masses)
-        along = np.array([0.0, 1.0, -1.0])
-        spring = specimen.stiffness_matrix + self.stiffness * np.outer(along, along)
         k0, c0 = specimen.stiffnesses[0], specimen.dampings[0]
         rates = block_diag(table.A, np.zeros((6, 6)))
         rates[3:6, 6:9] = np.eye(3)
-        rates[6:9, 3:6] = -spring / mass[:, None]
+        rates[6:9, 3:6] = -specimen.stiffness_matrix / mass[:, None]
         rates[6:9, 6:9] = -specimen.damping_matrix / mass[:, None]
         rates[6, 0] += k0 / mass[0]
         rates[6, 1] += c0 / mass[0]

@@ -14,7 +14,17 @@ from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
 from vibench.sim.specimen.power_law import PowerLaw
 from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
-from vibench_fast_loop.law import LawWeights, LinearLaw, design_law, loop_multiplier, loop_transfer, pd_law
+from vibench_fast_loop.law import (
+    NOISE,
+    PUSH_N,
+    RELATIVE_M,
+    VOLT,
+    LinearLaw,
+    design_law,
+    loop_multiplier,
+    loop_transfer,
+    pd_law,
+)
 from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 RATE_HZ = 10_240.0
@@ -113,12 +123,12 @@ def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
 @pytest.mark.thorough
 def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
     """All that is weighed, by simulation under its noises."""
-    weights, model, rng = LawWeights(), plant(specimen=LINEAR), np.random.default_rng(5)
+    model, rng = plant(specimen=LINEAR), np.random.default_rng(5)
     step, volt = model.step
     into, relative = model.spring
     count = 20_000
-    pushes, unknown = rng.normal(0, weights.push_n, count), rng.normal(0, weights.volt, count)
-    heard = rng.normal(0, 1, (count, 2)) * (weights.acceleration, weights.velocity)
+    pushes, unknown = rng.normal(0, PUSH_N, count), rng.normal(0, VOLT, count)
+    heard = rng.normal(0, 1, (count, 2)) * NOISE
 
     def cost(law):
         state, memory, total = np.zeros(model.size), np.zeros(2), 0.0
@@ -127,7 +137,7 @@ def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
             seen = model.shown @ state + noise
             answer = (law.output @ memory + law.direct @ seen)[0]
             motion = (relative @ state) ** 2 + ((state[7] - state[8]) / omega) ** 2
-            total += motion * (0.1 / weights.relative_m) ** 2 + answer**2
+            total += motion * (0.1 / RELATIVE_M) ** 2 + answer**2
             memory = law.step @ memory + law.inlet @ seen
             state = step @ (state + into * push * model.timing.step_s) + volt * (answer + more)
         return total
