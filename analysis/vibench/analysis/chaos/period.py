@@ -62,7 +62,7 @@ class Points(Labelled):
         return float(np.sqrt(np.mean(self.noise**2)))
 
 
-def shortest_period(points: Points, longest: int = LONGEST_PERIOD) -> int | None:
+def shortest_period(points: Points) -> int | None:
     """Find the fewest drive periods after which all points repeat within noise; None if they do not.
 
     The points of each phase are compared over the whole record, because slow changes are small from period
@@ -72,7 +72,7 @@ def shortest_period(points: Points, longest: int = LONGEST_PERIOD) -> int | None
     by_noise = (_NOISE_MARGIN * points.noise) ** 2
     allowed = by_noise + STEADY**2
     count = len(points.value)
-    for period in range(1, min(longest, count // 4) + 1):
+    for period in range(1, min(LONGEST_PERIOD, count // 4) + 1):
         whole = np.full((-(-count // period) * period, _TABLE), np.nan)
         whole[:count] = points.value
         scatter = np.nanvar(whole.reshape(-1, period, _TABLE), axis=0, ddof=1)

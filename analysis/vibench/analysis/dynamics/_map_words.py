@@ -38,15 +38,15 @@ class RecordedLevel:
     """Curves of Response I of m0."""
 
 
-def motion_classes(results: MapResults, start: int = 0) -> Reals:
-    """Return the index in `MOTION_CLASSES` of each point for start number ``start``; NaN if unknown.
+def motion_classes(results: MapResults) -> Reals:
+    """Return the index in `MOTION_CLASSES` of each point for the first start; NaN if unknown.
 
     Returns
     -------
     ndarray
         The shape of the grid of varied parameters.
     """
-    motion, period, impacts = (results.shown(name, start) for name in ("motion", "period", "impact_rate"))
+    motion, period, impacts = (results.shown(name) for name in ("motion", "period", "impact_rate"))
     kinds = list(MotionKind)
     found = np.full(motion.shape, np.nan)
     is_periodic = motion == kinds.index(MotionKind.PERIODIC)

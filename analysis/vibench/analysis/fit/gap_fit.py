@@ -58,7 +58,6 @@ def fit_gap(
     sweeps: Sequence[SweepAnalysis],
     linear: Specimen,
     fit: SpecimenFit | None = None,
-    confidence: float = DEFAULT_CONFIDENCE,
 ) -> FittedValue:
     """Return the gap that explains the sharpest onset of collisions.
 
@@ -73,10 +72,8 @@ def fit_gap(
         Specimen for the linear motion; its gap is only reported as nominal.
     fit
         Fit of the linear specimen, for its covariance.
-    confidence
-        Confidence for the uncertainties of drive and linear specimen.
     """
-    found = [each for sweep in sweeps for each in onsets(sweep, linear, fit, confidence)]
+    found = [each for sweep in sweeps for each in onsets(sweep, linear, fit)]
     if not found:
         raise NotEnoughData(
             "no sweep enters a region in which the masses collide, so the gap is undetermined; sweep with "
@@ -85,17 +82,12 @@ def fit_gap(
     return _narrowest(found, linear)
 
 
-def onsets(
-    sweep: SweepAnalysis,
-    linear: Specimen,
-    fit: SpecimenFit | None = None,
-    confidence: float = DEFAULT_CONFIDENCE,
-) -> Iterator[Onset]:
+def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = None) -> Iterator[Onset]:
     """Yield every onset of collisions in a sweep, with the gap that follows from it.
 
     The bounds are those of the edge, widened by uncertainties of drive and linear specimen.
     """
-    reach = float(norm.ppf(0.5 + 0.5 * confidence))
+    reach = float(norm.ppf(0.5 + 0.5 * DEFAULT_CONFIDENCE))
     rate = sweep.response.sweep_rate_hz_per_s
     for region in sweep.collisions.regions:
         if region.reaches_start:

@@ -29,6 +29,7 @@ from ._ring import Values
 
 _LEAST_SEGMENTS = 2
 """Fewest segments: the coherence of a single one is always 1."""
+_OVERLAP = 0.5
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,6 @@ class SpectrumSettings:
     """Length of a segment; at 51.2 kS/s, lines are 6.25 Hz apart."""
     averages: int = 24
     """Number of averaged segments; older ones are dropped."""
-    overlap: float = 0.5
 
     def __post_init__(self) -> None:
         if self.segment_samples < 2 or self.averages < _LEAST_SEGMENTS:
@@ -47,7 +47,6 @@ class SpectrumSettings:
                 f"{self.averages} segments of {self.segment_samples} samples were requested; "
                 "give 2 or more of both"
             )
-        hop_samples(self.segment_samples, self.overlap)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,7 @@ class LiveSpectra:
     ) -> None:
         self._rate_hz = sample_rate_hz
         self._settings = settings
-        self._hop = hop_samples(settings.segment_samples, settings.overlap)
+        self._hop = hop_samples(settings.segment_samples, _OVERLAP)
         self._taper = taper(Window.HANN, settings.segment_samples)
         self._short_taper = self._taper.astype(np.float32)
         lines = settings.segment_samples // 2 + 1
@@ -135,7 +134,6 @@ class LiveSpectra:
         low_hz: float,
         high_hz: float,
         delay_s: float = 0.0,
-        confidence: float = DEFAULT_CONFIDENCE,
     ) -> FrequencyResponse | None:
         """Return transmissibility, coherence and bounds; None before two segments.
 
@@ -160,8 +158,8 @@ class LiveSpectra:
             sample_rate_hz=self._rate_hz,
             segment_samples=self._settings.segment_samples,
             window=Window.HANN.value,
-            overlap=self._settings.overlap,
-            confidence=confidence,
+            overlap=_OVERLAP,
+            confidence=DEFAULT_CONFIDENCE,
         )
         highest = int(high_hz * self._settings.segment_samples / self._rate_hz) + 2
         found = frequency_response_of(self._averages(used, rows, highest), settings).between(low_hz, high_hz)
@@ -181,7 +179,7 @@ class LiveSpectra:
             n_eff=effective_averages(self._taper, self._hop, used),
             segment_samples=self._settings.segment_samples,
             window=Window.HANN,
-            overlap=self._settings.overlap,
+            overlap=_OVERLAP,
             window_sum=float(np.sum(self._taper)),
             window_energy=float(self._taper @ self._taper),
         )

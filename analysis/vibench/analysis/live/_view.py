@@ -17,7 +17,7 @@ from ._outline import Samples, column_starts, outline
 from ._portrait import PoincareSection, Portrait, portrait, portrait_samples
 from ._ring import Ring, Values
 from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples
-from ._spectra import DEFAULT_SETTINGS, LiveSpectra, LiveSpectrum, SpectrumSettings
+from ._spectra import LiveSpectra, LiveSpectrum
 
 # Impacts are counted as kinks in the motion of m0.
 # When m1 and m2 collide, springs and dampers transmit their jump in velocity to m0: its acceleration steps
@@ -242,7 +242,6 @@ class LiveView:
         band_hz: tuple[float, float],
         delay_s: float = 0.0,
         lead_in_s: float = 0.0,
-        settings: SpectrumSettings = DEFAULT_SETTINGS,
     ) -> None:
         self.channels = tuple(channels)
         """Channels in the order of the time histories."""
@@ -253,7 +252,7 @@ class LiveView:
         self._units_per_volt = np.array([[each.units_per_volt] for each in channels], dtype=np.float32)
         self._rows = {each.role: row for row, each in enumerate(channels)}
         self._ring = Ring(len(channels), round(HELD_S * sample_rate_hz))
-        self._spectra = LiveSpectra(len(channels), sample_rate_hz, settings)
+        self._spectra = LiveSpectra(len(channels), sample_rate_hz)
         self._response = next((role for role in RESPONSE_ROLES if role in self._rows), RESPONSE)
         self._quantity = Quantity(self._response.partition("_")[2])
         self._impacts = ImpactCounter(sample_rate_hz, self._quantity)
