@@ -11,11 +11,12 @@ from nidaqmx.errors import DaqError
 from nidaqmx.stream_writers import AnalogSingleChannelWriter
 from nidaqmx.task.channels import AOChannel
 
-from ..errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
+from ..errors import DataLost, InstrumentError, InstrumentLost, SettingRefused
 from ..instruments import Identity, IdleOutput, Samples
 from ..rig import OutputConfig
 from ._daqmx import DaqmxDigitizer, daqmx_identity
 from ._daqmx_errors import daqmx_call
+from ._overload import require_playable
 
 _WRITE_TIMEOUT_S = 10.0
 # Length of the final zeros: the output holds the last one, and some devices need more than one.
@@ -93,14 +94,7 @@ class DaqmxOutput:
         DataLost
             When the output ran empty before: it has stopped.
         """
-        peak_v = float(np.max(np.abs(volts), initial=0.0))
-        if not peak_v <= self._config.limit_v:  # so that a NaN does not pass
-            raise LimitExceeded(
-                f"{self._physical} was to play a peak of {peak_v:g} V; {self._config.limit_v:g} V are "
-                "allowed here. Nothing was written; lower the amplitude"
-            )
-        if not self._is_open:
-            raise InstrumentError(f"{self._physical} is closed; open the bench again")
+        require_playable(volts, self._physical, self._config.limit_v, is_open=self._is_open)
         task = self._task or self._reserve()
         with daqmx_call(f"writing {volts.size} samples to {self._physical}"):
             writer = AnalogSingleChannelWriter(task.out_stream, auto_start=False)

@@ -1,7 +1,8 @@
-"""Ranges of samples where inputs are near the end of their range."""
+"""Samples near the end of an input's range, and samples that an output must not play."""
 
 import numpy as np
 
+from ..errors import InstrumentError, LimitExceeded
 from ..instruments import Overload, Samples
 
 # Vibrometers and converters distort before they clip: hardware reference 4.
@@ -38,3 +39,15 @@ def overload_ranges(
             for first, last in zip(firsts, lasts, strict=True)
         ]
     return tuple(found)
+
+
+def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: bool) -> None:
+    """Raise LimitExceeded for a sample beyond the limit of the bench, or NaN, InstrumentError if closed."""
+    peak_v = float(np.max(np.abs(volts), initial=0.0))
+    if not peak_v <= limit_v:  # so that a NaN does not pass
+        raise LimitExceeded(
+            f"{physical} was to play a peak of {peak_v:g} V; {limit_v:g} V are allowed here. Nothing was "
+            "written; lower the amplitude"
+        )
+    if not is_open:
+        raise InstrumentError(f"{physical} is closed; open the bench again")

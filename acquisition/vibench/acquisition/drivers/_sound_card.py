@@ -14,18 +14,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..errors import (
-    ConfigurationError,
-    DataLost,
-    InstrumentError,
-    InstrumentLost,
-    LimitExceeded,
-    MissingLibrary,
-)
+from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost, MissingLibrary
 from ..host.extras import need_extra
 from ..instruments import Block, Identity, IdleOutput, Samples
 from ..rig import Channel, OutputConfig, Rig, channels_of
-from ._overload import overload_ranges
+from ._overload import overload_ranges, require_playable
 
 _LATEST_S = 10.0
 """A card whose samples are later than this counts as lost [s]."""
@@ -282,14 +275,7 @@ class SoundCardOutput:
 
     def write(self, volts: Samples) -> None:
         """Add samples behind those still to be played, waiting for room; raises as `AnalogOutput.write`."""
-        peak_v = float(np.max(np.abs(volts), initial=0.0))
-        if not peak_v <= self._config.limit_v:
-            raise LimitExceeded(
-                f"{self._physical} was to play a peak of {peak_v:g} V; {self._config.limit_v:g} V are "
-                "allowed here. Nothing was written; lower the amplitude"
-            )
-        if not self._is_open:
-            raise InstrumentError(f"{self._physical} is closed; open the bench again")
+        require_playable(volts, self._physical, self._config.limit_v, is_open=self._is_open)
         card, needed = self._card, np.asarray(volts, dtype=np.float64).size
         with card.changed:
             there_is_room = card.changed.wait_for(
