@@ -9,7 +9,6 @@ from pydantic import ValidationError
 from vibench.acquisition import ConfigurationError, load_campaign
 from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
 from vibench.acquisition.excitation.plan import AbstractFeedback
-from vibench.acquisition.excitation.settled_sine import MOST_SETTLED_STEPS
 from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     HUSH_S,
@@ -101,9 +100,9 @@ def test_acceleration_of_a_displacement_grows_with_frequency_squared():
         (
             lambda: SettledSine(
                 amplitude_vpp=1,
-                grid=FrequencyGrid(start_hz=100, stop_hz=100 + MOST_SETTLED_STEPS, step_hz=1),
+                grid=FrequencyGrid(start_hz=100, stop_hz=100 + SettledSine.most_steps, step_hz=1),
             ),
-            f"the plan has {MOST_SETTLED_STEPS + 1} settled steps",
+            f"the plan has {SettledSine.most_steps + 1} steps; one recording holds",
         ),
         (lambda: HeldDwell(amplitude_vpp=1, frequency_hz=260, duration_s=1), "base_level"),
     ],

@@ -1,16 +1,14 @@
 """Sines one after the other, each recorded when its motion has settled."""
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat
 
 from ..recording import SegmentLabel
 from .feedback import BaseLevel, JumpSearch, Settling
 from .plan import AbstractFeedback
 from .stepped_sine import FrequencySteps
 
-MOST_SETTLED_STEPS = 600
-"""Largest number of steps: four events a step, and as many for searches, fit into a recording's table."""
 GLIDE_TONE_S = 0.1
 """Time at each tone between two frequencies of the list [s]."""
 
@@ -23,6 +21,8 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
+    most_steps: ClassVar[int] = 600
+    """Four events a step, and as many for searches, fit into a recording's table."""
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None
@@ -33,16 +33,6 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     """Largest frequency step of the tone between two frequencies of the list [Hz]."""
     search_s: float = Field(default=120.0, gt=0, le=7200)
     """Longest time spent on one jump; the interval found by then is kept [s]."""
-
-    @model_validator(mode="after")
-    def _events_have_room(self) -> Self:
-        count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
-        if count > MOST_SETTLED_STEPS:
-            raise ValueError(
-                f"the plan has {count} settled steps; one recording notes what is found at "
-                f"{MOST_SETTLED_STEPS} at most: widen the grid or split the measurement"
-            )
-        return self
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:

@@ -53,6 +53,7 @@ class FrequencySteps(AbstractExcitation):
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
+    most_steps: ClassVar[int] = MOST_STEPS
     frequencies_hz: tuple[FrequencyHz, ...] = ()
     """Rising [Hz]; or give ``grid``."""
     grid: FrequencyGrid | None = None
@@ -72,9 +73,9 @@ class FrequencySteps(AbstractExcitation):
                     "list every frequency once, rising, and choose the way through it with direction"
                 )
         count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
-        if count > MOST_STEPS:
+        if count > self.most_steps:
             raise ValueError(
-                f"the plan has {count} steps; one recording holds at most {MOST_STEPS}: "
+                f"the plan has {count} steps; one recording holds at most {self.most_steps}: "
                 "widen the grid or split the measurement"
             )
         return self
