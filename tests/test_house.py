@@ -20,7 +20,7 @@ LINES_AT_MOST = {
     "native": 6_625,
     "sim": 20_437,
     "studies": 3_182,
-    "virtual_rig": 7_562,
+    "virtual_rig": 7_558,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

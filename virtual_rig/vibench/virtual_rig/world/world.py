@@ -195,7 +195,8 @@ class World:
         self._outputs: dict[str, AnalogueOutput] = {}
         self._loop = loop
         self._conversions: list[Conversion] = []
-        self._history = np.zeros((len(self._rows), _history_steps(grid)))
+        slowest = history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz)
+        self._history = np.zeros((len(self._rows), slowest + 2))
         self._schedule = EventSchedule(grid)
         self._step = 0
         self._unspent_steps = 0.0
@@ -448,11 +449,6 @@ def _sensors_of(rig: Rig, virtual: VirtualConfig, grid: TimeGrid) -> Iterator[tu
     for role, sensor in rig.sensors.items():
         density = 0.0 if sensor.noise_per_rthz is None else sensor.noise_per_rthz.value
         yield role, MotionSensor(sensor, role, density * per_rthz, noise(role.value), grid)
-
-
-def _history_steps(grid: TimeGrid) -> int:
-    """Return the number of steps of history for the slowest conversion."""
-    return history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz) + 2
 
 
 def virtual_section(rig: Rig) -> VirtualConfig:
