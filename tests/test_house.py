@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_239,
-    "analysis": 32_538,
+    "acquisition": 28_233,
+    "analysis": 32_535,
     "cli": 5_068,
     "extensions": 2_680,
     "gui": 12_466,
     "native": 6_625,
     "sim": 20_437,
     "studies": 3_182,
-    "virtual_rig": 7_558,
+    "virtual_rig": 7_549,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

@@ -123,11 +123,8 @@ class Equaliser:
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
-        return _average(np.abs(spectrum) ** 2 / 2 / plan.repetition_hz, self._width)
-
-    @property
-    def _width(self) -> int:
-        return max(1, round(self._plan.resolution_hz / self._plan.repetition_hz))
+        width = max(1, round(plan.resolution_hz / plan.repetition_hz))
+        return _average(np.abs(spectrum) ** 2 / 2 / plan.repetition_hz, width)
 
     def _require_answer(self, heard: MeasuredDensities) -> None:
         modelled = sqrt(float(np.sum(heard.drive * self._modelled)))

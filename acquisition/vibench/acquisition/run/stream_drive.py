@@ -151,6 +151,8 @@ class StreamDrive:
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
         """``terminal_factor``: volts that the generator's terminal would show per volt of setting."""
         self._output = output
+        self.pause_s = output.ahead_samples / output.sample_rate_hz
+        """Time to play the samples written ahead [s]."""
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
         self._synthesizer = OutputSynthesizer(output.sample_rate_hz)
@@ -161,11 +163,6 @@ class StreamDrive:
         self._is_playing = False
         self.setting_vpp = 0.0
         """Current amplitude as the equivalent setting of a generator [V]."""
-
-    @property
-    def pause_s(self) -> float:
-        """Time to play the samples written ahead [s]."""
-        return self._output.ahead_samples / self._output.sample_rate_hz
 
     @property
     def is_playing(self) -> bool:

@@ -230,6 +230,7 @@ class LiveTwin:
             rig.model_dump(mode="json"), channels[BASE], channels[RESPONSE], sample_rate_hz
         )
         self._rate = sample_rate_hz
+        self._block = round(BLOCK_S * sample_rate_hz)
         self._executor = executor
         self._finding: Future[FoundSpecimen] | None = None
         self.found: tuple[FoundParameter, ...] = ()
@@ -281,10 +282,6 @@ class LiveTwin:
         self._level = np.nan
         self._forecaster = Forecaster(self._rate)
         self._forecast: Forecast | None = None
-
-    @property
-    def _block(self) -> int:
-        return round(BLOCK_S * self._rate)
 
     @property
     def newest(self) -> LiveMotion:

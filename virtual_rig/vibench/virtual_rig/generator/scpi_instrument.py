@@ -370,18 +370,12 @@ class ScpiSocket:
     def __init__(self, device: ScpiDevice, port: int = 0) -> None:
         self._closing = threading.Event()
         self._server = _server(device, (LOOPBACK, port), self._closing)
+        self.port = int(self._server.server_address[1])
+        """The port of the server."""
+        self.resource_name = f"TCPIP0::{LOOPBACK}::{self.port}::SOCKET"
+        """The VISA address of the socket."""
         self._thread = threading.Thread(target=self._server.serve_forever, name="scpi-socket", daemon=True)
         self._thread.start()
-
-    @property
-    def port(self) -> int:
-        """The port of the server."""
-        return int(self._server.server_address[1])
-
-    @property
-    def resource_name(self) -> str:
-        """The VISA address of the socket."""
-        return f"TCPIP0::{self._server.server_address[0]!s}::{self.port}::SOCKET"
 
     def close(self) -> None:
         """Stop the server; allowed at any time."""

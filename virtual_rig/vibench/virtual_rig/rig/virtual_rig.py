@@ -95,12 +95,9 @@ class VirtualRig:
         """The controller of a fast loop; None without one."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
-        self._running: _Running | None = None
-
-    @property
-    def visa_resource(self) -> str:
+        self.visa_resource = self._usb.identification.resource_name
         """VISA name of the generator."""
-        return self._usb.identification.resource_name
+        self._running: _Running | None = None
 
     @property
     def daq_address(self) -> str:
