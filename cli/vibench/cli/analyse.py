@@ -205,7 +205,7 @@ def _analyse(
             for role, having in other_responses(paths).items()
         }
     if updated is not None:
-        results = replace(results, model_said=updated.sentences)
+        results = replace(results, model_sentences=updated.sentences)
     from vibench.analysis.report import check_warnings, findings, write_report
 
     if as_json:

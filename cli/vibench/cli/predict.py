@@ -249,7 +249,7 @@ def _share_text(point: ScenePrediction) -> str:
     """Return the number of starts that reached a point's motion; empty if all starts reach it."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
-            return f"{ensemble.motions[ensemble.asked].starts}/{ensemble.starts}"
+            return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
         case ScenePrediction(memory=StartMemory.LOST):
             return "forgotten"
         case _:

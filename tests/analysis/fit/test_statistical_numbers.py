@@ -123,7 +123,7 @@ def test_a_fit_determines_parameters_of_an_untrackable_motion(buried):
     assert holds(gap, 51e-6)
     assert updated.specimen.gaps_m == pytest.approx((gap.value, gap.value))
     assert any(each.startswith("From statistics, mean gap: (") for each in updated.sentences)
-    assert any(each.startswith("No motion could be tracked: ") for each in updated.not_told)
+    assert any(each.startswith("No motion could be tracked: ") for each in updated.not_determined)
     assert updated.to_dict()["statistics_from"] == updated.collisions.recording
 
 

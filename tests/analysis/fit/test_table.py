@@ -41,7 +41,7 @@ def test_a_right_description_of_a_whole_rig_is_not_refused(updated):
     assert updated.table.mass_kg == pytest.approx(TRUE_KG, abs=3.3 * updated.table.sd_kg)
     assert updated.table.sd_kg < 0.01 * TRUE_KG
     assert updated.table.suspects == ()
-    assert updated.not_told[0].endswith("the contact law are not determined: no recording collides.")
+    assert updated.not_determined[0].endswith("the contact law are not determined: no recording collides.")
 
 
 def test_a_table_that_is_a_tenth_heavier_than_described_is_named(updated):

@@ -88,14 +88,14 @@ def test_true_parameters_lie_within_intervals_that_exclude_the_description(updat
         slack = 0.7 * (each.high - each.low) / 2
         assert each.low - slack <= truth <= each.high + slack, each
         assert not each.low <= each.nominal <= each.high, each
-    assert len(updated.not_told) == 1
-    assert "Each side's gap, m1, c1 and the contact law are not determined" in updated.not_told[0]
+    assert len(updated.not_determined) == 1
+    assert "Each side's gap, m1, c1 and the contact law are not determined" in updated.not_determined[0]
     assert updated.fits
     assert 0.3 < updated.reduced_chi_square < 3
 
 
 def test_the_report_shows_fitted_and_described_values(measured, updated):
-    said = list(findings(replace(measured, model_said=updated.sentences)))
+    said = list(findings(replace(measured, model_sentences=updated.sentences)))
     assert said[: len(updated.sentences)] == list(updated.sentences)
     assert [
         each
@@ -163,7 +163,7 @@ def test_without_a_sweep_the_gap_is_not_fitted_and_the_reason_given(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m
-    assert [each for each in found.not_told if "gap stays as the bench says" in each]
+    assert [each for each in found.not_determined if "gap stays as the bench says" in each]
     only_sweep = update_model(CampaignResults("sweep", measured.sweeps, ()))
     assert [each.parameter for each in only_sweep.values] == [Parameter.GAP]
     assert math.isnan(only_sweep.reduced_chi_square)

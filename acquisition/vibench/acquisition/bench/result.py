@@ -40,7 +40,7 @@ class Finding(FrozenModel):
     """Standard uncertainty of the number."""
     unit: str = ""
     advice: str = ""
-    """What to do; empty when all is well."""
+    """Advice; empty if the finding is ok."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class KeptRecording:
     duration_s: float
     seal: str
     damage: str
-    """Sentence on what is wrong with the file; empty if it is sound or has no seal."""
+    """Description of the damage; empty if the file is sound or has no seal."""
     is_of_this_plan: bool
     rig: Mapping[str, Any] = field(default_factory=dict)
     """The configuration of the bench that made it."""

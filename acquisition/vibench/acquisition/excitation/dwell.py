@@ -30,7 +30,7 @@ class Dwell(FixedSine):
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
-    """Earlier tones, in the order of time; none to begin at the dwell itself."""
+    """Earlier tones in order of time; empty to start with the dwell."""
     lead_s: PositiveFloat = 0.5
     """Time at each tone of ``lead_in`` [s]."""
 

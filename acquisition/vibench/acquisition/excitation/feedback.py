@@ -24,7 +24,7 @@ class Settling(FrozenModel):
     """
 
     tolerance: Share = 0.01
-    """How closely the motion must repeat, over its rms size."""
+    """Tolerance for a repeating motion, relative to its rms value."""
     periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
     """Number of drive periods for which it must repeat."""
     longest_period: int = Field(default=8, ge=1, le=32)
@@ -96,4 +96,4 @@ class JumpSearch(FrozenModel):
     resolution_hz: PositiveFloat = 0.25
     """Largest distance between the two frequencies around a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)
-    """Largest number of changes in one pass that are searched; some may be steep only."""
+    """Largest number of searches in one pass, including steep changes that are no jumps."""

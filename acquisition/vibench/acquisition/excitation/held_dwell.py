@@ -20,7 +20,7 @@ class HeldDwell(FixedSine, AbstractFeedback):
     base_level: BaseLevel
     """Level of the base to be held."""
     settling: Settling = Settling()
-    """When the recording begins."""
+    """Settling before the recording."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     update_s: PositiveFloat = 1.0

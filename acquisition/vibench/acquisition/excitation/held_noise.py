@@ -54,11 +54,11 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     """Largest density of the velocity of m0 [(m/s)2/Hz]: the base is lowered (notched) where it would be
     exceeded; corner by corner; absent: no limit."""
     resolution_hz: PositiveFloat = 4.0
-    """Width for averaging densities before they are judged, and gains before they are used [Hz]."""
+    """Bandwidth over which densities and gains are averaged [Hz]."""
     equalisations: int = Field(default=4, ge=1, le=100)
-    """Realisations before the first that is kept."""
+    """Realisations for equalisation, before the first that gives results."""
     start_db: float = Field(default=-12.0, ge=-60, le=0)
-    """Level of the first of them, below the spectrum."""
+    """Level of the first equalisation, relative to the spectrum."""
 
     @model_validator(mode="after")
     def _corners_rise(self) -> Self:

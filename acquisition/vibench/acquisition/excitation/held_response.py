@@ -25,9 +25,9 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     response_m: HeldMetres
     """Amplitude of m0's fundamental to be held [m]."""
     response_of: PhaseReference = PhaseReference.RELATIVE
-    """Motion of m0 that is meant: relative to the base, or absolute."""
+    """Motion of m0: relative to the base, or absolute."""
     tolerance: Share = 0.01
-    """Allowed relative deviation, twice in a row."""
+    """Relative tolerance that two measurements in a row must meet."""
     most_change: float = Field(default=1.25, gt=1, le=4)
     """Largest factor of one change of the setting."""
     start_share: Share = 0.02

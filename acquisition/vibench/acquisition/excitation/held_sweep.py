@@ -24,7 +24,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
     average_s: PositiveFloat = 0.5
     """Averaging time for random errors and for the check of the level; a trend is followed faster [s]."""
     settling: Settling = Settling()
-    """When the sweep begins to move."""
+    """Settling before the sweep."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:

@@ -50,7 +50,7 @@ class ResonanceTracking(AbstractFeedback):
     phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
     """Phase of m0 over the base at the resonance, both as displacements [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
-    """Motion of m0 that is meant: relative to the base, or absolute."""
+    """Motion of m0: relative to the base, or absolute."""
     harmonic: Literal[1, 2, 3] = 1
     """Harmonic of m0 whose phase counts; above 1 the absolute phase, relative to this many times the
     base's."""
@@ -69,7 +69,7 @@ class ResonanceTracking(AbstractFeedback):
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
     """Allowed relative deviation of the measured level."""
     settling: Settling = Settling()
-    """When a motion counts as settled."""
+    """Criteria for settled motion."""
     widest_step_hz: PositiveFloat = 1.0
     """Longest step of the search; shorter than the distance to the next antiresonance [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)

@@ -55,7 +55,7 @@ class FrequencySteps(AbstractExcitation):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     most_steps: ClassVar[int] = MOST_STEPS
     frequencies_hz: tuple[FrequencyHz, ...] = ()
-    """Rising [Hz]; or give ``grid``."""
+    """Ascending frequencies [Hz]; or give ``grid``."""
     grid: FrequencyGrid | None = None
     """Frequencies at equal distances; or give ``frequencies_hz``."""
     direction: Direction = Direction.UP

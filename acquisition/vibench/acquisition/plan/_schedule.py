@@ -122,7 +122,7 @@ class Measurement(FrozenModel):
     ramp_step_s: PositiveFloat = 0.05
     """Duration of one stair: the ramp is a staircase of amplitude settings [s]."""
     repeats: PositiveInt = Field(default=1, le=1000)
-    """Number of recordings of it in a campaign."""
+    """Number of recordings of this measurement in a campaign."""
     limits: InRunLimits = InRunLimits()
     notes: str = ""
     until: Until | None = None

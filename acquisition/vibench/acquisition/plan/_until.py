@@ -21,9 +21,9 @@ Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
 
 
 class Until(FrozenModel):
-    """Record until every result named here has its bound; the plan's own time is the longest.
+    """Record until the bound of every result named here is small enough, at most for the plan's time.
 
-    A bound covers in 95 % of recordings, also of those that end by it. It contains noise and chance, which
+    The bounds hold in 95 % of recordings, also if they end a recording. They contain noise and chance, which
     recording time reduces, but no calibrations.
     """
 
@@ -36,7 +36,7 @@ class Until(FrozenModel):
     response_ii: Wish | None = None
     """Bound of Response II of a dwell or of each step: ``"1 %"``."""
     shortest_s: PositiveFloat = SHORTEST_S
-    """Recorded time before the first analysis, of a dwell, a step or streamed noise [s]: at most its planned
+    """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; at most its planned
     time."""
 
     @model_validator(mode="after")

@@ -94,10 +94,10 @@ class SettledNote(AbstractNote):
 
     kind: Literal["settled"] = "settled"
     frequency_hz: float
-    """As commanded [Hz]."""
+    """Commanded frequency [Hz]."""
     motion: Steadiness
     period: int
-    """In drive periods; 0 when it has none."""
+    """Period of the motion in drive periods; 0 if it has none."""
     waited_s: float
     scatter: SixFigures
     noise: SixFigures
@@ -114,7 +114,7 @@ class SegmentNote(AbstractNote):
     segment: Literal[SegmentLabel.STEP, SegmentLabel.SEARCH, SegmentLabel.RESONANCE]
     frequency_hz: float
     drive_hz: float
-    """As seen by the converter [Hz]."""
+    """Drive frequency in the converter's time [Hz]."""
     base_m_per_s2: SixFigures
     base_u: SixFigures
     level: Held
@@ -160,7 +160,7 @@ class ExcursionNote(AbstractNote):
     from_hz: SixFigures
     to_hz: SixFigures
     worst: SixFigures
-    """Largest deviation, as a share, with its sign."""
+    """Largest relative deviation, with sign."""
     level: Held
 
 
@@ -177,7 +177,7 @@ class JumpNote(AbstractNote):
     response_after: SixFigures
     how: JumpSearchEnd
     arrived: JumpSide
-    """The branch on which the pass went on."""
+    """Branch on which the pass continued."""
 
 
 class ResonanceNote(AbstractNote):
@@ -185,7 +185,7 @@ class ResonanceNote(AbstractNote):
 
     kind: Literal["resonance"] = "resonance"
     level: int
-    """Its number, in the order played, from 0."""
+    """Number of the level in the order played, from 0."""
     asked_m_per_s2: float
     frequency_hz: SixFigures | None
     """Frequency of the phase resonance; None where it was not found."""
@@ -201,7 +201,7 @@ class ResonanceNote(AbstractNote):
     tries: int
     lock: LockResult
     periods: int = 0
-    """Drive periods that the search, or the phase-locked loop, took; 0 in recordings that do not say."""
+    """Drive periods of the search or of the phase-locked loop; 0 if the recording does not state them."""
     mode_hz: SixFigures | None = None
     """Natural frequency; absent if the flanks do not determine it."""
     mode_u_hz: SixFigures | None = None
@@ -219,11 +219,11 @@ class NoiseNote(AbstractNote):
 
     kind: Literal["spectrum"] = "spectrum"
     realisation: int
-    """Its number; -1 while it is equalised."""
+    """Number of the realisation; -1 while equalising."""
     base_rms: SixFigures
-    """Level over the band [m/s2]."""
+    """Rms acceleration of the base in the band [m/s2]."""
     asked_rms: SixFigures
-    """Level over the band at full level, with the notches used [m/s2]."""
+    """Requested rms acceleration in the band at full level, with notches [m/s2]."""
     within: SixFigures
     """Share of the lines within the plan's tolerance of the level of this realisation."""
     worst_db: SixFigures
@@ -231,7 +231,7 @@ class NoiseNote(AbstractNote):
     notched: SixFigures
     """Share of lines that are lowered to limit the response."""
     kurtosis: SixFigures
-    """Kurtosis of the base's acceleration; 3 of Gaussian noise."""
+    """Kurtosis of the base's acceleration; 3 for Gaussian noise."""
 
 
 class HeldResponseNote(AbstractNote):
@@ -239,7 +239,7 @@ class HeldResponseNote(AbstractNote):
 
     kind: Literal["held_response"] = "held_response"
     frequency_hz: float
-    """As commanded [Hz]."""
+    """Commanded frequency [Hz]."""
     response_m: SixFigures
     response_ii: SixFigures
     base_m_per_s2: SixFigures
@@ -261,7 +261,7 @@ class BranchPointNote(AbstractNote):
 
     kind: Literal["branch_point"] = "branch_point"
     point: int
-    """From 0."""
+    """Number of the point, from 0."""
     frequency_hz: SixFigures
     base_m: SixFigures
     base_u_m: SixFigures = 0.0
@@ -274,7 +274,7 @@ class BranchPointNote(AbstractNote):
     residue: SixFigures
     """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
     residue_acceleration: SixFigures
-    """The same of its acceleration."""
+    """Harmonics of the base's acceleration from the second on, rms, over its fundamental."""
     reference_v: SixFigures
     """First coefficient of the controller's target [V]."""
     tries: int
@@ -294,7 +294,7 @@ class BranchStabilityNote(AbstractNote):
 
     kind: Literal["branch_stability"] = "branch_stability"
     point: int
-    """Point of the note that has the motion."""
+    """Number of the branch point with this motion."""
     stability: Stability
     multiplier: SixFigures | None
     """Largest multiplier over a period under a prescribed base motion, magnitude; None if unknown."""
@@ -319,7 +319,7 @@ class UntilNote(AbstractNote):
 
     kind: Literal["until"] = "until"
     stretch: int
-    """Number of the step; 1 for a single stretch."""
+    """Number of the step; 1 without steps."""
     wishes: dict[str, SixFigures]
     """Requested relative 95 % bounds, by result."""
     longest_s: SixFigures

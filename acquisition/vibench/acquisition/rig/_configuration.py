@@ -172,7 +172,7 @@ class GeneratorConfig(FrozenModel):
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
     """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver; ours have none."""
+    """Further settings of the driver; the shipped drivers have none."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
@@ -185,8 +185,8 @@ class GeneratorConfig(FrozenModel):
     settle_s: NonNegativeFloat = 0.0
     """Pause that the instrument needs after each command [s]."""
     dead_man_s: float | None = Field(default=None, ge=0.2, le=60.0)
-    """Length of bursts [s]: sines play as bursts that a living run triggers again, so the drive ends with
-    the burst if this computer hangs. docs/safety.md describes the effect on the signal."""
+    """Length of bursts [s]: a sine plays as bursts that the run must trigger, so the drive ends with a
+    burst if this computer hangs. docs/safety.md describes the effect on the signal."""
 
     @model_validator(mode="after")
     def _has_bursts(self) -> Self:
@@ -213,7 +213,7 @@ class AmplifierConfig(FrozenModel):
     model: str
     serial: str = ""
     gain_db: float = Field(ge=-60, le=60)
-    """Voltage gain as the knob is set [dB]."""
+    """Voltage gain at the position of the knob [dB]."""
     clip_v: PositiveFloat
     """Largest output voltage, peak [V]."""
     current_limit_a: Sourced

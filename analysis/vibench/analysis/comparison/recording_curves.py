@@ -117,7 +117,7 @@ class AnalysisOptions(FrozenModel):
     """Overlay the simulation: rig and specimen under the recorded voltage (the twin) or the specimen alone
     under the recorded base motion. Takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
-    """drive has no bias by noise on either channel; h1 none by noise on the response, h2 none on the base."""
+    """Noise on the base biases h1, noise on the response biases h2, and neither biases drive."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
     """For hv alone: noise density of m0's velocity over that of the base's acceleration, in s²."""
     window: Window = Window.HANN

@@ -45,7 +45,7 @@ class BranchRequest(SpecimenChoice):
     """Request for all periodic motions over a range."""
 
     method: BranchMethod = BranchMethod.SHOOTING
-    """Exact; harmonic balance; or with one harmonic, the paper's eq. 5."""
+    """Shooting (exact), harmonic balance, or first order (one harmonic: eq. 5 of the paper)."""
     along: Parameter = Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
@@ -60,7 +60,7 @@ class BranchRequest(SpecimenChoice):
     """Relative error of every motion, 0.01 or "1 %"; by default 1e-4 of the fundamental of p. Shooting
     always reaches 1e-8; a balance uses as many harmonics as needed."""
     time_s: TargetTime | None = None
-    """Time to search and follow, 20 or "20 s"; the branches found by then are the result."""
+    """Time limit of the search, 20 or "20 s"; the result has the branches found by then."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest harmonic of a balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8

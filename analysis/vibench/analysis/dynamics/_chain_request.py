@@ -51,7 +51,7 @@ class ChainRequest(SpecimenChoice):
     recording: str = ""
     """Path of the recording whose base motion drives the chain."""
     duration_s: PositiveFloat = 2.0
-    """Observation time under a steady sine, length of a sweep, or most of a recording to use."""
+    """Window of a steady sine, length of a sweep, or longest part of a recording."""
     settle_s: NonNegativeFloat = 2.0
     """Settling time from rest under a steady sine."""
     exponent_s: NonNegativeFloat = 0.0

@@ -102,7 +102,7 @@ class UpdatedSpecimen(Labelled):
     linear_from: str
     """Recording for damping and frequencies; empty if none."""
     table: TableFit | None
-    not_told: tuple[str, ...]
+    not_determined: tuple[str, ...]
     """Sentences with the reason for each value that remains as described."""
     nominal: SpecimenTable
     """Specimen described by the bench."""
@@ -167,7 +167,7 @@ class UpdatedSpecimen(Labelled):
         linear = columns(
             self,
             "lines=linear.lines reduced_chi_square=linear.reduced_chi_square chi_square_limit=linear.limit "
-            "table_mass_kg=table.mass_kg sd_table_mass_kg=table.sd_kg suspects not_told",
+            "table_mass_kg=table.mass_kg sd_table_mass_kg=table.sd_kg suspects not_told=not_determined",
         )
         document = {
             "fits": self.fits,
@@ -210,7 +210,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
     contradicted = _contradictory_suspects(updated.collisions)
     if contradicted:
         yield f"Collisions contradict the description: {culprits_text(contradicted)}."
-    yield from updated.not_told
+    yield from updated.not_determined
 
 
 def culprits_text(suspects: Sequence[Suspect]) -> str:
@@ -283,7 +283,7 @@ def update_model(
         linear=linear,
         linear_from="" if linear is None else Path(results.noise[0].analysis.facts.name).name,
         table=table,
-        not_told=(),
+        not_determined=(),
         nominal=described,
     )
     if linear is not None and not linear.fits:
@@ -292,7 +292,7 @@ def update_model(
         updated = _with_gaps(updated, results, reasons, observer)
         if not updated.fitted:
             raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(reasons)}")
-    return replace(updated, not_told=tuple(reasons))
+    return replace(updated, not_determined=tuple(reasons))
 
 
 def _linear(

@@ -469,7 +469,7 @@ class SimulationProgress:
             for point in self._found.get(model, {}).values()
             if point.ensemble is not None
             for place, motion in enumerate(point.ensemble.motions)
-            if place != point.ensemble.asked and motion.response_i is not None
+            if place != point.ensemble.requested_motion and motion.response_i is not None
         ]
         columns = np.array(sorted(found), dtype=np.float64).reshape(-1, 2)
         return columns[:, 0], columns[:, 1]

@@ -333,7 +333,7 @@ def findings(results: CampaignResults) -> Iterator[str]:
     -------
     Sentences: first on a fit to all recordings, then on each recording, which they name.
     """
-    yield from results.model_said
+    yield from results.model_sentences
     for each in results.in_order:
         yield from (f"{each.analysis.facts.name}: {text}" for text in DRAWINGS[each.kind].findings(each))
 

@@ -429,7 +429,7 @@ def write_report(
                 if each.what is FailedStep.ANALYSIS
             ),
         ),
-        further=Fold("Recordings together, and the model", results.model_said, figures=tuple(together)),
+        further=Fold("Recordings together, and the model", results.model_sentences, figures=tuple(together)),
         folds=tuple(_benches(results)),
         limits=tuple(limits(results)),
     )

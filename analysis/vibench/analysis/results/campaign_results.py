@@ -136,7 +136,7 @@ class CampaignResults:
     name: str
     results: tuple[AnyResult, ...]
     failures: tuple[AnalysisFailure, ...]
-    model_said: tuple[str, ...] = ()
+    model_sentences: tuple[str, ...] = ()
     """Remarks on the overlaid model, one sentence for each fitted value."""
 
     @property

@@ -280,13 +280,13 @@ class FollowedMotion:
     """x, y, z, vx, vy, vz at every sample, absolute, shape (reached, 6) [m, m/s]."""
     impacts: NDArray[np.int64]
     """Contacts that began between a sample and the next, shape (reached - 1,)."""
-    asked: int
+    requested: int
     """Number of requested samples; more than reached if the motion was lost."""
 
     @property
     def reached_end(self) -> bool:
         """Return whether there is a state for every requested sample."""
-        return len(self.states) == self.asked
+        return len(self.states) == self.requested
 
 
 def follow_samples(

@@ -59,7 +59,7 @@ class FoundMotion:
     period: int | None
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude, of the first repeating start, else the mean over starts;
+    """Largest abs(x) over the drive amplitude, from the first repeating start, else the mean over starts;
     likewise the next three."""
     response_ii: float | None
     relative_i: float | None
@@ -67,7 +67,7 @@ class FoundMotion:
     error_estimate: float | None
     """Relative error of Response I of one more run that reaches this motion."""
     starts: int
-    """Number of starts that reached it."""
+    """Number of starts that reached this motion."""
     share: Share
     """Share of all starts. The intervals of all motions hold together in 19 cases of 20, also for longer
     runs: starts that were chaotic, undecided, or on one of several chaotic motions may reach any other."""
@@ -81,8 +81,8 @@ class Ensemble:
     """Number of starts, including the requested one."""
     motions: tuple[FoundMotion, ...]
     """Motions found, the largest share first."""
-    asked: int
-    """Index of the motion from the requested start."""
+    requested_motion: int
+    """Index of the motion from the requested start; ``asked`` in JSON."""
     unseen_share: float
     """Upper 97.5 % confidence limit of the share of a motion that was not found; also for longer runs, in
     which chaotic or undecided starts may reach it."""
@@ -91,7 +91,7 @@ class Ensemble:
     scatter: float | None
     """Standard deviation of Response I over all starts, over its mean."""
     followed_s: float
-    """Total time that all starts were followed."""
+    """Total simulated time of all starts."""
 
 
 @dataclass(frozen=True)
@@ -231,10 +231,13 @@ class ScenePrediction:
         return _fields_of(self)
 
 
+_JSON_KEYS = {"requested_motion": "asked"}
+
+
 def _fields_of(
     value: ScenePrediction | Ensemble | FoundMotion | Share | EscapeRate | TargetReport,
 ) -> dict[str, object]:
-    return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    return {_JSON_KEYS.get(each.name, each.name): _plain(getattr(value, each.name)) for each in fields(value)}
 
 
 def _plain(value: object) -> object:  # noqa: PLR0911 - a row for each kind of value

@@ -382,7 +382,7 @@ def ensemble_of(
             )
             for group, kind, share in zip(groups, kinds, shares, strict=True)
         ),
-        asked=next(place for place, group in enumerate(groups) if group is requested),
+        requested_motion=next(place for place, group in enumerate(groups) if group is requested),
         unseen_share=wilson_share(pending, len(reached)).high,
         escape=escape,
         scatter=_deviation([each.responses_m[0] for each in reached]),

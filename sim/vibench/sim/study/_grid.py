@@ -131,7 +131,7 @@ NUMBERS = {
     "relative_ii_error": Column("relative_ii_error", REAL, "1", "relative error of relative_ii, estimated"),
     "error_estimate": Column("error_estimate", REAL, "1", "the largest of the four errors"),
     "integration_error": Column(
-        "integration_error", REAL, "1", "part of it that a stricter accuracy would lessen"
+        "integration_error", REAL, "1", "part of the error that a stricter accuracy reduces"
     ),
     "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
@@ -144,7 +144,7 @@ def _of_motion(name: str, dtype: str, long_name: str, meanings: tuple[str, ...] 
     return Column(name, dtype, "1" if not meanings else "", long_name, meanings, MOST_FOUND, FOUND_MOTION)
 
 
-FOUND_KIND = _of_motion("found_kind", WHOLE, "what this motion of an ensemble is", _meanings(MotionKind))
+FOUND_KIND = _of_motion("found_kind", WHOLE, "kind of this motion", _meanings(MotionKind))
 FOUND_NUMBERS = {
     "period": _of_motion("found_period", WHOLE, "drive periods after which this motion repeats"),
     "response_i": _of_motion("found_response_i", REAL, "Response I of this motion"),
@@ -152,21 +152,21 @@ FOUND_NUMBERS = {
     "relative_i": _of_motion("found_relative_i", REAL, "largest y - z of this motion"),
     "relative_ii": _of_motion("found_relative_ii", REAL, "y - z of this motion at the drive frequency"),
     "error_estimate": _of_motion("found_error", REAL, "relative error of its responses, estimated"),
-    "starts": _of_motion("found_starts", WHOLE, "starts that came to this motion"),
+    "starts": _of_motion("found_starts", WHOLE, "number of starts that reach this motion"),
 }
 """Columns by the field of `FoundMotion` that they store."""
 FOUND_SHARE = {
-    "share": _of_motion("found_share", REAL, "share of starts that come to this motion"),
+    "share": _of_motion("found_share", REAL, "share of starts that reach this motion"),
     "low": _of_motion("found_share_low", REAL, "lower end of its interval"),
     "high": _of_motion("found_share_high", REAL, "upper end of its interval"),
 }
 """Columns by the field of `Share` that they store."""
 ENSEMBLE_NUMBERS = {
-    "starts": Column(STARTS, WHOLE, "1", "starts followed where the start is forgotten"),
-    "asked": Column("found_asked", WHOLE, "1", "place of the motion that the start asked for came to"),
-    "unseen_share": Column("unseen_share", REAL, "1", "share that a motion not found has at most"),
+    "starts": Column(STARTS, WHOLE, "1", "number of starts with sensitive dependence on the start"),
+    "requested_motion": Column("found_asked", WHOLE, "1", "index of the motion from the requested start"),
+    "unseen_share": Column("unseen_share", REAL, "1", "largest share of a motion that was not found"),
     "scatter": Column("scatter_of_starts", REAL, "1", "relative deviation of Response I over starts"),
-    "followed_s": Column("followed_in_all", REAL, "s", "time that all starts together were followed"),
+    "followed_s": Column("followed_in_all", REAL, "s", "total simulated time of all starts"),
 }
 """Columns by the field of `Ensemble` that they store."""
 ESCAPE_NUMBERS = {
@@ -174,23 +174,23 @@ ESCAPE_NUMBERS = {
     "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
     "high_per_s": Column("escape_rate_high", REAL, "s-1", "upper end of its interval"),
     "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
-    "chaotic_s": Column("chaotic_time", REAL, "s", "time that all starts together were in chaos"),
+    "chaotic_s": Column("chaotic_time", REAL, "s", "total time of chaos of all starts"),
 }
 """Columns by the field of `EscapeRate` that they store."""
 OTHERS = (
-    Column(MOTION, WHOLE, "", "what the motion has come to", _meanings(MotionKind)),
+    Column(MOTION, WHOLE, "", "kind of the final motion", _meanings(MotionKind)),
     Column(MEMORY, WHOLE, "", "whether the start decides which motion is reached", _meanings(StartMemory)),
-    Column(METHOD, WHOLE, "", "how the scene was answered", _meanings(Method)),
+    Column(METHOD, WHOLE, "", "method of the prediction", _meanings(Method)),
     Column(OUTCOME, WHOLE, "", "how the run ended", _meanings(Outcome)),
-    Column(ENDED, f"S{TEXT_BYTES}", "", "why it was followed no longer"),
+    Column(ENDED, f"S{TEXT_BYTES}", "", "reason for the end of the run"),
     Column(FINAL_STATE, REAL, "m and m/s", "state at the end of the run", components=len(COORDINATES)),
     Column(PHASE, REAL, "rad", "phase of the drive when the run began"),
-    Column(CONTINUES, WHOLE, "1", "number of the point, from 0, whose end is this one's start"),
-    Column(TAKEN, REAL, "s", "processor time; missing where modules and tables were loaded in it"),
-    Column(SESSION, WHOLE, "1", "row of sessions in which it was computed"),
-    Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of everything that the scene says"),
+    Column(CONTINUES, WHOLE, "1", "number (from 0) of the point from which this point continues"),
+    Column(TAKEN, REAL, "s", "processor time; missing if it includes loading of modules and tables"),
+    Column(SESSION, WHOLE, "1", "row of the session that computed the point"),
+    Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of all values of the scene"),
     Column(MESSAGE, f"S{TEXT_BYTES}", "", "why the scene could not be computed"),
-    Column(STATE, STATE_DTYPE, "", "what is known of the point", _meanings(PointState)),
+    Column(STATE, STATE_DTYPE, "", "state of the point", _meanings(PointState)),
 )
 COLUMNS = (
     *NUMBERS.values(),
