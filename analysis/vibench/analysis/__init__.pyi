@@ -66,7 +66,7 @@ from .results.compared_recording import (
     recorded_response as recorded_response,
 )
 from .results.measurement_analysis import analyse as analyse
-from .results.spectral_functions import spectral_functions as spectral_functions
+from .results.spectral_functions import scan_files as scan_files, spectral_functions as spectral_functions
 from .signals.window import Window as Window
 from .uncertainty.expected import (
     Expected as Expected,

@@ -12,6 +12,8 @@ from vibench.analysis import (
     InvalidRequest,
     MagnitudeScale,
     quantities_named,
+    recordings_in,
+    scan_files,
     spectral_functions,
 )
 from vibench.analysis.exchange import Format, Results, excerpt, export_functions, export_samples
@@ -23,7 +25,13 @@ from .progress_bars import transfer_bar
 
 
 def export(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING.h5", help="Complete or still growing.")],
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING.h5",
+            help="Complete or still growing; or the folder of a scan, with --to uff --spectra.",
+        ),
+    ],
     to: Annotated[Format, option("Format of the new file.")],
     out: Annotated[
         Path | None, option("New file, or its folder; by default beside the recording.", "PATH")
@@ -51,6 +59,20 @@ def export(
         raise InvalidRequest("--quantity was given without --spectra, which it needs; give both, or neither")
     if as_json:
         leave_output_to_json()
+    if recording.is_dir():
+        if not spectra or to is not Format.UFF or channels or results or (from_s, to_s) != (None, None):
+            raise InvalidRequest(
+                f"{recording} is a folder, which is exported with --to uff --spectra, and with --out and "
+                "--quantity if needed; give these, or one recording"
+            )
+        place = recording.resolve()
+        request = FrequencyResponseRequest(
+            view=quantities_named(quantity or "displacement", MagnitudeScale.LOG)
+        )
+        with external_data(allow_external):
+            path = file_at(out, place / f"{place.name}.uff")
+            _report(tuple(scan_files(recordings_in(recording), request, path)), as_json=as_json)
+        return
     with external_data(allow_external), open_recording(recording) as opened:
         chosen = excerpt(
             opened, tuple(each.strip() for each in channels.split(",")) if channels else (), from_s, to_s
@@ -67,6 +89,10 @@ def export(
             included = Results.INCLUDED if results else Results.LEFT_OUT
             with transfer_bar(f"export as {to.value}", chosen.values) as observer:
                 written = export_samples(chosen, to, path, included, observer)
+    _report(written, as_json=as_json)
+
+
+def _report(written: tuple[Path, ...], *, as_json: bool) -> None:
     for each in written:
         console.print(f"wrote {each}")
     if as_json:

@@ -11,6 +11,7 @@ from ._export import (
     Results as Results,
     export_functions as export_functions,
     export_samples as export_samples,
+    export_scan as export_scan,
     new_file as new_file,
 )
 from ._import_recording import (

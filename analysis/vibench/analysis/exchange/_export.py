@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vibench.acquisition.recording import Recording, ResultArray, SavedResult
+from vibench.acquisition.recording import Recording, RecordingDescription, ResultArray, SavedResult
 from vibench.sim.operating_system.this import rename
 
 from ..errors import InvalidRequest, NotEnoughData
@@ -22,7 +22,7 @@ from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_path, write_facts
 from ._mat import require_small, write_mat
 from ._nexus import write_nexus
-from ._uff import UniversalFunction, write_uff, write_uff_functions
+from ._uff import UniversalFunction, write_uff, write_uff_functions, write_uff_scan
 from ._wav import require_sound, write_wav
 
 UNFINISHED = ".unfinished"
@@ -238,6 +238,29 @@ def export_functions(
     with new_file(facts) as unfinished:
         write_facts(excerpt, unfinished)
     return path, facts
+
+
+def export_scan(
+    nodes: Mapping[int, tuple[float, float, float]],
+    functions: Sequence[tuple[RecordingDescription, UniversalFunction]],
+    path: Path,
+) -> Path:
+    """Write the nodes of a scan and their frequency responses to a universal file.
+
+    Raises InvalidRequest when the name is taken or writing fails; no file is left.
+
+    Parameters
+    ----------
+    nodes
+        Coordinates x, y and z [m] by the number of the node.
+    functions
+        Functions in the order of writing, each with its recording.
+    path
+        The new file.
+    """
+    with new_file(path) as unfinished:
+        write_uff_scan(nodes, functions, unfinished)
+    return path
 
 
 WriteFunctions = Callable[[Excerpt, Sequence[UniversalFunction], Path], None]

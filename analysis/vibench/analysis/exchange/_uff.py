@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from vibench.acquisition.recording import ChannelHeader, Origin
+from vibench.acquisition.recording import ChannelHeader, Origin, Recording, RecordingDescription
 
 from ..errors import UnusableData
 from ..signals.arrays import Complexes, Reals
@@ -324,6 +324,8 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
 # its frequency.
 
 _COMPLEX_DOUBLE = 6
+_COLOUR = 11
+"""Colour of nodes: any of the definition's 16."""
 _FREQUENCY_AXIS = 18
 _PER_LINE = 4
 _LEAST_STEP = 1e-9
@@ -353,6 +355,10 @@ class FunctionAxis:
     quantity: str = ""
     """Quantity such as ``"velocity"``; determines data type and exponents."""
     unit: str = "NONE"
+    node: int | None = None
+    """Number of the node; None for the number of the channel."""
+    direction: int = SCALAR
+    """1, 2 or 3 along x, y or z, negative against them; 0 if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -375,11 +381,26 @@ def write_uff_functions(excerpt: Excerpt, functions: Sequence[UniversalFunction]
     with path.open("x", encoding="ascii", errors="replace", newline="\n") as file:
         file.write(SI_UNITS)
         for number, each in enumerate(functions, start=1):
-            file.writelines(f"{line}\n" for line in _dataset(excerpt, each, number))
+            file.writelines(f"{line}\n" for line in _dataset(excerpt.recording, each, number))
 
 
-def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iterator[str]:
-    recording = excerpt.recording
+def write_uff_scan(
+    nodes: Mapping[int, tuple[float, float, float]],
+    functions: Sequence[tuple[RecordingDescription, UniversalFunction]],
+    path: Path,
+) -> None:
+    """Write the coordinates of nodes as dataset 15, and one dataset 58 for each function."""
+    with path.open("x", encoding="ascii", errors="replace", newline="\n") as file:
+        file.write(f"{SI_UNITS}{DELIMITER}\n{15:6d}\n")
+        for node, place in nodes.items():
+            coordinates = "".join(f"{each:13.5E}" for each in place)
+            file.write(f"{node:10d}{0:10d}{0:10d}{_COLOUR:10d}{coordinates}\n")
+        file.write(f"{DELIMITER}\n")
+        for number, (recording, each) in enumerate(functions, start=1):
+            file.writelines(f"{line}\n" for line in _dataset(recording, each, number))
+
+
+def _dataset(recording: RecordingDescription, function: UniversalFunction, number: int) -> Iterator[str]:
     lines_hz = function.frequency_hz
     function, first, step = _with_spacing(function)
     hz = function.frequency_hz
@@ -387,14 +408,14 @@ def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iter
     yield DELIMITER
     yield f"{58:6d}"
     yield id_line(f"{response.label} over {reference.label}" if reference.role else response.label)
-    yield id_line(f"{excerpt.name} {recording.recording_id}")
+    yield id_line(f"{recording.path.name.removesuffix('.part').removesuffix('.h5')} {recording.recording_id}")
     yield id_line(date_line(recording.started_utc))
     yield id_line(function.note)
     moved = "" if hz is lines_hz else f" moved from lines every {lines_hz[1] - lines_hz[0]:.10g} Hz"
     yield id_line(f"origin={recording.origin.value}{moved}")
-    roles = recording.roles
-    point, other = (roles.index(each.role) + 1 if each.role in roles else 0 for each in (response, reference))
-    names = f" {'NONE':<10}{point:10d}{SCALAR:4d} {'NONE':<10}{other:10d}{SCALAR:4d}"
+    names = "".join(
+        f" {'NONE':<10}{_node(each, recording):10d}{each.direction:4d}" for each in (response, reference)
+    )
     yield f"{function.kind:5d}{number:10d}{0:5d}{0:10d}{names}"
     ordinate = _COMPLEX_DOUBLE if np.iscomplexobj(function.values) else REAL_DOUBLE
     spacing = (EVENLY_SPACED, first, step) if step else (0, 0.0, 0.0)
@@ -406,6 +427,12 @@ def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iter
     yield axis_record(0, (0, 0, 0), "NONE", "NONE")
     yield from _numbers(function.values, None if step else hz)
     yield DELIMITER
+
+
+def _node(axis: FunctionAxis, recording: RecordingDescription) -> int:
+    roles = recording.roles if isinstance(recording, Recording) else ()
+    number = roles.index(axis.role) + 1 if axis.role in roles else 0
+    return number if axis.node is None else axis.node
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:

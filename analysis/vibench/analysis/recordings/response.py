@@ -221,3 +221,10 @@ def response_roles(recording: Recording) -> tuple[str, ...]:
 def response_role(recording: Recording) -> str | None:
     """Return the channel of the motion of m0; None without one."""
     return next((each for each in RESPONSE_ROLES if each in recording.roles), None)
+
+
+def scanned_role(recording: Recording) -> str | None:
+    """Return the channel of the vibrometer at a point of a scan that is not on m0; else None."""
+    point = recording.plan.get("point")
+    role = f"{point.get('body')}_velocity" if isinstance(point, dict) else VELOCITY
+    return role if role != VELOCITY and role in recording.roles else None

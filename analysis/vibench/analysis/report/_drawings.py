@@ -19,6 +19,7 @@ from ..figures.ensemble_band import agreement_text
 from ..figures.excitation import excitation_figure
 from ..figures.hysteresis import hysteresis_figure
 from ..figures.portraits import portraits_figure, verdict_text
+from ..figures.scan import scan_figure
 from ..figures.stepped_sine import (
     STEPPED_FREQUENCIES,
     STEPPED_LEVELS,
@@ -32,6 +33,7 @@ from ..figures.sweep import regions_text, sweep_figure
 from ..figures.sweep_orders import sweep_orders_figure
 from ..figures.transmission import transmission_figure
 from ..figures.transmission_levels import transmission_levels_figure
+from ..frequency_response.scan import scans_of
 from ..kinds.analysis_kind import (
     AnyResult,
     DwellResult,
@@ -183,8 +185,11 @@ def _noise_figures(noise: NoiseResult) -> Iterator[DrawnFigure]:
 
 
 def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
-    if len(noise) > 1:
-        yield transmission_levels_figure([each.analysis for each in noise])
+    for scan in scans_of([each.analysis for each in noise]):
+        yield scan_figure(scan)
+    levels = [each.analysis for each in noise if each.analysis.facts.measurement.point is None]
+    if len(levels) > 1:
+        yield transmission_levels_figure(levels)
 
 
 def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:

@@ -25,7 +25,7 @@ from ..overlay.overlay import AbstractOverlay, Simulation
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..recordings.facts import RecordingFacts, specimen_of
-from ..recordings.response import response_role, response_roles
+from ..recordings.response import response_role, response_roles, scanned_role
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import plain
@@ -207,7 +207,7 @@ def analyse_files(
     draws
         Number of simulated runs of each test.
     response
-        Channel to analyse; by default the motion of m0. Only m0 is simulated.
+        Channel to analyse; by default as in `analyse`. Only m0 is simulated.
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
@@ -259,7 +259,7 @@ def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
         with suppress(RecordingError), open_recording(path) as recording:
             first = response_role(recording)
             for role in response_roles(recording):
-                if role != first:
+                if role not in (first, scanned_role(recording)):
                     found[role] = (*found.get(role, ()), path)
     return found
 
@@ -313,7 +313,7 @@ def result_of(
 
     Raises AnalysisError when nothing in the recording is usable.
     """
-    name = recording.path.name
+    name, response = recording.path.name, response or scanned_role(recording)
     analysis = analyse(recording, request, observer, response)
     if simulation is Simulation.LEFT_OUT or response is not None:
         return Result(analysis, None), ()

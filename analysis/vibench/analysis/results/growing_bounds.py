@@ -23,6 +23,7 @@ from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, Result
 from ..recordings.channels import RecordedChannels, Stretch
 from ..recordings.facts import RecordingFacts, plan_of, recording_facts
+from ..recordings.response import scanned_role
 from ..uncertainty.budget import COVERAGE, RESULT_PATTERNS, Budget, Cause
 from .campaign_results import budgets_of
 from .measurement_analysis import CONTRADICTIONS
@@ -84,7 +85,9 @@ def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, rec
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)
-    channels = _ChannelsSoFar(recording, stretch=stretch, samples_so_far=samples)
+    channels = _ChannelsSoFar(
+        recording, response=scanned_role(recording), stretch=stretch, samples_so_far=samples
+    )
     return Result(ANALYSES[plan.kind].analyse(facts, channels, plan, DEFAULT_REQUEST), None)
 
 
@@ -120,7 +123,7 @@ def main() -> None:
         try:
             with _open_when_there(Path(query["path"]), query["stretch"], query["recorded_s"]) as recording:
                 if query["path"] not in facts:
-                    facts[query["path"]] = recording_facts(recording)
+                    facts[query["path"]] = recording_facts(recording, response=scanned_role(recording))
                 known = facts[query["path"]]
                 bounds = bounds_of(result_so_far(recording, known, query["stretch"], query["recorded_s"]))
         except (AnalysisError, RecordingError, *CONTRADICTIONS) as error:

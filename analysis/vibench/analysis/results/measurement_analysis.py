@@ -15,6 +15,7 @@ from ..recordings.channel_levels import require_moving_channels
 from ..recordings.channels import RecordedChannels
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import recording_facts
+from ..recordings.response import scanned_role
 from ..uncertainty.expected import until_checks
 
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
@@ -41,12 +42,13 @@ def analyse(
     observer
         Receives the progress.
     response
-        Channel to analyse, such as ``"m2_velocity"``; by default the motion of m0.
+        Channel to analyse, such as ``"m2_velocity"``; by default the motion of m0, or of the mass that the
+        vibrometer was on in a scan.
     """
     if isinstance(recording, Path | str):
         with open_recording(Path(recording)) as opened:
             return analyse(opened, request, observer, response)
-    name = recording.path.name
+    name, response = recording.path.name, response or scanned_role(recording)
     facts = recording_facts(recording, stage(observer, f"{name}: looking at every channel"), response)
     try:
         channels = RecordedChannels(recording, stage(observer, f"{name}: analysing"), response)

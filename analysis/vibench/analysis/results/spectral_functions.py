@@ -1,6 +1,8 @@
 """Frequency response, coherence and spectral densities of a recording, for export as functions."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -9,12 +11,14 @@ from vibench.acquisition.recording import ChannelHeader, SegmentLabel
 from vibench.acquisition.rig import Role
 
 from ..errors import NotEnoughData
-from ..exchange import Excerpt, FunctionAxis, FunctionType, UniversalFunction
-from ..frequency_response.noise_response import NoiseResponse
-from ..frequency_response.request import FrequencyResponseRequest, FrequencyResponseView
+from ..exchange import Excerpt, FunctionAxis, FunctionType, UniversalFunction, export_scan
+from ..frequency_response.noise_response import NoiseAnalysis
+from ..frequency_response.request import FrequencyResponseRequest
+from ..frequency_response.scan import scans_of
 from ..kinds.analyses import ANALYSES
 from ..kinds.noise import NOISE_FAMILY
 from ..recordings.facts import require_checked
+from ..signals.arrays import Complexes, Reals
 from ..signals.quantity import Quantity
 from ..signals.window import hop_samples
 from ..spectra.spectra import DensitySums
@@ -52,13 +56,66 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
     kind = present_word(excerpt.recording.plan.get("excitation", {}).get("kind", ""))
     if kind not in ANALYSES or ANALYSES[kind].family != NOISE_FAMILY:
         return densities
-    return (*_responses(analyse(excerpt.recording, request).response, request.view), *densities)
+    analysis: NoiseAnalysis = analyse(excerpt.recording, request)  # type: ignore[assignment]
+    return (*_responses(analysis), *densities)
 
 
-def _responses(response: NoiseResponse, view: FrequencyResponseView) -> tuple[UniversalFunction, ...]:
+def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: Path) -> Iterator[Path]:
+    """Write the frequency responses of the scans among recordings as universal files; yield their paths.
+
+    A file has the nodes as dataset 15, and a dataset 58 for each. With several scans, the name of each file
+    ends with that of its measurement.
+
+    Raises NotEnoughData when no recording is noise at a point of a scan, AnalysisError when one cannot be
+    analysed, and InvalidRequest when a name is taken.
+
+    Parameters
+    ----------
+    paths
+        Recordings in the order of their start.
+    request
+        Estimator and quantities of the frequency responses.
+    path
+        The new file.
+    """
+    found = [analyse(each, request) for each in paths]
+    scans = list(scans_of([each for each in found if isinstance(each, NoiseAnalysis)]))
+    if not scans:
+        raise NotEnoughData(
+            "no recording here is noise at a point of a scan; measure a campaign with [[scan]], or give one "
+            "recording"
+        )
+    names = [each.name for each in scans]
+    for number, scan in enumerate(scans):
+        again = names[:number].count(scan.name)
+        ending = f"-{scan.name}{f'-{again + 1}' if again else ''}" if len(scans) > 1 else ""
+        nodes = {
+            node: (each.x_m, each.y_m, each.z_m) for node, each in zip(scan.nodes, scan.points, strict=True)
+        }
+        lines_hz = scan.analyses[0].response.frequency_response.frequency_hz
+        functions = [
+            (each.facts, _on_lines(_responses(each, node)[0], lines_hz))
+            for node, each in zip(scan.nodes, scan.analyses, strict=True)
+        ]
+        yield export_scan(nodes, functions, path.with_name(f"{path.stem}{ending}{path.suffix}"))
+
+
+def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
+    """Return a function on the lines of the first point, from which a drift of the clocks moves its own."""
+    values: Complexes = np.interp(lines_hz, function.frequency_hz, function.values)
+    return replace(function, frequency_hz=lines_hz, values=values)
+
+
+def _responses(analysis: NoiseAnalysis, node: int | None = None) -> tuple[UniversalFunction, ...]:
+    response, view, point = analysis.response, analysis.request.view, analysis.facts.measurement.point
     found = view.shown(response.frequency_response)
-    moved = _axis(Role.M0_VELOCITY, "m0", view.response)
+    moved = _axis(Role(analysis.facts.response), analysis.facts.mass, view.response)
     reference = _axis(Role.BASE_ACCELERATION, "base", view.base)
+    if point is not None:
+        axis = 1 + "xyz".index(point.direction[-1])
+        turned = -axis if point.direction.startswith("-") else axis
+        moved = replace(moved, node=node or point.node, direction=turned)
+        reference = replace(reference, node=0, direction=axis)
     averages = f"{found.n_eff:.4g} averages over {response.used_s:.6g} s of the whole recording"
     note = f"estimator {found.settings.estimator.value}, {averages}"
     # No unit, so that a program that converts metres to millimetres leaves the coherence unchanged.
