@@ -37,6 +37,7 @@ from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS
 from vibench.virtual_rig import VirtualRig
 
 STATES = {"m0": "vx", "m1": "vy", "m2": "vz"}
+pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]
 PLACES = {"top": "m2", "low": "m0", "side": "m1", "end": "m2"}
 
 

@@ -8,15 +8,25 @@ from scipy.linalg import eigh
 from typer.testing import CliRunner
 
 from vibench.acquisition import load_campaign, open_bench, run_campaign, shipped
-from vibench.analysis import Simulation, analyse_files, recordings_in
+from vibench.analysis import (
+    FrequencyResponseRequest,
+    NotEnoughData,
+    Simulation,
+    analyse_files,
+    recordings_in,
+    update_model,
+)
+from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response.noise_response import NoiseAnalysis
 from vibench.analysis.frequency_response.scan import scans_of
 from vibench.analysis.report import write_report
+from vibench.analysis.results.compared_recording import compare_recording
 from vibench.cli.__main__ import app
 from vibench.sim import gong2025
 
 pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
 ema = pytest.importorskip("sdypy.EMA", reason="pip install vibench[test] brings sdypy-EMA")
+pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]  # a scan takes seconds, on a busy computer more
 BODIES = (0, 0, 1, 2)
 """Mass of each point of the shipped scan, by node."""
 PLACES = ([-0.02, 0.02, 0.0, 0.0], [0.0] * 4, [0.0, 0.0, 0.02, 0.04])
@@ -116,3 +126,16 @@ def test_one_point_is_exported_with_its_node(folder, tmp_path):
     first = pyuff.UFF(str(path)).read_sets(1)
     assert (first["rsp_node"], first["rsp_dir"]) == (4, 3)
     assert first["id1"].strip() == "m2 displacement over base displacement"
+
+
+def test_comparisons_and_fits_use_the_points_on_m0_alone(folder, results):
+    with pytest.raises(
+        UnusableData, match=r"noise-m2.h5 is a point of a scan on m2, and comparisons show m0"
+    ):
+        compare_recording(folder / "noise-m2.h5", FrequencyResponseRequest(), Simulation.LEFT_OUT)
+    others = replace(
+        results, results=tuple(each for each in results.results if each.analysis.facts.mass != "m0")
+    )
+    assert len(others.results) == 2
+    with pytest.raises(NotEnoughData, match="has no result to which a specimen could be fitted"):
+        update_model(others)

@@ -271,7 +271,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
     for path in paths:
         try:
             with open_recording(path) as recording:
-                if described_shaker(recording) is not None:
+                if described_shaker(recording) is not None or scanned_role(recording) is not None:
                     continue
                 needed = True
                 plan = recording.plan.get("excitation") or {}

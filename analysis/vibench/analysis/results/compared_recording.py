@@ -13,7 +13,7 @@ from vibench.acquisition import open_recording
 from ..comparison.curve import Curve, CurveKind, CurveOrigin, sorted_curve
 from ..comparison.recording_curves import predicted_curves
 from ..dynamics import RecordedLevel, recorded_level
-from ..errors import NotEnoughData
+from ..errors import NotEnoughData, UnusableData
 from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult
@@ -58,6 +58,11 @@ def compare_recording(
         result, failures = result_of(recording, simulation, request)
     facts = result.analysis.facts
     name = facts.name
+    if facts.mass != "m0":
+        raise UnusableData(
+            f"{path.name} is a point of a scan on {facts.mass}, and comparisons show m0; choose a recording "
+            "of m0"
+        )
     return ComparedRecording(
         path=path,
         name=name,
