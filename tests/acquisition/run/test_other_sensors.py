@@ -266,11 +266,44 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     assert kinds[0] == kinds[1]
 
 
-def test_a_channel_without_a_mass_gives_no_response(tmp_path):
+def test_a_force_under_a_sine_is_refused(tmp_path):
     path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
-    with pytest.raises(UnusableData, match="base_force is not a channel that shows the motion of a mass"):
+    with pytest.raises(UnusableData, match="base_force has results of noise only"):
         analyse(path, response="base_force")
+    with pytest.raises(UnusableData, match=r"drive_voltage is not a channel that shows .* a mass or a force"):
+        analyse(path, response="drive_voltage")
+
+
+@pytest.mark.thorough
+def test_a_force_cell_gives_the_apparent_mass_in_kilograms(tmp_path):
+    noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
+    path = measured(
+        rig_with("base_force"), tmp_path, kind="white_noise", amplitude_vpp=0.05, settle_s=2.0, **noise
+    )
+    command = [sys.executable, "-m", "vibench.cli", "analyse", path, "--no-simulate", "--json"]
+    ended = subprocess.run(
+        [*command, "--out", tmp_path / "out"], capture_output=True, text=True, check=True, timeout=110
+    )
+    (said,) = json.loads(ended.stdout)["responses"]["base_force"]["results"]
+    shown, specimen = said["measured"]["transmission"], specimen_of(BASE)
+    assert (shown["quantity"], shown["unit"]) == ("force/acceleration", "kg")
+    frequency_hz, found = np.array(shown["frequency_hz"]), np.array(shown["magnitude"])
+    s = 2j * np.pi * frequency_hz
+    pull = specimen.stiffnesses[0] + s * specimen.dampings[0]
+    moved = base_transmissibility(specimen, frequency_hz)[:, 0] - 1
+    model = np.abs(BASE.shaker.fixture_mass_kg - pull * moved / s**2)
+    assert np.median(np.abs(found / model - 1)) < 5e-3
+    held = (np.array(shown["magnitude_lower"]) <= model) & (model <= np.array(shown["magnitude_upper"]))
+    assert np.mean(held) > 0.85
+    assert [each["frequency_hz"] for each in said["measured"]["resonances"]] == pytest.approx(
+        [94.4, 266.0, 500.5], rel=5e-3
+    )
+    units = {each["quantity"].split(" at ")[0]: each["unit"] for each in said["uncertainty"]}
+    assert units["apparent mass"] == "kg"
+    report = (tmp_path / "out" / "report_base_force.html").read_text(encoding="utf-8")
+    assert "Apparent mass, 0.05 Vpp noise" in report
+    assert "x / U" not in re.sub(r"<(script|style).*?</\1>|data:[^\"]+", "", report, flags=re.DOTALL)
 
 
 @pytest.mark.thorough

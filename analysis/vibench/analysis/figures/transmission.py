@@ -57,7 +57,7 @@ def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = 
         figure.align_ylabels()
     return style.DrawnFigure(
         name=f"transmission_{analysis.facts.name}",
-        title=f"Transmission, {analysis.facts.measurement.excitation.amplitude_vpp:g} Vpp noise",
+        title=f"{analysis.view.title}, {analysis.facts.measurement.excitation.amplitude_vpp:g} Vpp noise",
         caption=transmission_caption(analysis, overlay),
         figure=figure,
         tables=_tables(analysis, overlay),
@@ -67,7 +67,7 @@ def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = 
 def _magnitudes(
     axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances
 ) -> None:
-    view = analysis.request.view
+    view = analysis.view
     measured = view.shown(analysis.response.frequency_response)
     size = measured.magnitude
     low = np.maximum(measured.magnitude_lower, size / _LARGEST_BOUND_RATIO)
@@ -109,7 +109,7 @@ def _magnitudes(
 
 def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances) -> None:
     """Draw the phase in degrees, -180 to 180, with bounds where they are narrower than a turn."""
-    view = analysis.request.view
+    view = analysis.view
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
@@ -154,7 +154,7 @@ def _differences(axes: Axes, overlay: NoiseOverlay, at: ModelResonances) -> None
 def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> str:
     """Return the caption with level, resonances, coherence and agreement of the simulation."""
     response = analysis.response
-    view = analysis.request.view
+    view = analysis.view
     symbol, unit = view.symbol.replace(" ", ""), f" {view.unit}" if view.unit else ""
     found = ", ".join(
         f"{plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz)} Hz ({symbol} = "
@@ -212,7 +212,7 @@ def estimate_sentence(response: NoiseResponse) -> str:
 
 
 def _tables(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> tuple[Table, ...]:
-    view = analysis.request.view
+    view = analysis.view
     measured = view.shown(analysis.response.frequency_response)
     name = f"transmission_{analysis.facts.name}"
     found = columns(

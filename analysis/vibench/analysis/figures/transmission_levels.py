@@ -15,7 +15,7 @@ _HEIGHT_IN = 4.0
 def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.DrawnFigure:
     """Draw the transmissions of several noise levels, weak to strong; at least one is needed."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
-    view = rising[0].request.view
+    view = rising[0].view
     at = model_resonances(specimen_of(rising[0].facts.bench))
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
@@ -52,7 +52,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
         columns[f"magnitude_{each.facts.name}"] = view.shown(each.response.frequency_response).magnitude
     return style.DrawnFigure(
         name="transmission_levels",
-        title="Transmission at all noise levels",
+        title=f"{view.title} at all noise levels",
         caption=transmission_levels_caption(rising),
         figure=figure,
         tables=(table("transmission_levels", **columns),),
@@ -67,7 +67,7 @@ def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
         where = f"resonances at {', '.join(peaks)} Hz" if peaks else "no clear resonance"
         levels.append(f"{each.excitation.amplitude_vpp:g} Vpp: {where}")
     return (
-        f"Measured transmission from base to {rising[0].facts.mass} at {len(rising)} noise levels. "
+        f"Measured {rising[0].view.symbol} of {rising[0].facts.response} at {len(rising)} noise levels. "
         f"{'; '.join(levels)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
         "m2, where strong collisions move the motion to."
     )

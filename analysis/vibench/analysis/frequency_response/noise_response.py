@@ -12,6 +12,7 @@ from vibench.acquisition.recording import SegmentLabel
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.channels import Channels, Stretch, only_stretch
 from ..recordings.checks import AbstractAnalysis
+from ..recordings.response import FORCE
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import relative_sd, student_half_width
 from ..signals.quantity import Quantity
@@ -23,7 +24,7 @@ from .distortion import Distortion, distortion, scatters_beyond_noise
 from .hits import Hits, HitSpectra, find_hits, hit_spectra, weighted_alike, without_bounds
 from .modal_fit import Resonance
 from .periodic import PeriodicFrequencyResponse, PeriodicSums, Repetition
-from .request import FrequencyResponseRequest
+from .request import FrequencyResponseRequest, FrequencyResponseView
 from .resonance import resonances, scattered_resonances
 from .results import (
     Estimator,
@@ -51,7 +52,7 @@ _ALIKE_LINES = 4
 class NoiseResponse(Labelled):
     """Transmission from base displacement to m0's displacement, with resonances and data quality."""
 
-    OWN_UNITS: ClassVar = {"frequency_response": "1", "h1": "1", "h2": "1", "periodic": "s"}
+    OWN_UNITS: ClassVar = {**dict.fromkeys(("frequency_response", "h1", "h2"), "{0.unit}"), "periodic": "s"}
     DOCUMENT: ClassVar = (
         "independent_averages=frequency_response.n_eff used_s left_out lost_samples overloaded_samples "
         "median_coherence base_rms_acceleration_m_per_s2=base_level.rms_acceleration "
@@ -76,6 +77,8 @@ class NoiseResponse(Labelled):
     """Lost samples during the noise."""
     overloaded_samples: int
     """Samples during the noise with a channel near full scale."""
+    unit: str = "1"
+    """Unit of the transmission; kg for a force."""
 
     @property
     def hits(self) -> int | None:
@@ -148,9 +151,9 @@ def repeated_response(
             else given.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
         ).frequency_response
         if estimator is Estimator.DRIVE:
-            return as_displacements(found).without_gain(sensors)
+            return as_displacements(found, channels).without_gain(sensors)
         return _least_squares(
-            found, given.motion()[..., order], estimator, channels.response_delay_s, request.noise_ratio
+            found, given.motion()[..., order], estimator, channels, request.noise_ratio
         ).without_gain(sensors)
 
     chosen = by(request.estimator)
@@ -173,6 +176,7 @@ def repeated_response(
             left_out=len(stretches) - taken,
             lost_samples=bad.lost,
             overloaded_samples=bad.overloaded,
+            unit="kg" if channels.is_force else "1",
         )
 
     return chosen, response
@@ -215,7 +219,7 @@ def _least_squares(
     like: FrequencyResponse,
     motion: Complexes,
     estimator: Estimator,
-    delay_s: float,
+    channels: Channels,
     noise_ratio: float | None,
 ) -> FrequencyResponse:
     """Estimate h1, h2 or hv from realisations; ``motion`` has the shape (realisations, 2, lines)."""
@@ -234,7 +238,7 @@ def _least_squares(
         half_width=student_half_width(spread, like.n_eff, like.settings.confidence),
         settings=replace(like.settings, estimator=estimator, noise_ratio=noise_ratio, delay_s=0.0),
     )
-    return as_displacements(result.without_delay(delay_s))
+    return as_displacements(result.without_delay(channels.response_delay_s), channels)
 
 
 def streamed_response(
@@ -281,7 +285,7 @@ def streamed_response(
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
         found = sums.by(estimator, noise_ratio).without_delay(channels.response_delay_s)
         inside = found.between(*band)
-        return as_displacements(inside).without_gain(channels.response_gain(inside.frequency_hz))
+        return as_displacements(inside, channels).without_gain(channels.response_gain(inside.frequency_hz))
 
     chosen = by(request.estimator)
     found = _resonances(chosen)
@@ -297,6 +301,7 @@ def streamed_response(
         left_out=chosen.segments_excluded,
         lost_samples=bad.lost,
         overloaded_samples=bad.overloaded,
+        unit="kg" if channels.is_force else "1",
     )
 
 
@@ -321,8 +326,9 @@ def _response_to_hits(
         found = given.response(estimator, noise_ratio).without_delay(channels.response_delay_s)
         inside = found.between(*band_hz)
         # The response is known at i w + decay, where velocity over acceleration differs by this factor, too.
-        shift = 1 + decay_per_s / (2j * np.pi * inside.frequency_hz)
-        return as_displacements(inside).without_gain(channels.response_gain(inside.frequency_hz) / shift)
+        shift = 1 + (not channels.is_force) * decay_per_s / (2j * np.pi * inside.frequency_hz)
+        gain = channels.response_gain(inside.frequency_hz) / shift
+        return as_displacements(inside, channels).without_gain(gain)
 
     chosen = by(request.estimator)
     found = _resonances(chosen)
@@ -345,6 +351,7 @@ def _response_to_hits(
         left_out=hits.left_out + len(hits.starts) - spectra.count,
         lost_samples=bad.lost,
         overloaded_samples=bad.overloaded,
+        unit="kg" if channels.is_force else "1",
     )
 
 
@@ -373,8 +380,10 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
     return f"noise biases {name}; use drive: {name} lies {' and '.join(deviations)}" if deviations else ""
 
 
-def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse:
-    """Convert m0 velocity over base acceleration to displacement over displacement."""
+def as_displacements(frequency_response: FrequencyResponse, channels: Channels) -> FrequencyResponse:
+    """Convert velocity over base acceleration to displacement over displacement; keep force over it [kg]."""
+    if channels.is_force:
+        return frequency_response
     return converted_frequency_response(
         frequency_response,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
@@ -400,9 +409,14 @@ class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
     """Request that produced this analysis."""
 
     @property
+    def view(self) -> FrequencyResponseView:
+        """Requested quantities and scale; for a force always the apparent mass."""
+        return replace(self.request.view, is_force=self.facts.response.endswith(f"_{FORCE}"))
+
+    @property
     def transmission(self) -> dict[str, Any]:
         """The transmission in the requested quantities, as JSON."""
-        view = self.request.view
+        view = self.view
         return columns(view, "quantity=name unit") | columns(
             view.shown(self.response.frequency_response),
             "estimator=settings.estimator noise_ratio=settings.noise_ratio window=settings.window "

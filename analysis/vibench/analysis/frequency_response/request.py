@@ -36,33 +36,41 @@ class FrequencyResponseView:
     response: Quantity = Quantity.DISPLACEMENT
     base: Quantity = Quantity.DISPLACEMENT
     scale: MagnitudeScale = MagnitudeScale.LOG
+    is_force: bool = False
+    """Whether to show the apparent mass, force over the base's acceleration, whatever the quantities."""
 
     @property
     def power(self) -> int:
-        """Power of i omega relative to displacement over displacement."""
-        return self.response.derivatives - self.base.derivatives
+        """Power of i omega relative to displacement over displacement; 0 for a force."""
+        return 0 if self.is_force else self.response.derivatives - self.base.derivatives
 
     @property
     def unit(self) -> str:
         """Unit of the magnitude; empty for a plain ratio."""
-        return _UNITS[self.power]
+        return "kg" if self.is_force else _UNITS[self.power]
 
     @property
     def name(self) -> str:
         """Name that `quantities_named` reads, such as ``"velocity/acceleration"``."""
-        return f"{self.response.value}/{self.base.value}"
+        return "force/acceleration" if self.is_force else f"{self.response.value}/{self.base.value}"
 
     @property
     def symbol(self) -> str:
         """Symbol for captions and axes, such as ``"|x / U|"``."""
-        return f"|{_SYMBOLS[self.response]} / {_BASE_SYMBOLS[self.base]}|"
+        return "|F / U''|" if self.is_force else f"|{_SYMBOLS[self.response]} / {_BASE_SYMBOLS[self.base]}|"
+
+    @property
+    def title(self) -> str:
+        """Name of the ratio for titles and tables."""
+        return "Apparent mass" if self.is_force else "Transmission"
 
     def label(self, mass: str = "m0") -> str:
         """Return the label of the magnitude axis."""
         unit = self.unit
         match self.scale:
             case MagnitudeScale.LOG:
-                return f"{self.symbol}{f' [{unit}]' if unit else ''}  ({mass} over base)"
+                above = "force" if self.is_force else mass
+                return f"{self.symbol}{f' [{unit}]' if unit else ''}  ({above} over base)"
             case MagnitudeScale.DECIBEL:
                 return f"{self.symbol} [dB re 1{f' {unit}' if unit else ''}]"
 
@@ -74,6 +82,8 @@ class FrequencyResponseView:
 
     def shown(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
         """Convert displacement over displacement to the view's quantities, including bounds."""
+        if self.is_force:
+            return frequency_response
         return converted_frequency_response(
             frequency_response,
             drive=(Quantity.DISPLACEMENT, self.base),

@@ -106,6 +106,8 @@ class SimulatedChannels:
     sensors: Callable[[Reals], Complexes]
     """Ratio of the response sensor's gain to the base sensor's, without their delays."""
 
+    is_force = False
+
     @property
     def sample_rate_hz(self) -> float:
         """Sample rate of all channels."""

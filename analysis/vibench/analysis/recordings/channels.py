@@ -16,7 +16,7 @@ from vibench.acquisition.rig import sensor_table
 
 from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Reals
-from .response import RESPONSE_ROLES, VELOCITY, ResponseChannel
+from .response import FORCE, RESPONSE_ROLES, VELOCITY, ResponseChannel
 
 SENSOR_DAMPING_RATIO = 0.02
 """Damping ratio of a piezoelectric sensor's mounted resonance; a usual value."""
@@ -112,6 +112,10 @@ class Channels(Protocol):
     def response_delay_s(self) -> float:
         """Lag of the response channel behind the base channel."""
 
+    @property
+    def is_force(self) -> bool:
+        """Whether the response is a force [N]."""
+
     def response_gain(self, frequency_hz: Reals) -> Complexes:
         """Ratio of the response sensor's gain to the base sensor's, without their delays; shape (lines,)."""
 
@@ -162,6 +166,11 @@ class RecordedChannels:
     def response_delay_s(self) -> float:
         """Lag of the response channel behind the base channel."""
         return self.recording.channel(self._response.role).delay_s - self.recording.channel(BASE).delay_s
+
+    @property
+    def is_force(self) -> bool:
+        """Whether the response is a force [N]."""
+        return self._response.quantity == FORCE
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
         """Ratio of the response sensor's gain to the base sensor's, with couplings and without delays."""

@@ -18,7 +18,7 @@ from ..signals.arrays import Reals, Samples
 VELOCITY = ROLES[0].value
 RESPONSE_ROLES = tuple(role.value for role in ROLES)
 """Channels of the motion of m0 in the order of preference."""
-ACCELERATION, DISPLACEMENT = "acceleration", "displacement"
+ACCELERATION, DISPLACEMENT, FORCE = "acceleration", "displacement", "force"
 _MOTIONS = ("velocity", ACCELERATION, DISPLACEMENT)
 _COLLIDING = ("m1", "m2")
 LOWEST_INTEGRATED_HZ = 5.0
@@ -81,7 +81,7 @@ _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = Ma
 
 @dataclass(eq=False)
 class ResponseChannel:
-    """Velocity of a mass; by default that of m0 from the first of `RESPONSE_ROLES` that a recording has.
+    """Velocity of a mass, or a force; by default m0's, from the first of `RESPONSE_ROLES` in a recording.
 
     An acceleration is integrated, which increases its noise at low frequencies; a displacement is
     differentiated, which increases it at high ones. Both have zero phase.
@@ -100,10 +100,11 @@ class ResponseChannel:
 
     def __post_init__(self) -> None:
         found = self.response or response_role(self.recording)
-        if self.response is not None and self.response not in response_roles(self.recording):
+        shown = (*response_roles(self.recording), *force_roles(self.recording))
+        if self.response is not None and self.response not in shown:
             raise UnusableData(
-                f"{self.response} is not a channel that shows the motion of a mass; the recording has "
-                f"{', '.join(response_roles(self.recording)) or 'none'}"
+                f"{self.response} is not a channel that shows the motion of a mass or a force; the recording "
+                f"has {', '.join(shown) or 'none'}"
             )
         if found is None:
             raise UnusableData(
@@ -130,7 +131,7 @@ class ResponseChannel:
         return float(np.linalg.norm(self._kernel)) if self._kernel.size else 1.0
 
     def read(self, start: int, stop: int) -> Reals:
-        """Return velocities [m/s], shape (samples,); lost samples are NaN, drop-outs are bridged."""
+        """Return velocities [m/s] or forces [N]; lost samples are NaN, drop-outs are bridged."""
         if self._may_drop_out:
             return BridgedChannel(self.recording, self.role).read(start, stop)
         if self.quantity not in _CONVERSIONS:
@@ -152,7 +153,8 @@ class ResponseChannel:
     @property
     def _may_drop_out(self) -> bool:
         """Whether jumps of the signal are drop-outs; jumps of m1 and m2 are collisions."""
-        return self.quantity not in _CONVERSIONS and self.role.partition("_")[0] not in _COLLIDING
+        is_vibrometer = self.quantity not in (*_CONVERSIONS, FORCE)
+        return is_vibrometer and self.role.partition("_")[0] not in _COLLIDING
 
     def _velocities(self, number: int, size: int) -> Reals:
         if self._block is None or self._block[0] != number:
@@ -216,6 +218,15 @@ def response_roles(recording: Recording) -> tuple[str, ...]:
         and recording.channel(role).quantity == _quantity(role)
     )
     return (*(() if first is None else (first,)), *others)
+
+
+def force_roles(recording: Recording) -> tuple[str, ...]:
+    """Return every channel ``<place>_force`` of a force."""
+    return tuple(
+        role
+        for role in recording.roles
+        if role.endswith(f"_{FORCE}") and recording.channel(role).quantity == FORCE
+    )
 
 
 def response_role(recording: Recording) -> str | None:

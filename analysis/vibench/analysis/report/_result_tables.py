@@ -33,7 +33,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
             "noise",
             "measured [Hz]",
             "damping ratio [%]",
-            "peak |x/U|",
+            "peak |F/U''| [kg]" if noise and noise[0].analysis.view.is_force else "peak |x/U|",
             "simulated [Hz]",
             "model [Hz]",
             "paper [Hz]",

@@ -25,7 +25,7 @@ from ..overlay.overlay import AbstractOverlay, Simulation
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..recordings.facts import RecordingFacts, specimen_of
-from ..recordings.response import response_role, response_roles, scanned_role
+from ..recordings.response import force_roles, response_role, response_roles, scanned_role
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import plain
@@ -252,13 +252,17 @@ def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
 def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
     """Return the channels that measure other motions than m0's, with the recordings that have each.
 
-    Unreadable recordings are left out: their analysis reports the reason.
+    A force counts in noise only, where it gives the apparent mass. Unreadable recordings are left out: their
+    analysis reports the reason.
     """
     found: dict[str, tuple[Path, ...]] = {}
     for path in paths:
-        with suppress(RecordingError), open_recording(path) as recording:
+        # A plan of wrong types also counts as unreadable.
+        with suppress(RecordingError, AttributeError, TypeError), open_recording(path) as recording:
             first = response_role(recording)
-            for role in response_roles(recording):
+            kind = present_word((recording.plan.get("excitation") or {}).get("kind", ""))
+            is_noise = kind in ANALYSES and ANALYSES[kind].family == NOISE_FAMILY
+            for role in (*response_roles(recording), *(force_roles(recording) if is_noise else ())):
                 if role not in (first, scanned_role(recording)):
                     found[role] = (*found.get(role, ()), path)
     return found

@@ -11,6 +11,7 @@ from ..errors import AnalysisError, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST
 from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
+from ..kinds.noise import NOISE_FAMILY
 from ..recordings.channel_levels import require_moving_channels
 from ..recordings.channels import RecordedChannels
 from ..recordings.checks import AbstractAnalysis
@@ -54,6 +55,11 @@ def analyse(
         channels = RecordedChannels(recording, stage(observer, f"{name}: analysing"), response)
         require_moving_channels(facts.channels, facts.response)
         plan = facts.measurement.excitation
+        if channels.is_force and ANALYSES[plan.kind].family != NOISE_FAMILY:
+            raise UnusableData(
+                f"{facts.response} has results of noise only, the apparent mass; analyse a motion, "
+                "or measure noise"
+            )
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
         found = replace(found, checks=(*found.checks, *until_checks(facts)))
     except AnalysisError as error:

@@ -39,10 +39,11 @@ def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tu
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     found = analysis.response
     chance = _chance_share(found)
-    return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance))
+    peak = ("apparent mass", "kg") if analysis.view.is_force else ("transmissibility", "")
+    return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance, peak))
 
 
-def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[Budget]:
+def _of_resonance(found: Resonance, stated: Stated, chance: float, peak: tuple[str, str]) -> Iterator[Budget]:
     where = f"{found.frequency_hz:.0f} Hz"
 
     def scatter(sd: float, value: float) -> tuple[Contribution, ...]:
@@ -66,9 +67,9 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[B
         scatter(found.sd_damping_ratio, found.damping_ratio),
     )
     yield Budget(
-        f"transmissibility at {where}",
+        f"{peak[0]} at {where}",
         found.peak_magnitude,
-        "",
+        peak[1],
         (
             *stated.response,
             *stated.base,
