@@ -65,6 +65,39 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
     return values.reshape(*samples.shape[:-1], positions.size)
 
 
+_CLOSE = 0.125
+"""Distance of the interpolated values around a maximum, in samples; their parabola errs by 1e-6 at most."""
+
+
+def sizes_with_maxima(samples: Reals) -> Reals:
+    """Return |value| of every sample, or that of the maximum beside the sample, shape (n,).
+
+    At 16 samples per period, the largest sample may be 2 % below the maximum.
+
+    Parameters
+    ----------
+    samples
+        Band-limited signal, shape (n,); maxima within `REACH` of its ends are not interpolated.
+    """
+    size = np.abs(samples)
+    middle = size[REACH:-REACH]
+    top = REACH + np.flatnonzero(
+        (middle >= size[REACH - 1 : -REACH - 1]) & (middle >= size[REACH + 1 : size.size - REACH + 1])
+    )
+    at, _ = _vertices(size[top - 1], size[top], size[top + 1])
+    near = np.concatenate([top + at + each for each in (-_CLOSE, 0.0, _CLOSE)])
+    _, largest = _vertices(*np.abs(interpolate(samples, near)).reshape(3, -1))
+    size[top] = np.maximum(size[top], largest)
+    return size
+
+
+def _vertices(before: Reals, middle: Reals, after: Reals) -> tuple[Reals, Reals]:
+    """Return place (0 is the middle) and value of maxima of parabolas through three points."""
+    slope, bend = (after - before) / 2, before + after - 2 * middle
+    at = np.clip(-slope / np.minimum(bend, -np.finfo(np.float64).tiny), -1.0, 1.0)
+    return at, middle + at * slope / 2
+
+
 _TOGETHER = 8
 _STOP_DB = 100.0
 """Attenuation of aliases [dB], below the noise of a 24-bit converter."""

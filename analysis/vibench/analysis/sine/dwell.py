@@ -15,7 +15,8 @@ from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import Channels, far_from
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import standard_uncertainty
-from ..signals.quantity import ConvertedSignal, Quantity, converted_signal
+from ..signals.interpolation import sizes_with_maxima
+from ..signals.quantity import ConvertedSignal, Quantity, converted_signal, disturbed_samples
 from ..spectra.spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Labelled
 from ..tones.order_tracking import (
@@ -326,6 +327,10 @@ def dwell_response(
     bridged
         Whether each sample of the response bridges a drop-out; empty if there is none.
     """
+    window = _window(
+        response.size, disturbed_samples(sample_rate_hz, _LOWEST_ORDER * near_hz), sample_rate_hz, window_s
+    )
+    level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
     displacement = converted_signal(
         response,
         sample_rate_hz,
@@ -333,10 +338,9 @@ def dwell_response(
         wanted=Quantity.DISPLACEMENT,
         low_hz=_LOWEST_ORDER * near_hz,
         high_hz=_BAND_ABOVE * sample_rate_hz,
+        lines_hz=[order * level.frequency_hz for order in orders],
     )
-    window = _window(displacement, window_s)
     is_clear = _clear(bridged, displacement, near_hz, window)
-    level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
     phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
     motion = displacement.samples[window]
     whole, base_whole, repeating = tracked_together(
@@ -358,6 +362,7 @@ def dwell_response(
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
     most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)
     rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
+    repeated = sizes_with_maxima(repeated)
     rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
     lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
@@ -365,7 +370,8 @@ def dwell_response(
     return DwellResponse(
         drive=level,
         window_s=window_s,
-        response_i=float(np.max(np.abs(motion[is_clear]))) / level.amplitude_m,
+        response_i=float(np.max(sizes_with_maxima(displacement.samples)[window][is_clear]))
+        / level.amplitude_m,
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,
         noise_source=noise.source,
@@ -389,13 +395,13 @@ def dwell_response(
     )
 
 
-def _window(displacement: ConvertedSignal, window_s: float) -> slice:
-    length = round(window_s * displacement.sample_rate_hz)
-    stop = displacement.samples.size - displacement.edge_samples
+def _window(samples: int, edge: int, sample_rate_hz: float, window_s: float) -> slice:
+    length = round(window_s * sample_rate_hz)
+    stop = samples - edge
     if length < 1:
         raise InvalidRequest(f"window_s is {window_s:g}; it is more than 0")
-    if stop - length < displacement.edge_samples:
-        have_s = displacement.settled.size / displacement.sample_rate_hz
+    if stop - length < edge:
+        have_s = max(0, stop - edge) / sample_rate_hz
         raise NotEnoughData(
             f"a window of {window_s:g} s was requested, but without the ends that integration disturbs "
             f"{have_s:.3g} s are left; ask for less or record longer"

@@ -85,7 +85,11 @@ def stroboscope(
     if drive.shape != response.shape:
         raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")
     sine = fit_sine(drive, sample_rate_hz, near_hz)
-    band = {"low_hz": _LOWEST_ORDER * near_hz, "high_hz": BAND_ABOVE * sample_rate_hz}
+    band = {
+        "low_hz": _LOWEST_ORDER * near_hz,
+        "high_hz": BAND_ABOVE * sample_rate_hz,
+        "lines_hz": [sine.frequency_hz],
+    }
     displacement = converted_signal(
         response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.DISPLACEMENT, **band
     )
