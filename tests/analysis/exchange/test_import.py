@@ -561,7 +561,30 @@ def test_a_unit_in_hdf5_may_be_in_either_encoding(tmp_path, text, is_fixed):
         assert source.channels[0].unit == "m/s\u00b2"
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("heading", ["m0 / Gal", "m0 / ips", "m0 / ft/s^2"])
+def test_an_unknown_unit_in_a_heading_is_not_taken_as_si(tmp_path, heading):
+    text = "".join(f"{number / 8000:.6f};{number % 7}\n" for number in range(40_000))
+    (tmp_path / "a.csv").write_text(f"time / s;{heading}\n{text}")
+    with pytest.raises(
+        InvalidRequest, match=r"m0_velocity is in '.*' in the file, and the recording needs 'm s-1'"
+    ):
+        imported(tmp_path / "a.csv", mapping(tmp_path, ("2", "m0_velocity", "")))
+
+
+@pytest.mark.parametrize("encoding", ["cp037", "utf-16-le"])
+def test_zero_bytes_in_a_table_are_explained(tmp_path, encoding):
+    text = "Zeit [s];v [m/s]\n" + "".join(f"{0.001 * number:.3f};1\n" for number in range(20))
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0\0\0")
+    with (
+        pytest.raises(UnusableData, match=r"zero bytes|no line of numbers"),
+        opened_source(tmp_path / "a.csv"),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    "encoding", ["latin-1", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"]
+)
 def test_a_heading_may_be_in_any_usual_encoding(tmp_path, encoding):
     text = "F\u00fchrung am Fu\u00df\nZeit [s];Fu\u00dfpunkt (\u00b5m)\n0,0;1,5\n0,5;-2\n1,0;3\n"
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))

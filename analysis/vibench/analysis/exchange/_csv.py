@@ -168,13 +168,31 @@ def _encoding(path: Path) -> str:
     """Guess the encoding of text from its start, since files do not state it."""
     with path.open("rb") as file:
         head = b"".join(islice(file, LONGEST_HEAD))
+    if head.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
+        return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
+    # Text has no zero bytes, except in UTF-16 in half of the places.
+    zeros = [_share_of_zeros(head[place::2]) for place in (0, 1)]
+    if max(zeros) > _MANY_ZEROS and min(zeros) == 0.0:
+        return "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"
+    if max(zeros) > 0.0:
+        raise ValueError(
+            "it has zero bytes, so it is no text in UTF-8, UTF-16 or Latin-1; export it as UTF-8"
+        )
     try:
         head.decode("utf-8")
     except UnicodeDecodeError:
         return "latin-1"
     return "utf-8-sig"
+
+
+_MANY_ZEROS = 0.9
+"""Share of zeros among every other byte of tables in UTF-16, whose characters are nearly all ASCII."""
+
+
+def _share_of_zeros(raw: bytes) -> float:
+    return raw.count(0) / max(len(raw), 1)
 
 
 def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:

@@ -42,11 +42,14 @@ def unit_in_name(name: str) -> str:
         unit = unit.replace("_", "/") if sign == "_" else unit
         is_letter = sign in {"", "_"} and (len(unit) == 1 or unit == "in")
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
-        if sign == "[" or (is_known and (not is_letter or (unit == "g" and sign))):
+        # As in DIN 461, such as "a / Gal"; a longer word may be another name.
+        is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
+        if sign == "[" or is_unknown or (is_known and (not is_letter or (unit == "g" and sign))):
             return unit
     return ""
 
 
+_LIKE_A_UNIT = re.compile(r"\S{1,4}|\S*[/^*\u00b2]\S*")
 _BEFORE_UNIT = re.compile(r"^|\s*[\[(/,;_]\s*|\s+in\s+(?=.)")
 
 
