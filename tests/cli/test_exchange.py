@@ -91,7 +91,11 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folde
         (("export", "run.h5", "--to", "csv", "--until", "nan"), "the beginning to nan s was requested"),
         (("export", "run.h5", "--to", "uff", "--spectra", "--until", "inf"), "to inf s was requested"),
         (("export", "run.h5", "--to", "csv", "--until", "1e308"), "to 1e+308 s was requested"),
+        (("export", "run.h5", "--to", "csv", "--from", "1", "--until", "0.5"), "a start and a later end"),
+        (("export", ".", "--to", "csv"), ". is a folder; give a recording (vibench catalogue"),
         (("import", "run.h5", "--out", "a.h5"), "give --mapping"),
+        (("recover", "."), "nothing to recover; give the path of a .h5.part"),
+        (("import", "."), ". is a folder; give the path of a file to import"),
         (("import", "run.h5", "--mapping", "map.toml"), "run.h5 exists, and nothing is ever overwritten"),
     ],
 )

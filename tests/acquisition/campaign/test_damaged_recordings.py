@@ -318,6 +318,8 @@ def test_a_pipe_in_place_of_a_journal_does_not_block(folder):
     os.mkfifo(folder / "c.campaign.sqlite")
     with pytest.raises(RecordingError, match="is not a file"):
         read_journal(folder / "c.campaign.sqlite")
+    with pytest.raises(RecordingError, match="is a folder; give the path of a campaign's journal"):
+        read_journal(folder)
 
 
 def test_verifying_names_a_journal_that_cannot_be_read(folder):

@@ -132,8 +132,10 @@ def test_a_foreign_file_is_not_read_as_branches(tmp_path):
     for name in ("x.h5", "y.h5", "z.h5"):
         with pytest.raises(InvalidRequest, match="give a file that vibench branches wrote"):
             read_diagram(tmp_path / name)
-    with pytest.raises(InvalidRequest, match=r"z\.h5 does not exist or is not a file"):
+    with pytest.raises(InvalidRequest, match=r"z\.h5 does not exist, or is not a file"):
         read_diagram(tmp_path / "z.h5")
+    with pytest.raises(InvalidRequest, match="is a folder; give a file that vibench branches wrote"):
+        read_diagram(tmp_path)
 
 
 def test_the_document_is_json_with_every_point(computed):

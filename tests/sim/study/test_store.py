@@ -224,6 +224,8 @@ def test_a_file_without_a_study_is_refused_in_one_sentence(tmp_path, content, sa
         path.write_bytes(content)
     with pytest.raises(StudyError, match=said):
         open_study(path)
+    with pytest.raises(StudyError, match="is a folder; give the path of a study's file"):
+        open_study(tmp_path)
 
 
 def test_another_kind_of_hdf5_file_and_a_newer_version_are_refused(small, tmp_path):

@@ -320,9 +320,8 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     Raises RecordingError when the file does not exist or is not a journal.
     """
     if not path.is_file():
-        raise RecordingError(
-            f"{path} does not exist, or is not a file; give the path of a campaign's journal."
-        )
+        what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
+        raise RecordingError(f"{path} {what}; give the path of a campaign's journal.")
     with sentences(path), closing(opened_to_look(path)) as connection:
         require_version(path, connection)
         return points_of(connection)

@@ -333,8 +333,8 @@ def recover(path: Path | str) -> Path:
     final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path
     part = layout.part_of(final)
     if not part.exists():
-        instead = f"analyse {final.name}, which is there" if final.exists() else "give the path of a .h5.part"
-        raise RecordingError(f"{part} does not exist, so there is nothing to recover; {instead}.")
+        hint = f"analyse {final.name}, which is there" if final.is_file() else "give the path of a .h5.part"
+        raise RecordingError(f"{part} does not exist, so there is nothing to recover; {hint}.")
     key = seal_key()
     try:
         _finish(part, final, key)

@@ -146,12 +146,12 @@ RESERVED_NAMES = frozenset(
 
 def part_of(path: Path) -> Path:
     """Return ``NAME.h5.part``, the path of the file while it is being recorded."""
-    return path.with_name(path.name + PART_SUFFIX)
+    return path.parent / (path.name + PART_SUFFIX)
 
 
 def tmp_of(path: Path) -> Path:
     """Return ``NAME.h5.tmp``, the path of a compressed copy or a ``.part`` that is not yet complete."""
-    return path.with_name(path.name + TMP_SUFFIX)
+    return path.parent / (path.name + TMP_SUFFIX)
 
 
 ELLIPSIS = "…"

@@ -89,15 +89,15 @@ def _require_file(path: Path) -> None:
         if path.stat().st_size == 0:
             raise RecordingError(f"{path} is empty (0 bytes). Copy it again from where it was recorded.")
         return
+    if path.is_dir():
+        raise RecordingError(f"{path} is a folder; give a recording (vibench catalogue lists them)")
     part = layout.part_of(path)
     if part.is_file():
         raise RecordingError(
             f"{path} does not exist, but {part.name} does: it is being recorded, or was interrupted."
             f" Open {part.name} to look at it, or recover it."
         )
-    raise RecordingError(
-        f"{path} does not exist, or is not a file. Check its name; vibench catalogue FOLDER lists recordings."
-    )
+    raise RecordingError(f"{path} does not exist, or is not a file; vibench catalogue DIR lists recordings")
 
 
 def _require_ours(path: Path, file: h5py.File) -> None:

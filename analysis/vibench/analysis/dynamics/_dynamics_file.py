@@ -106,9 +106,8 @@ def read_diagram(path: Path) -> BranchDiagram:
     Raises InvalidRequest when the file does not exist or contains no branches.
     """
     if not path.is_file():
-        raise InvalidRequest(
-            f"{path} does not exist or is not a file; give a file that vibench branches wrote"
-        )
+        what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
+        raise InvalidRequest(f"{path} {what}; give a file that vibench branches wrote")
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != BRANCHES_FORMAT:

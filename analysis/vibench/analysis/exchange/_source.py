@@ -82,7 +82,8 @@ def opened_source(path: Path) -> Iterator[Source]:
     damaged, or contains no channel.
     """
     if not path.is_file():
-        raise InvalidRequest(f"{path} does not exist, or is not a file; give the path of a file to import")
+        what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
+        raise InvalidRequest(f"{path} {what}; give the path of a file to import")
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InvalidRequest(

@@ -103,8 +103,10 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
     # Imported here, because results in memory do not need h5py.
     from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
+    wanted = f"give the path of a {kind.called}'s file"
     if not path.is_file():
-        raise StudyError(f"{path} does not exist, or is not a file; give the path of a {kind.called}'s file.")
+        what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
+        raise StudyError(f"{path} {what}; {wanted}.")
     try:
         # Use HDF5's default lock, which the writer's lock allows: HDF5 refuses another kind of lock if this
         # process has already opened the file, for example in xarray.
@@ -116,9 +118,7 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
             raise StudyError(
                 f"{path} could not be read ({reason}). The file may be intact: check the disk, and try again."
             ) from error
-        raise StudyError(
-            f"{path} is not a readable HDF5 file ({error}); give the path of a {kind.called}'s file."
-        ) from error
+        raise StudyError(f"{path} is not a readable HDF5 file ({error}); {wanted}.") from error
     with file:
         _require_ours(path, file, kind)
         yield file
