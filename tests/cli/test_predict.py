@@ -131,6 +131,7 @@ def test_sensitive_dependence_on_the_start_is_answered_with_motions_and_shares(v
     told = vibench_here(*asked, cwd=tmp_path)
     assert "Motions with sensitive dependence on the start" in told.stdout
     assert "%)" in told.stdout
+    assert "┃" not in told.stdout, "one table with a frame, one without"
 
 
 @pytest.mark.timeout(COMPILING_S)
@@ -146,6 +147,13 @@ def test_a_requested_error_is_reached_and_stated(answered):
     assert point["target"]["is_met"]
     assert point["target"]["wanted_error"] == 0.01
     assert " % reached in " in answered(*asked)
+
+
+def test_a_mean_over_starts_has_one_word_in_table_and_json(answered):
+    asked = ("predict", "--amplitude", 5e-6, "--frequency", 260, "--error", "50 %")
+    (point,) = answered(*asked, "--json")["points"]
+    (row,) = [each for each in answered(*asked).splitlines() if "chaotic" in each]
+    assert (point["memory"], row.split()[-1]) == ("lost", "lost")
 
 
 def test_every_point_of_a_curve_reaches_the_requested_error(answered):

@@ -211,16 +211,18 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
     return f"{span}: {method}. At {worst_hz:g} Hz: {text}"
 
 
-def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
-    rows = Table(
-        title="Responses I and II of m0 and of p = y - z, over the base amplitude [-]",
-        box=SIMPLE_HEAD,
-        padding=0,
-        show_edge=False,
-    )
-    headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
-    for heading in headings + ["exponent [1/s]"] * has_exponents:
+def _table(title: str, headings: Sequence[str], caption: str | None = None) -> Table:
+    """Return an empty table without a frame."""
+    rows = Table(title=title, caption=caption, box=SIMPLE_HEAD, padding=0, show_edge=False)
+    for heading in headings:
         rows.add_column(heading, justify="right")
+    return rows
+
+
+def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
+    title = "Responses I and II of m0 and of p = y - z, over the base amplitude [-]"
+    headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
+    rows = _table(title, headings + ["exponent [1/s]"] * has_exponents)
     step = max(1, -(-len(points) // _SHOWN))
     for each in points[::step]:
         numbers = (each.response_i, each.response_ii, each.relative_i, each.relative_ii, each.lyapunov_per_s)
@@ -251,7 +253,7 @@ def _share_text(point: ScenePrediction) -> str:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
         case ScenePrediction(memory=StartMemory.LOST):
-            return "forgotten"
+            return "lost"
         case _:
             return ""
 
@@ -266,12 +268,9 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
     ]
     if not several:
         return None
-    rows = Table(
-        title="Motions with sensitive dependence on the start: starts differ by a millionth of a gap",
-        caption=f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None,
-    )
-    for heading in ("f [Hz]", "I", "II", "I of p", "II of p", "motion", "error", "share"):
-        rows.add_column(heading, justify="right")
+    title = "Motions with sensitive dependence on the start: starts differ by a millionth of a gap"
+    more = f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None
+    rows = _table(title, ("f [Hz]", "I", "II", "I of p", "II of p", "motion", "error", "share"), more)
     for point, motion in several[:_SHOWN]:
         responses = (motion.response_i, motion.response_ii, motion.relative_i, motion.relative_ii)
         rows.add_row(
