@@ -58,8 +58,8 @@ def test_messages_and_status_show_markup_as_plain_text(qtbot):
     status.show_fields({StatusField.FILE: HOSTILE})
     assert SHOWN in strip._text.text()
     assert SHOWN in read(strip._text.toolTip())
-    assert status.text_of(StatusField.FILE) == SHOWN
-    assert read(status.tip_of(StatusField.FILE)) == SHOWN
+    assert status.labels[StatusField.FILE].text() == SHOWN
+    assert read(status.labels[StatusField.FILE].toolTip()) == SHOWN
 
 
 def curve(source):

@@ -38,49 +38,41 @@ class StatusLine(QFrame):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 3, 10, 3)
         layout.setSpacing(18)
-        self._labels: dict[StatusField, ElidedLabel] = {}
+        self.labels: dict[StatusField, ElidedLabel] = {}
         for field in StatusField:
             label = ElidedLabel()
             label.setAccessibleName(f"Status: {field.value}")
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-            self._labels[field] = label
+            self.labels[field] = label
             layout.addWidget(label)
-        frames = self._labels[StatusField.FRAMES]
+        frames = self.labels[StatusField.FRAMES]
         frames.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self._fit()
         # The file field takes the remaining width and shrinks first.
-        self._labels[StatusField.FILE].setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        layout.setStretchFactor(self._labels[StatusField.FILE], 1)
+        self.labels[StatusField.FILE].setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        layout.setStretchFactor(self.labels[StatusField.FILE], 1)
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply a change of the font at once."""
         super().changeEvent(event)
-        if event.type() is QEvent.Type.FontChange and self._labels:
+        if event.type() is QEvent.Type.FontChange and self.labels:
             self._fit()
 
     def _fit(self) -> None:
         """Give the last field its largest width, so that changing numbers do not move other fields."""
-        frames = self._labels[StatusField.FRAMES]
+        frames = self.labels[StatusField.FRAMES]
         frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
-
-    def text_of(self, field: str) -> str:
-        """Return the text of a field."""
-        return self._labels[StatusField(field)].text()
-
-    def tip_of(self, field: str) -> str:
-        """Return the tooltip of a field."""
-        return self._labels[StatusField(field)].toolTip()
 
     def explain(self, field: StatusField, text: str) -> None:
         """Set the tooltip of a field."""
-        if self._labels[field].toolTip() != text:
-            self._labels[field].setToolTip(text)
+        if self.labels[field].toolTip() != text:
+            self.labels[field].setToolTip(text)
 
     def show_fields(
         self, texts: Mapping[StatusField, str], marked: frozenset[StatusField] = frozenset()
     ) -> None:
         """Show texts; ``marked`` fields need attention."""
-        for field, label in self._labels.items():
+        for field, label in self.labels.items():
             text = texts.get(field, "")
             tone = Tone.CAUTION.value if field in marked else ""
             shown = f"⚠ {text}" if tone else text
