@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,29 +154,20 @@ def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
     """Return the ensemble of a point from its cells; None if it has no ensemble."""
     if _number(arrays[layout.STARTS][number]) is None:
         return None
-    ensemble = {
-        field: _number(arrays[column.name][number]) for field, column in layout.ENSEMBLE_NUMBERS.items()
-    }
-    escape = {field: _number(arrays[column.name][number]) for field, column in layout.ESCAPE_NUMBERS.items()}
+    escape = _numbers_at(arrays, layout.ESCAPE_NUMBERS, number)
     kinds = arrays[layout.FOUND_KIND.name][number]
     return Ensemble(
-        **ensemble,  # type: ignore[arg-type]
+        **_numbers_at(arrays, layout.ENSEMBLE_NUMBERS, number),
         motions=tuple(_motion_at(arrays, number, k) for k in range(layout.MOST_FOUND) if int(kinds[k]) >= 0),
-        escape=None if escape["chaotic_s"] is None else EscapeRate(**escape),  # type: ignore[arg-type]
+        escape=None if escape["chaotic_s"] is None else EscapeRate(**escape),
     )
 
 
 def _motion_at(arrays: Arrays, number: int, place: int) -> FoundMotion:
-    found = {
-        field: _number(arrays[column.name][number, place]) for field, column in layout.FOUND_NUMBERS.items()
-    }
-    share = {
-        field: _number(arrays[column.name][number, place]) for field, column in layout.FOUND_SHARE.items()
-    }
     return FoundMotion(
-        **found,  # type: ignore[arg-type]
+        **_numbers_at(arrays, layout.FOUND_NUMBERS, (number, place)),
         motion=list(MotionKind)[int(arrays[layout.FOUND_KIND.name][number, place])],
-        share=Share(**share),  # type: ignore[arg-type]
+        share=Share(**_numbers_at(arrays, layout.FOUND_SHARE, (number, place))),
     )
 
 
@@ -199,10 +190,9 @@ def prediction_at(
     frequency_hz, amplitude_m, accuracy, start
         Values of the study at this point.
     """
-    numbers = {field: _number(arrays[column.name][number]) for field, column in layout.NUMBERS.items()}
     x, y, z, vx, vy, vz = (float(value) for value in arrays[layout.FINAL_STATE][number].astype(np.float64))
     return ScenePrediction(
-        **numbers,  # type: ignore[arg-type]
+        **_numbers_at(arrays, layout.NUMBERS, number),
         frequency_hz=frequency_hz,
         amplitude_m=amplitude_m,
         motion=list(MotionKind)[int(arrays[layout.MOTION][number])],
@@ -220,6 +210,13 @@ def prediction_at(
 def cut_text(text: str) -> bytes:
     """Return a text as UTF-8 bytes, cut between characters to the size of a column."""
     return text.encode()[: layout.TEXT_BYTES].decode(errors="ignore").encode()
+
+
+def _numbers_at(
+    arrays: Arrays, columns: Mapping[str, layout.Column], at: int | tuple[int, int]
+) -> dict[str, Any]:
+    """Return the numbers of a point, or of one motion of it, by field; None where missing."""
+    return {field: _number(arrays[column.name][at]) for field, column in columns.items()}
 
 
 def _number(cell: np.generic) -> float | int | None:

@@ -87,8 +87,7 @@ def _require_playable(campaign: Campaign, rig: Rig) -> None:
     if needed_v > allowed:
         raise ConfigurationError(
             f"The sweep asks for up to {needed_v:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on "
-            "this "
-            "bench (amplitude_limit_vpp of the hardware configuration): lower its levels."
+            "this bench (amplitude_limit_vpp of the hardware configuration): lower its levels."
         )
 
 
