@@ -107,7 +107,11 @@ def stated_errors(
         if float(np.max(off)) < PARTED:
             return StatedErrors(SAFETY * off + sure, float(np.max(off)))
     added = error_per_period(run, scene.accuracy)
-    drawn = _difference_of_draws(begin, seen, strict, pace, slowest_rate, follow)
+    drawn, memories = None, -slowest_rate * seen.window.begins.time_s
+    if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
+        drawn = draws_apart(seen.blocks, len(seen.window.blocks))
+    if drawn is None:
+        drawn = draws_of_starts(answer, _more_starts(begin, seen, strict, pace, follow))
     return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
 
 
@@ -143,24 +147,6 @@ class _StrictRun:
     """Responses in the window, shape (4,), if reached."""
     is_together: bool
     """Whether it never diverged from the result's run."""
-
-
-def _difference_of_draws(
-    begin: FollowedRun,
-    seen: SceneRun,
-    strict: _StrictRun,
-    pace: Pace,
-    slowest_rate: float,
-    follow: Follow,
-) -> Floats:
-    """Return the relative difference of two draws, shape (4,)."""
-    memories = -slowest_rate * seen.window.begins.time_s
-    if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
-        drawn = draws_apart(seen.blocks, len(seen.window.blocks))
-        if drawn is not None:
-            return drawn
-    others = _more_starts(begin, seen, strict, pace, follow)
-    return draws_of_starts(seen.window.responses_m, others)
 
 
 def _more_starts(
