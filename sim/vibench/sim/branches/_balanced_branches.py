@@ -70,16 +70,13 @@ def _starts(
 ) -> Iterator[BranchStart[Balance]]:
     structure, spring = structure_of(specimen), spring_of(specimen)
     where = drive.frequency_hz, drive.amplitude_m
-    match spring:
-        case PowerSpring():
-            for guess in first_order_guesses(structure, spring, *where):
-                found = balance(structure, spring, *where, options, guess)
-                if found.outcome is not BalanceEnd.NO_SOLUTION:
-                    yield BranchStart(found, BranchOrigin.FIRST_ORDER, drive, found.state[None, :])
-        case _:
-            for orbit in periodic_motions(specimen, drive, search, until_s):
-                if orbit.period_map.periods > 1:
-                    continue
-                found = balance(structure, spring, *where, options, orbit_guess(orbit))
-                if found.outcome is not BalanceEnd.NO_SOLUTION:
-                    yield BranchStart(found, BranchOrigin.SEARCH, drive, found.state[None, :])
+    if isinstance(spring, PowerSpring):
+        guesses, origin = iter(first_order_guesses(structure, spring, *where)), BranchOrigin.FIRST_ORDER
+    else:
+        orbits = periodic_motions(specimen, drive, search, until_s)
+        guesses = (orbit_guess(orbit) for orbit in orbits if orbit.period_map.periods == 1)
+        origin = BranchOrigin.SEARCH
+    for guess in guesses:
+        found = balance(structure, spring, *where, options, guess)
+        if found.outcome is not BalanceEnd.NO_SOLUTION:
+            yield BranchStart(found, origin, drive, found.state[None, :])
