@@ -269,9 +269,9 @@ class Bridge(QObject):
         self.rig = rig
         self._order(lambda client: _open(client, rig, confirmations))
 
-    def adopt(self, announcement: Announcement) -> None:
-        """Take over an engine that another window left, with its campaign; `adopted` follows."""
-        if self._line is not None:
+    def adopt(self, announcement: Announcement | None) -> None:
+        """Take over an engine that another window left, if any, with its campaign; `adopted` follows."""
+        if announcement is None or self._line is not None:
             return
         self._line = EngineLine(lambda: AdoptedEngine(announcement))
 

@@ -122,10 +122,6 @@ class Selection(QObject):
             self.measurement, self.prediction = measurement, None
             self.measurement_changed.emit()
 
-    def keep_prediction(self, prediction: "MeasurementPrediction") -> None:
-        """Store the prediction for the test."""
-        self.prediction = prediction
-
     def choose_campaign(self, campaign: Campaign | None) -> None:
         """Select another campaign."""
         if campaign != self.campaign:

@@ -30,7 +30,7 @@ from vibench.sim import FrozenModel
 from ..forms.model_form import ValidatedForm
 from ..page.app_context import AppContext, SettingKey
 from ..widgets.boxes import fill_box, push_button
-from ..widgets.theme import DARK, LIGHT, THEMES, Theme
+from ..widgets.theme import DARK, LIGHT, THEMES
 from ..widgets.units import UNITS
 
 if TYPE_CHECKING:
@@ -285,7 +285,12 @@ def menu_actions(window: "Window") -> tuple[MenuAction, ...]:
             )
             for number, name in enumerate(window.pages, start=1)
         ),
-        MenuAction("&View", "&Light or dark", lambda: context.choose_theme(_other(context)), "Ctrl+T"),
+        MenuAction(
+            "&View",
+            "&Light or dark",
+            lambda: context.choose_theme(DARK if context.theme is LIGHT else LIGHT),
+            "Ctrl+T",
+        ),
         MenuAction("&View", "&Reset layout", window.reset_layout),
         MenuAction("Hel&p", "&Manual", lambda: show_manual(window), "Shift+F1", "the manual, offline"),
         MenuAction("Hel&p", "&About…", lambda: show_about(window, context), "", ""),
@@ -341,7 +346,3 @@ def show_keys(parent: QWidget, actions: tuple[MenuAction, ...]) -> None:
     box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=parent)
     box.setModal(False)
     box.show()
-
-
-def _other(context: AppContext) -> Theme:
-    return DARK if context.theme is LIGHT else LIGHT

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
+from vibench.acquisition.engine import CampaignRequest, left_alone
 
 from ..background.background import in_next_pass
 from ..engine_link.bridge import Urgency
@@ -220,11 +220,7 @@ class Window(QMainWindow):
 
     def look_for_left_campaign(self) -> None:
         """Take over the engine of a campaign that another window left, if there is one."""
-        self.context.background.ask(left_alone, self._take_over, self.context.fail)
-
-    def _take_over(self, left: Announcement | None) -> None:
-        if left is not None:
-            self.context.bridge.adopt(left)
+        self.context.background.ask(left_alone, self.context.bridge.adopt, self.context.fail)
 
     def _show_adopted(self, request: CampaignRequest) -> None:
         """Show a campaign that was taken over as if it had been armed in this window."""

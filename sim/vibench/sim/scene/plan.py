@@ -229,11 +229,6 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     )
 
 
-def transient_decay_s(motion: LinearMotion) -> float:
-    """Return the time when the transient of a motion without contact has decayed; infinite if never."""
-    return motion.died_away_s(DECAYED_SHARE)
-
-
 def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | AutomaticDuration) -> Method:
     match specimen.contact, duration:
         case PowerLaw(), _:
@@ -242,7 +237,7 @@ def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | 
             by_s = duration.duration_s - duration.window_s
         case _, AutomaticDuration():
             by_s = duration.longest_s - 1.0 / motion.drive.frequency_hz
-    is_proved = never_touches(specimen, motion) and transient_decay_s(motion) <= by_s
+    is_proved = never_touches(specimen, motion) and motion.died_away_s(DECAYED_SHARE) <= by_s
     return Method.CLOSED_FORM if is_proved else Method.EVENT_DRIVEN
 
 

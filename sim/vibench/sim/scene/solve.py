@@ -14,7 +14,7 @@ from ..specimen.outcome import Outcome
 from ..specimen.stops import chosen
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
-from .plan import LinearMotion, linear_motion, plan_of, transient_decay_s
+from .plan import DECAYED_SHARE, LinearMotion, linear_motion, plan_of
 from .prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, state_of
 from .repetition import FEWEST_TIMES, MOST_STATES, growth_of, pace_of
 from .scatter import WindowScatter, window_scatter
@@ -234,7 +234,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             ended = f"the {duration_s:g} s requested have passed"
         case AutomaticDuration():
-            settled_s, window_s = transient_decay_s(motion), period_s
+            settled_s, window_s = motion.died_away_s(DECAYED_SHARE), period_s
             duration_s = settled_s + period_s
             ended = "it repeats after 1 drive period(s)"
     x, p = abs(motion.steady_x) / amplitude, abs(motion.steady_p) / amplitude

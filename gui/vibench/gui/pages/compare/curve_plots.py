@@ -225,7 +225,9 @@ class CurveList(QListWidget):
         place = next((n for n, each in enumerate(self._curves) if _is_of(each, source)), len(others))
         place = min(place, len(others))
         self._curves = [*others[:place], *curves, *others[place:]]
-        self._list(lambda each: each.name in ticked or (each.name not in known and _is_first(each)))
+        self._list(
+            lambda each: each.name in ticked or (each.name not in known and each.response in _SHOWN_FIRST)
+        )
 
     def remove_chosen(self) -> tuple[str, ...]:
         """Remove the selected curves; return the sources that have none left."""
@@ -274,10 +276,6 @@ def _name(each: Curve) -> str:
 def _is_of(each: Curve, source: str) -> bool:
     """Return whether a curve belongs to a source; steps up and down of one recording are two sources."""
     return each.source == source or each.source in (f"{source} up", f"{source} down")
-
-
-def _is_first(each: Curve) -> bool:
-    return each.response in _SHOWN_FIRST
 
 
 def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:

@@ -21,7 +21,6 @@ from vibench.acquisition.engine import DRIVING, EngineClient, EngineState, Engin
 from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
 from vibench.acquisition.recording import REJECTED
 from vibench.acquisition.rig import channels_of
-from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...engine_link.bridge import measurement_called
@@ -439,7 +438,8 @@ class RunPage(Page):
         pictures = self._pictures
         for picture in pictures.values():
             picture.clear()
-        self._show_prediction(prediction)
+        for shown_beside in (self.frequency_response, self.history, self.envelope):
+            shown_beside.show_prediction(prediction)
         if measurement is not None:
             for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
                 # Fix the range: a preceding check plays outside the band, and would compress the plot.
@@ -447,11 +447,6 @@ class RunPage(Page):
         shown = OF_A_BAND if measurement is None else KIND_VIEWS[measurement.excitation.kind]
         self.left_tabs.setCurrentWidget(pictures[shown.left])
         self.right_tabs.setCurrentWidget(pictures[shown.right])
-
-    def _show_prediction(self, prediction: MeasurementPrediction | None) -> None:
-        self.frequency_response.show_prediction(prediction)
-        self.history.show_prediction(prediction)
-        self.envelope.show_prediction(prediction)
 
     def _recorded(self, path: Path) -> None:
         self._ended = path

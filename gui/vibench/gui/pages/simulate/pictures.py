@@ -6,7 +6,6 @@ from functools import partial
 from math import log10
 
 import numpy as np
-import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout, QStackedWidget, QWidget
 
 from vibench.analysis import SIMILARITY_THRESHOLD
@@ -289,13 +288,14 @@ class AnswerPlots(QWidget):
             frequency_hz, values = progress.column(model, name)
             if frequency_hz.size:
                 line = self.responses.curve(curve_style(number, dash), f"{label}, {model}")
-                _draw(line, frequency_hz, values)
+                line.setData(frequency_hz, values, connect="finite")
 
     def _exponents(self, progress: SimulationProgress) -> None:
         for number, model in enumerate(progress.models):
             frequency_hz, values = progress.column(model, "lyapunov_per_s")
             if np.isfinite(values).any():
-                _draw(self.exponents.curve(curve_style(number), model), frequency_hz, values)
+                line = self.exponents.curve(curve_style(number), model)
+                line.setData(frequency_hz, values, connect="finite")
                 if number == 0:
                     self.exponents.level(GUIDE, 0.0)
 
@@ -320,7 +320,8 @@ class AnswerPlots(QWidget):
             return
         name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
         shown = np.maximum(found.difference, _SMALLEST_DIFFERENCE)
-        _draw(self.likeness.curve(curve_style(2), name), found.frequency_hz, shown)
+        line = self.likeness.curve(curve_style(2), name)
+        line.setData(found.frequency_hz, shown, connect="finite")
         self.likeness.level(LIMIT, SIMILARITY_THRESHOLD, "limit")
 
 
@@ -330,11 +331,3 @@ def _draw_anew(
     plot.wipe()
     if progress is not None:
         draw(progress)
-
-
-def _draw(
-    line: pg.PlotDataItem,
-    frequency_hz: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
-    values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
-) -> None:
-    line.setData(frequency_hz, values, connect="finite")

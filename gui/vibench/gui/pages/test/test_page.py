@@ -407,8 +407,7 @@ class TestPage(Page):
             self.edits.note(measurement)
             if inputs == self._requested_inputs:
                 # Only name or notes changed, so the prediction stays valid.
-                if seen is not None:
-                    self.context.selection.keep_prediction(seen)
+                self.context.selection.prediction = seen
                 return
         self._preview, self._refusal = None, ""
         # Mark the old prediction as outdated until the new one arrives.
@@ -441,7 +440,7 @@ class TestPage(Page):
 
     def _predicted(self, prediction: TestPrediction) -> None:
         seen = prediction.motion
-        self.context.selection.keep_prediction(seen)
+        self.context.selection.prediction = seen
         self._predicted_of = self._requested_inputs
         self._refusal = prediction.refusal
         if self._preview is not None:
