@@ -24,7 +24,6 @@ from vibench.acquisition.engine import (
     CampaignRequest,
     EngineClient,
     EngineGone,
-    EngineMessage,
     EngineProcess,
     EngineSilent,
     EngineState,
@@ -388,7 +387,8 @@ class Bridge(QObject):
         for message in status.messages:
             if message.number > self._last_message:
                 self._last_message = message.number
-                self.noticed.emit(_notice(message))
+                kind = NoticeKind(message.kind.value)
+                self.noticed.emit(Notice(kind, message.what, message.done, message.next_step, message.code))
         ended = frozenset(
             row.file for row in status.rows if row.file and row.state not in ("queued", "running")
         )
@@ -441,8 +441,3 @@ def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> No
 def _adopt(client: EngineClient) -> tuple[Rig, CampaignRequest, EngineStatus]:
     warm_up()
     return client.open_rig(), client.carried_request(), client.status()
-
-
-def _notice(message: EngineMessage) -> Notice:
-    kind = NoticeKind(message.kind.value)
-    return Notice(kind, message.what, message.done, message.next_step, message.code)

@@ -210,6 +210,7 @@ def integrate_chain(
         return _of_one(alone)
     motion, tables = start_motion(chain, initial_state), chain_tables(chain, drive, accuracy)
     check_work(chain, duration_s, longest_window_s(tables, drive))
+    rate_hz = 1.0 if sample_rate_hz is None else sample_rate_hz
     count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
     run = ChainRun(
         chain,
@@ -219,7 +220,7 @@ def integrate_chain(
         most_impacts=most_chain_impacts(chain, max_impact_rate_hz, duration_s),
         start_time_s=start_time_s,
         samples=count,
-        sample_rate_hz=1.0 if sample_rate_hz is None else sample_rate_hz,
+        sample_rate_hz=rate_hz,
     )
     run.place(motion, start_time_s)
     end = start_time_s + duration_s
@@ -232,9 +233,7 @@ def integrate_chain(
             outcome = run.advance(until)
             if outcome is not Outcome.REACHED_END:
                 break
-    return _trajectory(
-        chain, run, start_time_s, 1.0 if sample_rate_hz is None else sample_rate_hz, outcome, accuracy
-    )
+    return _trajectory(chain, run, start_time_s, rate_hz, outcome, accuracy)
 
 
 def check_work(chain: Chain, duration_s: float, window_s: float) -> None:

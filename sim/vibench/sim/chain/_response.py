@@ -108,7 +108,7 @@ def chain_response(
     end = cmath.exp(-1j * (2.0 * math.pi * drive.frequency_hz * duration_s + drive.phase_rad))
     # Over whole periods exp(-i omega t) returns to its start.
     change = np.asarray((run.motion - line_start) * end, dtype=np.complex128)
-    lines = _lines(chain, drive, run.forces, _in_order(change), line_s)
+    lines = _lines(chain, drive, run.forces, change, line_s)
     void = 1.0 if outcome is Outcome.REACHED_END else math.nan
     impacts = run.impact_cells
     return ChainResponse(
@@ -157,11 +157,6 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     )
 
 
-def _in_order(motion: Complex) -> Complex:
-    """Return the displacements of all masses, then their velocities, shape (6 cells,)."""
-    return np.concatenate([motion[:, :MASSES_PER_CELL].ravel(), motion[:, MASSES_PER_CELL:].ravel()])
-
-
 def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:
     """Return the components of all motions at the drive frequency, shape (cells, 4), from the forces.
 
@@ -176,14 +171,14 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     forces
         Integral of the force in each cell times exp(-i omega t), shape (cells,) [N s].
     change
-        Change of the state times exp(-i omega t) from start to end of the lines, shape (6 cells,).
+        Change of the state times exp(-i omega t) from start to end of the lines, shape (cells, 6).
     line_s
         Length of the lines [s].
     """
     omega = 2.0 * math.pi * drive.frequency_hz
     first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix
     push = (first.stiffnesses[0] + 1j * omega * first.dampings[0]) * -1j * drive.amplitude_m
-    moved, sped = change[: len(masses)], change[len(masses) :]
+    moved, sped = change[:, :MASSES_PER_CELL].ravel(), change[:, MASSES_PER_CELL:].ravel()
     right = -masses * (sped + 1j * omega * moved) - damping @ moved
     right[0] += push * 0.5 * line_s
     right[1::MASSES_PER_CELL] -= forces

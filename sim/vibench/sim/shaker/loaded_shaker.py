@@ -256,10 +256,8 @@ class LoadedShaker:
         block
             Steps of a block for counting contacts; 0 for none.
         """
-        drive, motion = (
-            np.ascontiguousarray(drive_v, np.float64),
-            ShakenMotion.of(len(drive_v), end_rows, block),
-        )
+        drive = np.ascontiguousarray(drive_v, np.float64)
+        motion = ShakenMotion.of(len(drive_v), end_rows, block)
         self.structure["block"] = block
         noise = np.zeros(len(drive)) if noise_v is None else np.ascontiguousarray(noise_v, np.float64)
         self.move_into(motion, drive, noise)

@@ -100,8 +100,7 @@ def _dump_all(models: Sequence[BaseModel]) -> list[dict[str, object]]:
 
 
 def _dump(model: BaseModel) -> dict[str, object]:
-    content: dict[str, object] = model.model_dump(mode="json", exclude_none=True)
-    return content
+    return model.model_dump(mode="json", exclude_none=True)
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -255,8 +255,9 @@ class RigPage(Page):
         status = self.context.bridge.status
         state = self.context.bridge.state
         may_open = state in (EngineState.CLOSED, EngineState.FAULT)
-        knobs_missing = self._rig_needs_knobs() and self.knobs.sheet() is None
-        self.open_button.setEnabled(may_open and self.choice.rig is not None and not knobs_missing)
+        rig = self.choice.rig
+        is_complete = rig is not None and (rig.virtual is not None or self.knobs.sheet() is not None)
+        self.open_button.setEnabled(may_open and is_complete)
         self.close_button.setEnabled(state in (EngineState.READY, EngineState.ARMED, EngineState.FAULT))
         self.check_button.setEnabled(state is EngineState.READY)
         self.choice.setEnabled(may_open)
@@ -311,10 +312,6 @@ class RigPage(Page):
                     for each in found
                 ]
             )
-
-    def _rig_needs_knobs(self) -> bool:
-        rig = self.choice.rig
-        return rig is not None and rig.virtual is None
 
     def _chosen(self) -> None:
         rig = self.choice.rig

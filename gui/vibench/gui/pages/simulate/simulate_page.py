@@ -128,12 +128,9 @@ class SimulatePage(Page):
         self._is_stale = True
         troubles = () if self.progress is None else self.progress.troubles
         text = "Complete." if not troubles else f"Complete except for {len(troubles)} points."
-        forgotten = 0 if self.progress is None else self.progress.forgotten
-        self._say_progress(
-            f"{text} At {forgotten} points the motion depends sensitively on the start."
-            if forgotten
-            else text
-        )
+        if self.progress is not None and self.progress.forgotten:
+            text += f" At {self.progress.forgotten} points the motion depends sensitively on the start."
+        self._say_progress(text)
         if troubles:
             self.context.warn(troubles[0], details="\n".join(troubles[1:]))
 
