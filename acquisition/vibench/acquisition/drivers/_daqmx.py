@@ -223,6 +223,8 @@ class DaqmxDigitizer:
         """Connection to the driver, for an output on the same one."""
         self._config = config
         self._channels = channels
+        self.roles = tuple(channel.role.value for channel in channels)
+        """Roles of the channels, in the order of the rows of a block."""
         self._resources = ExitStack()
         self._task: Task | None = None
         self._reader: AnalogUnscaledReader | AnalogMultiChannelReader | None = None
@@ -256,11 +258,6 @@ class DaqmxDigitizer:
         if self._identity is None:
             raise InstrumentError(f"{self._config.device} is not open; make it with DaqmxDigitizer.open")
         return self._identity
-
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """Roles of the channels, in the order of the rows of a block."""
-        return tuple(channel.role.value for channel in self._channels)
 
     def start_trigger(self) -> str:
         """Terminal of this task's start trigger; arm other tasks on it before `start`."""

@@ -37,6 +37,10 @@ class DaqmxOutput:
     def __init__(self, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> None:
         self._physical = physical
         self._config = config
+        self.sample_rate_hz = config.sample_rate_hz
+        """The requested sample rate, which the device accepted."""
+        self.ahead_samples = int(config.ahead_s * config.sample_rate_hz)
+        """Largest number of samples ahead of the one being played."""
         self._digitizer = digitizer
         self._resources = ExitStack()
         self._task: Task | None = None
@@ -73,16 +77,6 @@ class DaqmxOutput:
         with daqmx_call(f"identifying {self._physical}"):
             module = daqmx_identity(self._digitizer.session, device)
         return replace(module, reply=f"{self._physical} of {module.reply}")
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """The requested sample rate, which the device accepted."""
-        return self._config.sample_rate_hz
-
-    @property
-    def ahead_samples(self) -> int:
-        """Largest number of samples ahead of the one being played."""
-        return int(self._config.ahead_s * self._config.sample_rate_hz)
 
     def write(self, volts: Samples) -> None:
         """Add samples behind those still to be played; wait if the buffer is full.

@@ -21,9 +21,15 @@ class FilePlayer:
     samples; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
+    waiting_samples = 0
+    """Zero: a recording is read at any speed."""
+
     def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
         self._recording = recording
-        self._channels = channels
+        self.sample_rate_hz = recording.sample_rate_hz
+        """Sample rate of the recording."""
+        self.roles = tuple(channel.role.value for channel in channels)
+        """Roles of the channels, in the order of the rows of a block."""
         self._next_sample = 0
         self._is_running = False
         self._is_open = True
@@ -75,16 +81,6 @@ class FilePlayer:
         return Identity("", "recording", made.recording_id, "", reply, origin=made.origin.value)
 
     @property
-    def sample_rate_hz(self) -> float:
-        """Sample rate of the recording."""
-        return self._recording.sample_rate_hz
-
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """Roles of the channels, in the order of the rows of a block."""
-        return tuple(channel.role.value for channel in self._channels)
-
-    @property
     def volts_per_count(self) -> tuple[float | None, ...]:
         """Steps of the recording's converter, where count zero is zero volts [V]."""
         heads = (self._recording.channel(role) for role in self.roles)
@@ -128,11 +124,6 @@ class FilePlayer:
             if each.channel in self.roles and each.first_sample < last and each.last_sample >= first
         )
         return Block(first, volts, overloads)
-
-    @property
-    def waiting_samples(self) -> int:
-        """Zero: a recording is read at any speed."""
-        return 0
 
     def stop(self) -> None:
         """Stop playing. Legal at any time."""

@@ -114,6 +114,12 @@ class SoundCardDigitizer:
         self.options = rig.daq.options
         self._device = rig.daq.device
         self._channels = channels
+        self.sample_rate_hz = float(card.stream.samplerate)
+        """The rate that PortAudio reports."""
+        self.roles = tuple(channel.role.value for channel in channels)
+        """Roles of the channels, in the order of the rows of a block."""
+        self.volts_per_count = (None,) * len(channels)
+        """None for each channel: PortAudio returns numbers, not counts."""
         self._full_scale_v = float(rig.daq.options["input_full_scale_v"])
         self._next_sample = 0
         self._is_running = False
@@ -159,21 +165,6 @@ class SoundCardDigitizer:
         version = _sounddevice().get_portaudio_version()[1]
         reply = f"{self._device}, {version}, {', '.join(f'{key} {self.options[key]}' for key in _NEEDED)}"
         return Identity("", self._device, "", version, reply)
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """The rate that PortAudio reports."""
-        return float(self.card.stream.samplerate)
-
-    @property
-    def roles(self) -> tuple[str, ...]:
-        """Roles of the channels, in the order of the rows of a block."""
-        return tuple(channel.role.value for channel in self._channels)
-
-    @property
-    def volts_per_count(self) -> tuple[float | None, ...]:
-        """None for each channel: PortAudio returns numbers, not counts."""
-        return (None,) * len(self._channels)
 
     def start(self) -> None:
         """Begin sampling, and playing an armed output."""
@@ -241,6 +232,10 @@ class SoundCardOutput:
         self._physical = physical
         self._config = config
         self._digitizer = digitizer
+        self.sample_rate_hz = digitizer.sample_rate_hz
+        """The rate of the stream."""
+        self.ahead_samples = int(config.ahead_s * digitizer.sample_rate_hz)
+        """Largest number of samples ahead of the one being played."""
         self._card = digitizer.card
         self._full_scale_v = float(digitizer.options["output_full_scale_v"])
         self._is_open = True
@@ -262,16 +257,6 @@ class SoundCardOutput:
         """Identity of the card, with the name of its output."""
         card = self._digitizer.identity
         return Identity(card.maker, card.model, "", card.firmware, f"{self._physical} of {card.reply}")
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """The rate of the stream."""
-        return self._digitizer.sample_rate_hz
-
-    @property
-    def ahead_samples(self) -> int:
-        """Largest number of samples ahead of the one being played."""
-        return int(self._config.ahead_s * self.sample_rate_hz)
 
     def write(self, volts: Samples) -> None:
         """Add samples behind those still to be played, waiting for room; raises as `AnalogOutput.write`."""

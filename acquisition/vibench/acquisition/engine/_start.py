@@ -30,13 +30,10 @@ class AdoptedEngine(ClosedOnLeaving):
 
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement
+        self.pid = announcement.pid
+        """Number of the process."""
         self.address = announcement.address
         self.client = EngineClient.attach(announcement.address, ConnectionRole.ATTENDING)
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._announcement.pid
 
     def leave(self) -> None:
         """Stop attending; a campaign that was armed to be left alone continues."""
@@ -64,14 +61,11 @@ class EngineProcess(ClosedOnLeaving):
 
     def __init__(self, process: "subprocess.Popen[str]", address: EngineAddress) -> None:
         self._process = process
+        self.pid = process.pid
+        """Number of the process."""
         self.address = address
         """Address for other programs."""
         self.client = EngineClient.attach(address, ConnectionRole.ATTENDING)
-
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
 
     @property
     def is_alive(self) -> bool:
