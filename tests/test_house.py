@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_194,
+    "acquisition": 28_187,
     "analysis": 32_535,
     "cli": 5_068,
     "extensions": 2_680,
@@ -20,7 +20,7 @@ LINES_AT_MOST = {
     "native": 6_625,
     "sim": 20_404,
     "studies": 3_182,
-    "virtual_rig": 7_563,
+    "virtual_rig": 7_540,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

@@ -290,7 +290,8 @@ class Run(ClosedOnLeaving):
             require_within_limits(self._measurement, self._bench.rig)
             self._drive = drive_for(self._bench, self._measurement)
             self._controller = controller_for(self._bench, self._measurement)
-            self._total_s += self._before_s()
+            if self._bench_check is LowLevelCheck.AT_LOW_LEVEL:
+                self._total_s += CHECK_S + self._drive.pause_s  # the signal is announced after the check
             if self._drive.is_commanded:
                 self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
             self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
@@ -347,14 +348,6 @@ class Run(ClosedOnLeaving):
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)
             self._known = f"; {note.sentence}"
-
-    def _before_s(self) -> float:
-        """Return the time before the first ramp [s]; the signal is announced after the check has passed."""
-        match self._bench_check:
-            case LowLevelCheck.AT_LOW_LEVEL:
-                return CHECK_S + self._drive.pause_s
-            case LowLevelCheck.RECENTLY_PASSED:
-                return 0.0
 
     def _begin(self, coming: Iterable[Phase]) -> None:
         """Start sampling, and with it an output that shares the digitizer's trigger."""

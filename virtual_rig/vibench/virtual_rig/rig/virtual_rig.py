@@ -82,7 +82,7 @@ class VirtualRig:
         self._scpi_port = scpi_port
         self.token = token_for(address)
         """Token required from other computers; None on loopback."""
-        self._pace = _pace(virtual)
+        self._pace: Pace = WallPace(virtual.speed) if virtual.pace == "wall" else OnDemandPace()
         # Generator and world refer to each other, so the clock looks up ``world`` at each call.
         usb_ids, serial = _address(rig.generator.resource)
         self.generator = GENERATORS[usb_ids[0]](
@@ -131,9 +131,8 @@ class VirtualRig:
 
     def let_pass(self, duration_s: float) -> None:
         """Advance rig time without sampling; a rig in real time advances by itself."""
-        match self._pace:
-            case OnDemandPace():
-                self._running_state.daq.let_pass(duration_s)
+        if isinstance(self._pace, OnDemandPace):
+            self._running_state.daq.let_pass(duration_s)
 
     def __enter__(self) -> Self:
         """Switch everything on; if a part fails, switch everything off again."""
@@ -199,14 +198,6 @@ def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
         return None
     simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")
     return simulated(rig.controller, virtual_section(rig).grid_rate_hz, clock)
-
-
-def _pace(virtual: VirtualConfig) -> Pace:
-    match virtual.pace:
-        case "free":
-            return OnDemandPace()
-        case "wall":
-            return WallPace(virtual.speed)
 
 
 def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
