@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_187,
-    "analysis": 32_535,
+    "analysis": 32_532,
     "cli": 5_068,
     "extensions": 2_680,
     "gui": 12_466,

@@ -342,11 +342,8 @@ def _can_be_tracked(tracked: TrackedSpecimen, motion: PreparedMotion) -> bool:
     good = 0
     for first in firsts:
         begun = acquire(model, motion, int(first))
-        match begun:
-            case FilterState():
-                left = min(count, motion.samples - 1 - begun.sample)
-                run = run_filter(model, motion, begun, left, loss_limit=LOSS_LIMIT)
-                good += run.states.shape[0] == left and float(np.nanmean(run.squared)) < _FITTING_LEVEL
-            case str():
-                pass
+        if isinstance(begun, FilterState):
+            left = min(count, motion.samples - 1 - begun.sample)
+            run = run_filter(model, motion, begun, left, loss_limit=LOSS_LIMIT)
+            good += run.states.shape[0] == left and float(np.nanmean(run.squared)) < _FITTING_LEVEL
     return 2 * good > len(firsts)
