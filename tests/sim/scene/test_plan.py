@@ -28,7 +28,7 @@ def test_a_transient_within_the_window_is_integrated():
     undamped = plan_scene(Scene(gong2025(damping_time_s=0.0), QUIET))
     for plan in (short, undamped):
         assert plan.method is Method.EVENT_DRIVEN
-        assert "not forgotten" in plan.explain()
+        assert "has not decayed" in plan.explain()
 
 
 def test_a_force_at_every_p_is_always_integrated():
@@ -38,7 +38,7 @@ def test_a_force_at_every_p_is_always_integrated():
 @pytest.mark.parametrize(
     ("observable", "said"),
     [
-        (Observable.LYAPUNOV, "A tangent vector is carried for the exponent."),
+        (Observable.LYAPUNOV, "A tangent vector is computed for the exponent."),
         (Observable.SPECTRUM, "Samples are kept over the window"),
         (Observable.SCATTER, "for their scatter"),
     ],

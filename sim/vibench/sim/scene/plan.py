@@ -242,65 +242,65 @@ def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | 
 
 
 def _reason_of_closed_form(specimen: Specimen, motion: LinearMotion) -> str:
-    steady = "The steady motion is known in closed form; nothing is followed in time."
+    steady = "The steady motion has a closed form; nothing is integrated in time."
     if specimen.contact.kind == "linear":
         return f"There are no stops. {steady}"
     return (
-        f"No stop is ever touched: abs(p) stays below {motion.largest_p_m * MICROMETRES:.3g} um, "
-        f"transient and all, and the gap is {min(specimen.gaps_m) * MICROMETRES:.3g} um. {steady}"
+        f"No stop is touched: abs(p) stays below {motion.largest_p_m * MICROMETRES:.3g} um, "
+        f"transient included, and the gap is {min(specimen.gaps_m) * MICROMETRES:.3g} um. {steady}"
     )
 
 
 def _reason_to_integrate(specimen: Specimen, motion: LinearMotion, method: Method) -> str:
     if method is Method.POLYNOMIAL:
-        return "The force acts at every p: one adaptive method of order 8 follows the motion throughout."
+        return "The force acts at every p: the whole motion is integrated with steps of eight Gauss points."
     largest, gap = motion.largest_p_m * MICROMETRES, min(specimen.gaps_m) * MICROMETRES
     if never_touches(specimen, motion):
         return (
-            "No stop is ever touched, but the start is not forgotten before the window: "
-            "the motion is followed by exact flight."
+            "No stop is touched, but the transient has not decayed before the window: "
+            "the exact motion without contact is computed."
         )
     return (
         f"A stop may be touched: without stops abs(p) might reach {largest:.3g} um, "
         f"and the gap is {gap:.3g} um. "
-        "Flight between contacts is exact; contacts are resolved to the tolerance of the accuracy."
+        "Motion between contacts is exact; contacts are resolved to the tolerance of the accuracy."
     )
 
 
 def _carried_quantities(observe: tuple[Observable, ...]) -> list[str]:
     sentences = [
-        "A tangent vector is carried for the exponent."
+        "A tangent vector is computed for the exponent."
         if Observable.LYAPUNOV in observe
-        else "A tangent vector is carried only if the motion does not repeat, to tell what it is."
+        else "A tangent vector is computed only if the motion does not repeat, to classify it."
     ]
     if Observable.SPECTRUM in observe:
         sentences.append("Samples are kept over the window for the spectrum.")
     else:
-        sentences.append("No samples are kept but the states once a drive period.")
+        sentences.append("Only the states once per drive period are kept.")
     if Observable.SCATTER in observe:
         sentences.append(
-            f"The scene is run from {FEWEST - 1} more starts a millionth of the gap apart, for their scatter."
+            f"{FEWEST - 1} further starts, a millionth of the gap apart, are computed for their scatter."
         )
     return sentences
 
 
 def _refined(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
     return (
-        "A second start, a millionth of the gap away, is followed beside it at a stricter tolerance.",
-        "A motion that approaches a stable periodic one is completed by Newton's iteration.",
-        f"One that does not is observed over {duration.window_s:g} s, and compared with the second start's.",
-        "Where the two part, the start is forgotten: the answer is the mean over starts in that window.",
+        "A second start, a millionth of the gap away, is computed with a stricter tolerance.",
+        "If the motion approaches a stable periodic motion, Newton's iteration completes it.",
+        f"Otherwise it is observed over {duration.window_s:g} s and compared with the second start.",
+        "If both diverge, the motion depends sensitively on its start: the result is a mean over starts.",
         "Starts are added until the error or the time is reached.",
     )
 
 
 def _other_starts(budget_s: float) -> str:
     if budget_s == 0.0:
-        return "Whether the start decides which motion is reached is not looked for: there is no budget."
+        return "Other starts are not computed, because there is no budget."
     return (
-        "Another start, a millionth of the gap away, is followed beside it. If they part, or the motion is "
-        f"chaotic, the start is forgotten, and which motion is reached is chance: then {CLEAR} to {MOST} "
-        f"starts are followed, and chaos is followed on, for {budget_s:g} s of processor time at most."
+        "Another start, a millionth of the gap away, is computed too. If both diverge, or if the motion is "
+        f"chaotic, the final motion is random: then {CLEAR} to {MOST} starts are computed and chaos is "
+        f"continued, for at most {budget_s:g} s of processor time."
     )
 
 
@@ -308,12 +308,12 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
     window = f"{duration.window_s:g} s"
     match duration:
         case FixedDuration(duration_s=duration_s):
-            return f"The motion is followed for {duration_s:g} s, the last {window} observed."
+            return f"The motion is computed for {duration_s:g} s; the last {window} are observed."
         case AutomaticDuration(longest_s=longest_s):
             return (
-                "The motion is followed until it repeats, and observed over one of its periods; "
-                f"if it never does, over {window}; "
-                f"for {longest_s:g} s or {MOST_STATES} drive periods at most."
+                "The motion is computed until it repeats, and observed over one of its periods; "
+                f"if it never repeats, over {window}; "
+                f"for at most {longest_s:g} s or {MOST_STATES} drive periods."
             )
 
 

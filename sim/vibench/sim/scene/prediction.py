@@ -152,7 +152,7 @@ class Method(StrEnum):
     EVENT_DRIVEN = "event driven"
     """Exact flight from contact to contact; contacts resolved to the tolerance."""
     POLYNOMIAL = "polynomial"
-    """For a force at every p: one adaptive method of order 8 throughout."""
+    """For a force at every p: steps of eight Gauss points throughout."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
