@@ -69,7 +69,7 @@ def test_an_attendant_keeps_a_run_alive_and_reports_a_hanging_program(engine, sh
         hung_s = monotonic()
         print(file=program.stdin, flush=True)
         status = until_state(visitor, EngineState.READY)
-    assert "stands still" in status.rows[0].reason
+    assert "is blocked" in status.rows[0].reason
     assert monotonic() - hung_s > hung_patience_s(VIEWER_PATIENCE_S)
 
 
@@ -80,8 +80,8 @@ def test_an_attendant_is_silent_for_a_stopped_program(engine, shipped_rig, tmp_p
     with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
         os.kill(program.pid, signal.SIGSTOP)
         status = until_state(visitor, EngineState.READY)
-    assert "nobody has looked" in status.rows[0].reason
-    assert "stands still" not in status.rows[0].reason
+    assert "no viewer has" in status.rows[0].reason
+    assert "is blocked" not in status.rows[0].reason
 
 
 @pytest.mark.thorough
@@ -90,7 +90,7 @@ def test_an_attendant_ends_when_its_program_is_killed(engine, shipped_rig, tmp_p
     with attending(process) as (program, pid), running(process, shipped_rig, tmp_path) as visitor:
         program.kill()
         status = until_state(visitor, EngineState.READY)
-    assert "nobody has looked" in status.rows[0].reason
+    assert "no viewer has" in status.rows[0].reason
     clock = Event()
     for _ in range(500):
         if process_start(pid) is None:  # also where nobody has taken note of its end yet

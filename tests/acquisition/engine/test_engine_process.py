@@ -274,7 +274,9 @@ def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, cli
 class TestNobodyLooks:
     def test_an_attended_run_is_aborted_without_requests(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
-        events = kept(tmp_path / "run.h5", r"nobody has looked for \d+\.\d s")  # asks nothing meanwhile
+        events = kept(
+            tmp_path / "run.h5", r"no viewer has sent a request for \d+\.\d s"
+        )  # asks nothing meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
         messages = until_state(client, EngineState.READY).messages
         told = [message for message in messages if message.what.startswith("The viewer is gone")][-1]
@@ -374,7 +376,7 @@ class TestNobodyLooks:
             assert viewer.stdout.readline() == "running\n"
             viewer.send_signal(number)
             ended = "the program that started|" if number is signal.SIGKILL else ""
-            kept(tmp_path / "run.h5", f"{ended}nobody has looked")
+            kept(tmp_path / "run.h5", f"{ended}no viewer has")
         finally:
             viewer.kill()
             viewer.wait()

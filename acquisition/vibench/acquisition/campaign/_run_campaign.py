@@ -379,7 +379,7 @@ def _confirmed_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
     missing = [f"{knob.instrument} {knob.setting}" for knob in knobs if knob not in sheet.knobs]
     if missing:
         raise CheckFailed(
-            f"the bench came back with settings that nobody has confirmed: {', '.join(missing)}. Nothing was "
+            f"the reopened bench has unconfirmed settings: {', '.join(missing)}. Nothing was "
             "energised; look at them and resume the campaign"
         )
     return sheet

@@ -149,7 +149,7 @@ class _BlockReader:
             if block.first_sample != self._due:
                 raise DataLost(
                     f"the converter handed over sample {block.first_sample} where {self._due} was due: it "
-                    "loses samples while nothing else is asked of it. Look for what keeps the bus busy"
+                    "loses samples although nothing else uses it. Look for what keeps the bus busy"
                 )
             self._due += block.volts.shape[1]
             blocks.append(block.volts)

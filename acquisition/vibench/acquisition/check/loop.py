@@ -205,7 +205,7 @@ class LoopCheck:
     def _silence(self) -> Finding:
         volts = self._after[Role.DRIVE_VOLTAGE] * self._channels[Role.DRIVE_VOLTAGE].units_per_volt
         left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
-        advice = "the output says off and plays on: switch the amplifier off, and have what plays repaired"
+        advice = "the output reports off but plays: switch the amplifier off, and have the output repaired"
         return finding_of(
             DRIVE_LEFT,
             left,

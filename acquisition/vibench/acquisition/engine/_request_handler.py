@@ -303,9 +303,9 @@ class RequestHandler:
         granted_s = self._patience_s + LATE_FACTOR * max(0.0, self._late_s)
         alone_s = now_s - self._last_request_s
         if alone_s > granted_s:
-            self._act_alone(f"nobody has looked for {alone_s:.1f} s")
+            self._act_alone(f"no viewer has sent a request for {alone_s:.1f} s")
         elif self._still_s > hung_patience_s(granted_s):
-            self._act_alone(f"nobody has looked for {self._still_s:.1f} s: the window stands still")
+            self._act_alone(f"no viewer has responded for {self._still_s:.1f} s: the window is blocked")
 
     @property
     def continues_unattended(self) -> bool:

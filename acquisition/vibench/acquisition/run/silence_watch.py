@@ -111,7 +111,7 @@ def _row(channels: tuple[Channel, ...], role: Role) -> int:
     roles = [channel.role for channel in channels]
     if role not in roles:
         raise CheckFailed(
-            f"the rig has no {role.value} channel, without which nobody sees what the shaker gets. "
+            f"the rig has no {role.value} channel, which shows the signal that the shaker gets. "
             "Nothing was played; connect it and add it to daq.channels"
         )
     return roles.index(role)

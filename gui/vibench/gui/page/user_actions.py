@@ -115,7 +115,7 @@ class UserActions(QObject):
         return False
 
 
-_BUSY = "the last order is still being carried out"
+_BUSY = "the previous command is still running"
 _STANDS = {
     EngineState.CLOSED: "no bench is open",
     EngineState.OPENING: "the bench is being opened",

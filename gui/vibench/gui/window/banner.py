@@ -193,7 +193,7 @@ _BYTES_PER_SAMPLE = 4
 _LITTLE_ROOM_S = 3600.0
 
 
-ORDERED = "The last order is being carried out: limits, folder and instruments are being checked"
+ORDERED = "Limits, folder and instruments are being checked"
 
 
 def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a fact

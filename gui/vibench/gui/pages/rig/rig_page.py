@@ -165,7 +165,7 @@ class KnobSheetForm(QGroupBox):
 
     def _tick(self, knob: Knob) -> QCheckBox:
         text = f"{knob.instrument}: {knob.setting} at {knob.value}"
-        tick = tick_box(text, "Ticked: somebody has checked this setting", lambda _: self.changed.emit())
+        tick = tick_box(text, "Tick when you have checked this setting", lambda _: self.changed.emit())
         tick.setAccessibleName(f"{knob.instrument}: {knob.setting} is at {knob.value}")
         # Insert between the note and the name.
         self._layout.insertWidget(self._layout.count() - 1, tick)
@@ -221,9 +221,7 @@ class RigPage(Page):
         self.check_button = push_button(
             "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks", self._actions.check
         )
-        self.find_button = push_button(
-            "Find instruments", "List every instrument that can be seen", self._find
-        )
+        self.find_button = push_button("Find instruments", "List all instruments found", self._find)
         self.instruments = ReadTable(
             "Instruments",
             ("part", "what answered"),
