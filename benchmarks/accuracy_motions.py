@@ -264,16 +264,16 @@ class MotionBenchmark:
         quick, standard, reference = self.levels
         steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
         errors = f"{steps} in the state"
-        price = f"costs {reference.cost / quick.cost:.1f} times the first"
+        price = f"reference takes {reference.cost / quick.cost:.1f} times as long as quick"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
-                return f"Each level reduces the error: {errors}; the last {price}."
+                return f"Each level reduces the error: {errors}; {price}."
             case [Accuracy.STANDARD]:
-                return f"Only reference reduces the error: {errors}; the last {price}."
+                return f"Only reference reduces the error: {errors}; {price}."
             case [Accuracy.REFERENCE]:
-                return f"Standard reduces the error, reference does not: {errors}; the last {price}."
+                return f"Standard reduces the error, reference does not: {errors}; {price}."
             case _:
-                return f"No level reduces the error: {errors}; the last {price}."
+                return f"No level reduces the error: {errors}; {price}."
 
 
 def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
