@@ -231,13 +231,11 @@ class ScenePrediction:
         return _fields_of(self)
 
 
-_JSON_KEYS = {"requested_motion": "asked"}
-
-
 def _fields_of(
     value: ScenePrediction | Ensemble | FoundMotion | Share | EscapeRate | TargetReport,
 ) -> dict[str, object]:
-    return {_JSON_KEYS.get(each.name, each.name): _plain(getattr(value, each.name)) for each in fields(value)}
+    key = {"requested_motion": "asked"}
+    return {key.get(each.name, each.name): _plain(getattr(value, each.name)) for each in fields(value)}
 
 
 def _plain(value: object) -> object:  # noqa: PLR0911 - a row for each kind of value

@@ -130,9 +130,7 @@ NUMBERS = {
     "relative_i_error": Column("relative_i_error", REAL, "1", "relative error of relative_i, estimated"),
     "relative_ii_error": Column("relative_ii_error", REAL, "1", "relative error of relative_ii, estimated"),
     "error_estimate": Column("error_estimate", REAL, "1", "the largest of the four errors"),
-    "integration_error": Column(
-        "integration_error", REAL, "1", "part of the error that a stricter accuracy reduces"
-    ),
+    "integration_error": Column("integration_error", REAL, "1", "part reduced by a stricter accuracy"),
     "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
