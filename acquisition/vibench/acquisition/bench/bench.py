@@ -290,7 +290,7 @@ class Bench:
 
     @contextmanager
     def aimed(self, role: Role) -> Iterator["Bench"]:
-        """Yield the bench with the beam on the mass of ``role``; a virtual rig moves it there and back.
+        """Yield the bench with the beam on the mass of ``role``; a virtual rig then moves it back to m0.
 
         Raises ConfigurationError when the vibrometer of this rig cannot measure there.
         """

@@ -1,6 +1,7 @@
 """Transmission and phase over the points of a scan, at each resonance."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..frequency_response.request import MagnitudeScale
 from ..frequency_response.scan import Scan
@@ -16,7 +17,7 @@ def scan_figure(scan: Scan) -> style.DrawnFigure:
     """Draw the operating deflection shape at each resonance."""
     view, points = scan.analyses[0].request.view, scan.points
     places = np.arange(len(points))
-    columns: dict[str, object] = {
+    columns: dict[str, ArrayLike] = {
         "node": np.array(scan.nodes),
         **{f"{axis}_m": np.array([getattr(each, f"{axis}_m") for each in points]) for axis in "xyz"},
     }

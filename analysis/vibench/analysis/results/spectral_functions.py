@@ -18,7 +18,7 @@ from ..frequency_response.scan import scans_of
 from ..kinds.analyses import ANALYSES
 from ..kinds.noise import NOISE_FAMILY
 from ..recordings.facts import require_checked
-from ..signals.arrays import Complexes, Reals
+from ..signals.arrays import Reals
 from ..signals.quantity import Quantity
 from ..signals.window import hop_samples
 from ..spectra.spectra import DensitySums
@@ -102,7 +102,7 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
 
 def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
     """Return a function on the lines of the first point, from which a drift of the clocks moves its own."""
-    values: Complexes = np.interp(lines_hz, function.frequency_hz, function.values)
+    values = np.asarray(np.interp(lines_hz, function.frequency_hz, function.values), dtype=np.complex128)
     return replace(function, frequency_hz=lines_hz, values=values)
 
 
