@@ -98,6 +98,19 @@ def test_the_live_twin_reports_p_and_a_change_ends_the_run_if_planned(running, t
 
 
 @pytest.mark.thorough
+def test_the_live_twin_waits_while_a_scan_measures_another_mass(running):
+    """The engine's samples are then those of m2: taken for m0, they would look like another specimen."""
+    point = {"name": "tip", "body": "m2", "x_m": 0.0, "y_m": 0.0, "z_m": 0.04}
+    plan = campaign({}).model_dump(mode="json") | {"scan": [point]}
+    client = running(Campaign.model_validate(plan), twin=TwinSwitch.ON)
+    until(client, lambda status: status.twin is not None and status.twin.pid > 0 and status.samples > 0)
+    began = client.status().samples
+    status = until(client, lambda status: status.samples > began + 3 * 51_200)
+    assert [each.role for each in status.bench.channels][-1] == "m2_velocity"
+    assert status.twin.state == "waiting"
+
+
+@pytest.mark.thorough
 def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     client = running(campaign({}), twin=TwinSwitch.ON)
     pid = until(client, lambda status: status.twin is not None and status.twin.pid > 0).twin.pid

@@ -71,7 +71,7 @@ class _Following:
     def look(self) -> float:
         """Process and report new samples; return the waiting time before the next call [s]."""
         status = self.client.status()
-        if status.state not in DRIVING or status.run is None:
+        if status.state not in DRIVING or status.run is None or not _shows_m0(status):
             return IDLE_S
         if status.run_id != self.run_id:
             self._begin(status)
@@ -155,6 +155,11 @@ class _Following:
         )
 
 
+def _shows_m0(status: EngineStatus) -> bool:
+    """Return whether the vibrometer is on m0; a scan moves it."""
+    return status.bench is not None and "m0_velocity" in [each.role for each in status.bench.channels]
+
+
 def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the forecast and its errors, up to the largest displayed error; empty without a forecast."""
     if newest.forecast is None:
@@ -206,7 +211,7 @@ def _following(
     status = client.status()
     if status.bench is None:
         raise EngineError("the bench was closed before the twin could read it; start the twin again")
-    roles = [each.role for each in status.bench.channels]
+    roles = [each.role.value for each in rig.daq.channels]
     known_as = specimen_of(rig) if specimen is None else read_specimen(specimen).specimen()
     baseline = kept_baseline(baseline_path(rig, known_as))
     live = LiveTwin(

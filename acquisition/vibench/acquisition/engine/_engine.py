@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache, partial
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -27,7 +28,7 @@ from ..campaign import (
 from ..check.admission import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..plan import OnChange
-from ..rig import Confirm, Rig
+from ..rig import Confirm, Rig, Role, channels_of
 from ..stopping.program import stop_on_signal
 from ..stopping.stop import DRIVES_ON, Cause, StopSwitch
 from ._published_state import PublishedState
@@ -35,8 +36,8 @@ from ._status import BenchFacts, ChannelFacts, EngineState, Supervision, TwinPro
 from ._verbs import CampaignRequest
 
 
-def bench_facts(bench: Bench) -> BenchFacts:
-    """Return the description of an open bench for viewers."""
+def bench_facts(bench: Bench, role: Role | None = None) -> BenchFacts:
+    """Return the description of an open bench for viewers; in a scan with the vibrometer's ``role``."""
     return BenchFacts(
         rig_name=bench.rig.name,
         is_simulated=bench.rig.virtual is not None,
@@ -48,7 +49,7 @@ def bench_facts(bench: Bench) -> BenchFacts:
                 units_per_volt=channel.units_per_volt,
                 full_scale_v=channel.full_scale_v,
             )
-            for channel in bench.channels
+            for channel in channels_of(bench.rig if role is None else bench.rig.aimed(role))
         ),
         sample_rate_hz=bench.digitizer.sample_rate_hz,
     )
@@ -140,10 +141,11 @@ class Engine:
     ) -> tuple[PointResult, ...]:
         """Make the recordings of a campaign; see `run_campaign`, which calls the functions given here."""
         assert self._reconnecting is not None
-        facts = bench_facts(self.bench)
+        facts_at = cache(partial(bench_facts, self.bench))
+        roles = {name: each.point and each.point.role for name, each in request.campaign.recordings()}
 
         def tell(progress: CampaignProgress) -> None:
-            self.published.tell(progress, facts)
+            self.published.tell(progress, facts_at(roles.get(progress.name)))
 
         def ended(point_result: PointResult) -> None:
             self.published.note_result(point_result)

@@ -280,6 +280,7 @@ class PublishedState:
         self._file = progress.path
         self._overloads = 0
         self.sample_buffer.begin(len(bench.channels), bench.sample_rate_hz)
+        self._put(bench=bench)  # a scan gives the vibrometer's channel another role
         self._row(progress.name, "running", "", str(progress.path))
 
     def _row(self, name: str, state: str, reason: str, file: str) -> None:
