@@ -190,5 +190,7 @@ def weighted_alike(response: FrequencyResponse) -> FrequencyResponse:
 
 def without_bounds(found: Resonance) -> Resonance:
     """Return a resonance of unknown uncertainty."""
-    unknown = {f"sd_{name}": np.inf for name in ("frequency_hz", "damping_ratio", "peak_magnitude")}
-    return replace(found, **unknown, reduced_chi_square=np.nan, overlap=1.0)
+    return replace(
+        found, sd_frequency_hz=np.inf, sd_damping_ratio=np.inf, sd_peak_magnitude=np.inf,
+        reduced_chi_square=np.nan, overlap=1.0,
+    )  # fmt: skip

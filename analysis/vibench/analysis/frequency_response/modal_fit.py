@@ -295,7 +295,7 @@ class Lines:
     def modes(self, poles: Reals) -> Complexes:
         """Return the shapes of modes including leakage; see `mode_shapes`."""
         if self._leakage is None:
-            return mode_shapes(self.frequency_hz + self._off_hz, poles)
+            return mode_shapes(np.asarray(self.frequency_hz + self._off_hz), poles)
         columns = []
         for log_frequency, log_damping in poles.reshape(-1, 2):
             natural, damping = 2 * np.pi * np.exp(log_frequency), np.exp(log_damping)

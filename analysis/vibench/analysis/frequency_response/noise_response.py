@@ -344,7 +344,7 @@ def _response_to_hits(
         h1=by(Estimator.H1),
         h2=by(Estimator.H2),
         resonances=found,
-        base_level=NoiseDriveLevel(*band_hz, *motion.tolist(), relative_sd=np.nan),
+        base_level=NoiseDriveLevel(*band_hz, float(motion[0]), float(motion[1]), np.nan),
         bias=_bias(chosen, by(Estimator.DRIVE), found),
         periodic=None,
         used_s=spectra.count * size / rate,
