@@ -115,6 +115,8 @@ class Short:
     samples = 80
     response_delay_s = 0.0
 
+    is_force = False
+
     def response_gain(self, frequency_hz):
         return np.ones(frequency_hz.size)
 

@@ -19,6 +19,7 @@ class Endless:
 
     sample_rate_hz = RATE
     response_delay_s = 0.0
+    is_force = False
 
     def __init__(self, duration_s):
         self.samples = round(duration_s * RATE)
