@@ -27,6 +27,7 @@ from vibench.analysis.figures.sweep import regions_text, sweep_figure
 from vibench.analysis.figures.transmission import transmission_figure
 from vibench.analysis.figures.transmission_levels import transmission_levels_figure
 from vibench.analysis.recordings.checks import measurement_checks
+from vibench.analysis.report._drawings import sweep_findings
 from vibench.analysis.results.campaign_results import result_of
 from vibench.analysis.tables import plus_minus
 
@@ -136,6 +137,14 @@ def test_frequencies_above_a_sweep_lie_within_it(sweep_file):
     beyond = [each for each in top.xaxis.get_majorticklocs() if not low <= each <= high]
     places = top.transScale.transform([(each, 0.0) for each in (low - 10.0, *beyond, high + 10.0)])
     assert not np.isfinite(places[:, 0]).any(), f"{beyond} Hz are drawn at the ends of {low:g} to {high:g} Hz"
+
+
+def test_a_sweep_finding_says_sweep_once(sweep_file):
+    found = result(sweep_file, Simulation.LEFT_OUT)
+    (finding,) = sweep_findings(found)
+    rate = abs(found.analysis.response.sweep_rate_hz_per_s)
+    assert f" Hz at {rate:.3g} Hz/s: the masses collide from" in finding
+    assert f"The frequency was swept at {rate:.3g} Hz/s." in sweep_figure(found.analysis).caption
 
 
 def test_collisions_throughout_a_sweep_are_one_phrase(sweep_file):

@@ -115,7 +115,7 @@ def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
             f"{found.frequency_hz[-1]:.0f} Hz; the base moved by A0 = "
             f"{amplitudes[0]:.3g} µm at the beginning and {amplitudes[-1]:.3g} µm at the end."
         ),
-        f"The frequency was {analysis.rate_text}.",
+        f"The frequency was swept {analysis.rate_text}.",
         f"Grey: {regions_text(analysis.collisions)}.",
         f"Response II has {jumps_text(analysis.jumps)}.",
     ]

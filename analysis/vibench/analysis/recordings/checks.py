@@ -191,7 +191,7 @@ def _least_peak_v(facts: RecordingFacts) -> float:
 def _late(facts: RecordingFacts) -> Iterator[Check]:
     if facts.late:
         text = f"{facts.late[0]}; {len(facts.late)} such {'moment' if len(facts.late) == 1 else 'moments'}"
-        yield Check("Drive in time", Verdict.WARNING, text)
+        yield Check("Timing of the drive", Verdict.WARNING, text)
 
 
 def _ranges(facts: RecordingFacts) -> Iterator[Check]:

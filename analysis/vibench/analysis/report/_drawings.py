@@ -74,7 +74,7 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
     """Yield sentences on where the masses collide, measured and simulated."""
     plan = result.analysis.excitation
     yield (
-        f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz, "
+        f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz "
         f"{result.analysis.rate_text}: {regions_text(result.analysis.collisions)}."
     )
     if result.overlay is not None:

@@ -48,7 +48,7 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
     @property
     def rate_text(self) -> str:
         """Return the sweep rate, and the difference from steady responses if known."""
-        text = f"swept at {abs(self.response.sweep_rate_hz_per_s):.3g} Hz/s"
+        text = f"at {abs(self.response.sweep_rate_hz_per_s):.3g} Hz/s"
         more = self.response.steady_over_swept - 1
         if np.isnan(more) or self.collisions.regions:
             return text
