@@ -1,6 +1,7 @@
 """Analysis of a recorded dwell: its responses over the last seconds."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -85,17 +86,16 @@ def stroboscope(
     if drive.shape != response.shape:
         raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")
     sine = fit_sine(drive, sample_rate_hz, near_hz)
-    band = {
-        "low_hz": _LOWEST_ORDER * near_hz,
-        "high_hz": BAND_ABOVE * sample_rate_hz,
-        "lines_hz": [sine.frequency_hz],
-    }
-    displacement = converted_signal(
-        response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.DISPLACEMENT, **band
+    converted = partial(
+        converted_signal,
+        response,
+        sample_rate_hz,
+        given=Quantity.VELOCITY,
+        low_hz=_LOWEST_ORDER * near_hz,
+        high_hz=BAND_ABOVE * sample_rate_hz,
+        lines_hz=[sine.frequency_hz],
     )
-    velocity = converted_signal(
-        response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.VELOCITY, **band
-    )
+    displacement, velocity = converted(wanted=Quantity.DISPLACEMENT), converted(wanted=Quantity.VELOCITY)
     first = max(displacement.edge_samples, REACH)
     last = response.size - 1 - first
     per_sample = sine.frequency_hz / sample_rate_hz
