@@ -44,10 +44,10 @@ def _usual_again():
     UNITS.choose({})
 
 
-@pytest.fixture(scope="module")
-def full_window(lasting_window, record, wait_for, tmp_path_factory):
+@pytest.fixture
+def full_window(window, record, tmp_path, qtbot):
     """A window with displacements, velocities and accelerations on every page."""
-    pages, context = lasting_window.pages, lasting_window.context
+    pages, context = window.pages, window.context
     rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
     context.selection.choose_rig(rig)
     form = pages[TEST].form
@@ -70,7 +70,7 @@ def full_window(lasting_window, record, wait_for, tmp_path_factory):
         forecast_m=(), forecast_error_m=(), numbers=(("lower gap", "(44.001 ± 0.005) µm"),),
     )  # fmt: skip
     pages[RUN].hidden_motion.show_status(status.model_copy(update={"twin": twin}))
-    path = record(tmp_path_factory.mktemp("recordings"), "a")
+    path = record(tmp_path, "a")
     context.recording_requested.emit(path)
     frequency_hz = np.linspace(200.0, 300.0, 50)
     for name in ("model hertz, 5 µm", "model linear, 10 to 20 µm"):
@@ -86,8 +86,8 @@ def full_window(lasting_window, record, wait_for, tmp_path_factory):
         SettledMotion(260.0, 5e-6, said, shown, shown, shown, (4.5e-5, 4.5e-5), shown * 1e7, shown)
     )
     pages[QUEUE].open_file(shipped("campaigns/paper.toml"))
-    wait_for(lambda: bool(pages[FILES].time_histories.plots))
-    return lasting_window
+    qtbot.waitUntil(lambda: bool(pages[FILES].time_histories.plots), timeout=60_000)
+    return window
 
 
 def choose_units(window, units):
@@ -181,10 +181,10 @@ def test_lists_are_read_in_the_displayed_unit(qtbot):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
-def test_chosen_units_are_kept_after_a_restart(full_window):
+def test_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
     choose_units(full_window, OTHERS)
     UNITS.choose({})
-    again = AppContext(Settings(full_window.context.folder.parent / "window.ini"))
+    again = AppContext(Settings(tmp_path / "window.ini"))
     assert tuple(UNITS.chosen.values()) == tuple(OTHERS.values())
     again.background.close()
 
