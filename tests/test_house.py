@@ -13,12 +13,12 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_310,
-    "analysis": 32_994,
+    "analysis": 32_734,
     "cli": 5_076,
     "extensions": 2_712,
     "gui": 12_467,
     "native": 6_625,
-    "sim": 20_404,
+    "sim": 20_863,
     "studies": 3_182,
     "virtual_rig": 7_746,
 }

@@ -172,9 +172,9 @@ def _encoding(path: Path) -> str:
         return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
-    # Text has no zero bytes, except in UTF-16 in half of the places.
-    zeros = [_share_of_zeros(head[place::2]) for place in (0, 1)]
-    if max(zeros) > _MANY_ZEROS and min(zeros) == 0.0:
+    # Text has no zero bytes, except in UTF-16 in nearly every other place.
+    zeros = [2 * head[place::2].count(0) / max(len(head), 1) for place in (0, 1)]
+    if max(zeros) > 0.9 and min(zeros) == 0.0:
         return "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"
     if max(zeros) > 0.0:
         raise ValueError(
@@ -185,14 +185,6 @@ def _encoding(path: Path) -> str:
     except UnicodeDecodeError:
         return "latin-1"
     return "utf-8-sig"
-
-
-_MANY_ZEROS = 0.9
-"""Share of zeros among every other byte of tables in UTF-16, whose characters are nearly all ASCII."""
-
-
-def _share_of_zeros(raw: bytes) -> float:
-    return raw.count(0) / max(len(raw), 1)
 
 
 def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:

@@ -106,7 +106,7 @@ def converted_signal(
     for line_hz in (each for each in lines_hz if low_hz <= each <= high_hz):
         line = _steady_line(rest, line_hz / sample_rate_hz)
         rest = rest - line.real
-        steady += (line * derivative_factor(np.array([line_hz]), given, wanted)).real
+        steady += (line * complex(derivative_factor(np.array(line_hz), given, wanted))).real
     spectrum = fft.rfft(scipy.signal.detrend(rest), padded)
     spectrum[0] = 0.0
     spectrum[1:] *= derivative_factor(frequency_hz[1:], given, wanted)
