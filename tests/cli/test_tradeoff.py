@@ -22,6 +22,7 @@ def test_the_curve_of_a_scene_has_the_chosen_and_the_other_methods(answered, tmp
         (("--amplitude", 5e-6), "a scene needs both --amplitude and --frequency"),
         (("--frequency", 100), "a scene needs both --amplitude and --frequency"),
         (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0"),
+        (("--amplitude", 5e-6, "--frequency", -1), "--frequency was given as -1.0"),
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
     ],
 )

@@ -32,6 +32,7 @@ _OTHER_NAMES = {
     "lengths": "cells",
     "models": "model",
     "amplitudes_m": "amplitude",
+    "frequencies_hz": "frequency",
     "gaps_m": "gap",
     "damping_times_s": "damping-time",
 }

@@ -32,9 +32,8 @@ def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]
 
     def print_lines() -> None:
         while not ending.wait(interval_s):
-            if bars.tasks:
-                elapsed_s = bars.tasks[0].elapsed or 0.0
-                bars.console.print(f"progress: {progress_line(bars)}, after {elapsed_s:.0f} s")
+            if tasks := bars.tasks:
+                bars.console.print(f"progress: {progress_line(bars)}, after {tasks[0].elapsed or 0:.0f} s")
 
     thread = Thread(target=print_lines, name="progress lines", daemon=True)
     thread.start()

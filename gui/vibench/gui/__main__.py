@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
         try:
             load_rig(options.bench)
         except ConfigurationError as error:
-            sys.stderr.write(f"{printable(str(error))}\n")
+            sys.stderr.write(f"error: {printable(str(error))}\n")
             return NO_WINDOW
     starting = _sign_of_life()
     from .window.open_window import open_window  # noqa: PLC0415

@@ -150,6 +150,7 @@ def test_a_bench_that_is_missing_is_refused_before_a_window_opens(tmp_path, caps
     assert main(["--bench", str(tmp_path / "missing.toml")]) == NO_WINDOW
     said = capsys.readouterr().err
     assert "missing.toml" in said
+    assert said.startswith("error: ")
     assert len(said.splitlines()) == 1
 
 
