@@ -259,7 +259,17 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
-    """Return labels and units from one heading row, or from one row each; empty texts if there are none."""
+    """Return labels and units from one heading row, or from one row each; empty texts if there are none.
+
+    Raises ValueError for a row with too few units, which may belong to any columns.
+    """
+    for line in head:
+        cells = [each.strip() for each in layout.cells(line.strip())]
+        if 1 < len(cells) < layout.columns and all(cells) and _are_units(cells):
+            raise ValueError(
+                f"its line {line.strip()!r} has {len(cells)} units for {layout.columns} columns; give each "
+                "column a unit, such as - where there is none"
+            )
     rows = [row for line in head if any(row := _row(line, layout))]
     named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]
     labels, units = named[-1], next((row for row in reversed(rows) if _are_units(row)), [""] * layout.columns)
