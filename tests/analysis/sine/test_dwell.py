@@ -38,7 +38,7 @@ def test_responses_of_a_linear_motion_are_its_amplitude_ratio():
     assert result.drive.distortion < 1e-9
 
 
-@pytest.mark.parametrize("samples_per_period", [16, 49.0 / 3.0])
+@pytest.mark.parametrize("samples_per_period", [6.5, 7, 8, 9, 10, 16, 49.0 / 3.0])
 def test_the_largest_displacement_is_found_between_samples(samples_per_period):
     drive_hz = RATE / samples_per_period
     drive, base, velocity = dwell(

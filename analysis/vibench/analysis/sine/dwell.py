@@ -190,6 +190,8 @@ _LOWEST_ORDER = 0.1
 """High-pass for displacement relative to the drive frequency, above drift and hum."""
 _BAND_ABOVE = 0.33
 """Low-pass relative to the sample rate."""
+_HIGHEST_ORDER = 0.45
+"""Frequency of the highest order relative to the sample rate; aliases cannot be told from lower orders."""
 _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
 """Band relative to the sample rate that contains only vibrometer noise, above modes and impacts."""
@@ -331,6 +333,8 @@ def dwell_response(
         response.size, disturbed_samples(sample_rate_hz, _LOWEST_ORDER * near_hz), sample_rate_hz, window_s
     )
     level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
+    highest = _HIGHEST_ORDER * sample_rate_hz / level.frequency_hz
+    orders = tuple(order for order in orders if order <= highest)
     displacement = converted_signal(
         response,
         sample_rate_hz,
