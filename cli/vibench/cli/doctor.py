@@ -28,14 +28,14 @@ FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = {
     STATE_VARIABLE: "folder for locks, bench checks and learnt costs; by default the user's own",
-    LOCK_VARIABLE: "folder that shows all users of a computer which bench is in use; by default /tmp",
+    LOCK_VARIABLE: "folder of the locks that all users of a computer share; by default /tmp",
     TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
     KEY_VARIABLE: "key file for signing the seals of recordings",
-    "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
-    "MALLOC_MMAP_THRESHOLD_": "size of arrays that background processes return at once on Linux [bytes]; "
-    "4 MiB if absent",
-    "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
-    "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
+    "OPENBLAS_NUM_THREADS": "threads of linear algebra; default 1, because the matrices are small",
+    "MALLOC_MMAP_THRESHOLD_": "size above which background processes on Linux return memory at once [bytes]; "
+    "default 4 MiB",
+    "QT_QPA_PLATFORM": "Qt's platform plug-in; 'offscreen' without a display",
+    "PYQTGRAPH_QT_LIB": "Qt binding of the plots; default PySide6",
 }
 """The environment variables of vibench and their meaning: docs/installation.md."""
 SECRET = frozenset({TOKEN_VARIABLE})

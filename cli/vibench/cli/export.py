@@ -62,8 +62,8 @@ def export(
     if recording.is_dir():
         if not spectra or to is not Format.UFF or channels or results or (from_s, to_s) != (None, None):
             raise InvalidRequest(
-                f"{recording} is a folder, which is exported with --to uff --spectra, and with --out and "
-                "--quantity if needed; give these, or one recording"
+                f"{recording} is a folder; give a recording (vibench catalogue lists them). The folder "
+                "of a scan is exported by --to uff --spectra, with --out and --quantity if needed"
             )
         place = recording.resolve()
         request = FrequencyResponseRequest(

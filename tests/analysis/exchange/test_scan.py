@@ -113,7 +113,7 @@ def test_a_later_attempt_replaces_the_earlier_and_repetitions_are_separate_scans
 
 def test_a_folder_without_a_scan_is_refused(folder, tmp_path):
     run = CliRunner().invoke(app, ["export", str(folder), "--to", "csv"])
-    assert "is a folder, which is exported with --to uff --spectra" in str(run.exception)
+    assert "The folder of a scan is exported by --to uff --spectra" in str(run.exception)
     run = CliRunner().invoke(app, ["export", str(tmp_path), "--to", "uff", "--spectra"])
     assert "holds no recording" in str(run.exception)
 

@@ -20,7 +20,7 @@ def test_following_samples_equals_integration(amplitude_m):
     followed = follow_samples(gong2025(), drive, Accuracy.REFERENCE)
     duration_s = (len(drive.displacement_m) - 1) / RATE_HZ
     whole = integrate(gong2025(), drive, duration_s, Accuracy.REFERENCE, sample_rate_hz=RATE_HZ)
-    assert followed.states.shape == (followed.asked, 6)
+    assert followed.states.shape == (followed.requested, 6)
     assert np.sum(followed.impacts) == whole.impacts.count
     # Both cut intervals alike but join the pieces in another order; chaos magnifies the rounding.
     near = slice(0, 4000)
@@ -49,5 +49,5 @@ def test_an_overflowing_motion_stops_at_its_last_sample():
     samples = np.zeros(1000)
     samples[500:] = 1e280
     followed = follow_samples(gong2025(), Sampled(samples, RATE_HZ))
-    assert len(followed.states) < followed.asked
+    assert len(followed.states) < followed.requested
     assert np.all(np.isfinite(followed.states[:400]))

@@ -95,7 +95,11 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     if method is Method.CLOSED_FORM:
         return in_closed_form(scene, motion, question)
     begun = _Begun(scene, method, motion, question)
-    begun.follow()
+    if begun.course.way is not None:
+        begun.course.way.follow()
+    chaos = begun.course.watch()
+    if chaos is not None:
+        chaos.follow()
     return begun.answer(one_by_one)
 
 
@@ -212,7 +216,9 @@ def solve_ensemble(
     if method is Method.CLOSED_FORM:
         return None
     begun = _Begun(scene, method, motion, Question.ANSWER)
-    begun.follow()
+    one_by_one([begun.course.way] if begun.course.way is not None else [])
+    chaos = begun.course.watch()
+    one_by_one([chaos] if chaos is not None else [])
     seen = begun.course.seen()
     if begun.run.outcome is not Outcome.REACHED_END:
         return None
@@ -316,14 +322,6 @@ class _Begun:
                     alone_s=ALONE * scene.budget_s if is_answer else math.inf,
                     by_itself_s=math.inf if is_answer else 0.0,
                 )
-
-    def follow(self) -> None:
-        """Follow the motion to its end by itself."""
-        if self.course.way is not None:
-            self.course.way.follow()
-        chaos = self.course.watch()
-        if chaos is not None:
-            chaos.follow()
 
     def answer(self, follow: Follow) -> ScenePrediction:
         """Return the result of the motion; ``follow`` follows other starts."""

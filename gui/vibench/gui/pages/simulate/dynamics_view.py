@@ -166,6 +166,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._begin = push_button(
             "Find", "Compute the request of the form in another process", self.begin, "first"
         )
+        self.simulator.cancel_button.setText("Cancel")  # Alt+C is taken by another tab of the page
         return row((self._begin, 1), self.simulator.cancel_button)
 
     def _right(self) -> QWidget:
