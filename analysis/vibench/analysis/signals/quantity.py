@@ -104,7 +104,7 @@ def converted_signal(
     frequency_hz = fft.rfftfreq(padded, 1 / sample_rate_hz)
     rest, steady = samples, np.zeros(samples.size)
     for line_hz in (each for each in lines_hz if low_hz <= each <= high_hz):
-        line = _steady_line(rest, line_hz / sample_rate_hz)
+        line = steady_line(rest, line_hz / sample_rate_hz)
         rest = rest - line.real
         steady += (line * complex(derivative_factor(np.array(line_hz), given, wanted))).real
     spectrum = fft.rfft(scipy.signal.detrend(rest), padded)
@@ -115,11 +115,15 @@ def converted_signal(
     return ConvertedSignal(result + steady, sample_rate_hz, wanted, low_hz, high_hz, edge)
 
 
-def _steady_line(samples: Reals, cycles_per_sample: float) -> Complexes:
-    """Return the line of a signal at a frequency, rotating, shape (samples,); its real part is the signal."""
-    turn = np.exp(2j * np.pi * cycles_per_sample * np.arange(samples.size))
+def steady_line(samples: Reals, cycles_per_sample: float, beyond: int = 0) -> Complexes:
+    """Return the rotating line of a signal at a frequency; its real part is the line in the signal.
+
+    The line is continued by ``beyond`` samples at both ends: shape (samples + 2 beyond,).
+    """
+    turn = np.exp(2j * np.pi * cycles_per_sample * np.arange(-beyond, samples.size + beyond))
     taper = np.hanning(samples.size)
-    return np.asarray(turn * (2 * np.vdot(turn, taper * samples) / max(np.sum(taper), 1.0)))
+    part = turn[beyond : beyond + samples.size]
+    return np.asarray(turn * (2 * np.vdot(part, taper * samples) / max(np.sum(taper), 1.0)))
 
 
 def disturbed_samples(sample_rate_hz: float, low_hz: float) -> int:

@@ -374,8 +374,8 @@ def dwell_response(
     return DwellResponse(
         drive=level,
         window_s=window_s,
-        response_i=float(np.max(sizes_with_maxima(displacement.samples)[window][is_clear]))
-        / level.amplitude_m,
+        # Outside the window a step may be continued by a copy, whose joint would disturb the interpolation.
+        response_i=float(np.max(sizes_with_maxima(motion)[is_clear])) / level.amplitude_m,
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,
         noise_source=noise.source,

@@ -34,7 +34,9 @@ from ..errors import NotEnoughData
 from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Integers, Reals
+from ..signals.quantity import steady_line
 from ..tables import Labelled, columns, plus_minus
+from ..tones.sine_fit import fit_sine
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
@@ -118,16 +120,19 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
-    # Outside the step, frequency or level differed, and integration would mix that in.
+    # Outside the step, frequency or level differed, and integration would mix that in. The sine is continued
+    # exactly, and the rest by copies.
+    line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).real
+    data[-1] -= line[edge:-edge]
     places = _continuation_samples(data, rate / near_hz, edge)
-    drive, base, response = data[:, places]
+    drive, base, rest = data[:, places]
     bridged = channels.bridged(stretch.start, stretch.stop)[places]
     if np.mean(clear_of_dropouts(bridged, rate, near_hz)[edge:-edge]) < LEAST_CLEAR:
         return None
     return dwell_response(
         drive,
         base,
-        response,
+        rest + line,
         rate,
         near_hz=near_hz,
         window_s=min(plan.record_s, data.shape[1] / rate),
