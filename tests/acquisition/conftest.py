@@ -25,6 +25,7 @@ from vibench.acquisition.rig import (
     channels_of,
     load_rig,
 )
+from vibench.acquisition.stopping.stop import DRIVES_ON
 
 SAMPLE_RATE_HZ = 5120.0
 Fault = Callable[[], BaseException]
@@ -349,6 +350,13 @@ class LoopbackBench:
     def idle(self, duration_s: float) -> None:
         """Let time pass at once."""
         self.idled_s += duration_s
+
+
+@pytest.fixture(autouse=True)
+def no_drive_left_on() -> None:
+    """Forget drives of earlier tests whose silence could not be confirmed, as a new process would."""
+    DRIVES_ON.begin(None)
+    DRIVES_ON.confirm_silence(None)
 
 
 @pytest.fixture(scope="session")
