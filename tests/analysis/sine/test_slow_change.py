@@ -160,7 +160,7 @@ def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
     part = synthetic.Part("step", 1.0, 2.0, {"frequency_hz": hz, "direction": "up"})
     synthetic.write_recording(tmp_path, plan, motion, velocity + drift, [part], name="drift")
     (result,) = analyse_files([tmp_path / "drift.h5"], "steps", Simulation.LEFT_OUT).results
-    assert result.analysis.response.response_i[0] == pytest.approx(1.0, abs=2e-4)
+    assert result.analysis.response.response_i[0] == pytest.approx(1.0, abs=2e-5)
 
 
 @pytest.mark.thorough

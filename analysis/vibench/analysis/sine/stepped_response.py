@@ -115,24 +115,25 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     data = channels.read(stretch.start, stretch.stop)
     if np.isnan(data).any():
         return None
-    # Sensor drift would be a jump where the record is continued, and integration amplifies it.
-    data[-1] = scipy.signal.detrend(data[-1])
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
+    line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).real
+    inside = line[edge:-edge]
+    # Sensor drift would be a jump where the record is continued, and integration amplifies it.
+    data[-1] = scipy.signal.detrend(data[-1] - inside) + inside
     # Outside the step, frequency or level differed, and integration would mix that in. The sine is continued
     # exactly, and the rest by copies.
-    line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).real
-    data[-1] -= line[edge:-edge]
     places = _continuation_samples(data, rate / near_hz, edge)
-    drive, base, rest = data[:, places]
+    drive, base, response = data[:, places]
+    response += line - inside[places]
     bridged = channels.bridged(stretch.start, stretch.stop)[places]
     if np.mean(clear_of_dropouts(bridged, rate, near_hz)[edge:-edge]) < LEAST_CLEAR:
         return None
     return dwell_response(
         drive,
         base,
-        rest + line,
+        response,
         rate,
         near_hz=near_hz,
         window_s=min(plan.record_s, data.shape[1] / rate),
