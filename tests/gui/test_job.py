@@ -382,7 +382,7 @@ def test_an_error_message_disappears_when_its_request_is_fulfilled(bench, qtbot)
     assert bench.strip.is_said
     bench.user_actions.arm_test()
     bench.user_actions.start()
-    assert "is still being carried out" in bench.strip.notices[-1].what
+    assert "the previous command is still running" in bench.strip.notices[-1].what
     reach(qtbot, bench, EngineState.ARMED)
     assert not bench.strip.is_said
     bench.user_actions.disarm()
