@@ -197,7 +197,7 @@ def test_a_command_moves_the_beam_in_silence_and_may_refuse_a_point(kept, tmp_pa
 
 
 def test_without_a_command_a_real_rig_is_held_for_the_operator(coarse, tmp_path):
-    """The rig is that of another program, so that nothing here can move its beam."""
+    """Another program serves the rig, so nothing here can move its beam."""
     asked, switch = [], StopSwitch()
     with VirtualRig(coarse) as virtual:
         real = coarse.model_copy(
