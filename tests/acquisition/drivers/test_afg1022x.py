@@ -12,7 +12,7 @@ from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
 from vibench.virtual_rig.generator.channel_output import OPEN_AMPLITUDE_RANGE_VPP, RunMode
-from vibench.virtual_rig.generator.scpi_instrument import Quirks
+from vibench.virtual_rig.generator.scpi_instrument import Quirks, ScpiSocket
 
 SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)
 
@@ -155,6 +155,19 @@ class TestPlaying:
         assert held.tolist() == generator.codes.codes.tolist()
         volts = (held / 8191.5 - 1) * generator.panel_vpp / 2
         assert np.max(np.abs(volts - 0.25 * (values - values.mean()))) < 0.5 / 16383 + 0.5e-4
+
+    def test_a_waveform_with_newline_bytes_passes_a_socket(self, plugged):
+        with ScpiSocket(plugged.instrument) as socket:
+            config = plugged.config.model_copy(update={"resource": socket.resource_name})
+            generator = AFG1022X.open(config)
+            generator.load_waveform(np.linspace(-1, 1, 8192), 2.0, 0.5)
+            held = plugged.instrument.memory.codes("EMEM")
+            assert b"\n" in held.tobytes()
+            assert held.tolist() == generator.codes.codes.tolist()
+            with pytest.raises(InstrumentError, match="more than 300 bytes"):
+                generator.query("DATA:DATA? EMEM")
+            assert generator.query("OUTP1?") == "0"
+            generator.close()
 
     def test_an_uneven_waveform_keeps_its_volts_when_the_amplitude_changes(self, plugged, generator):
         values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])

@@ -19,6 +19,7 @@ class Instrument:
 
     def __init__(self, **answers):
         self.timeout = 3000.0
+        self.read_termination = None
         self.answers = {name.replace("_", " "): list(replies) for name, replies in answers.items()}
         self.errors = deque()
         self.written = []

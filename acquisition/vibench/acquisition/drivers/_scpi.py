@@ -117,10 +117,7 @@ class ScpiInstrument:
     def query_codes(self, message: str) -> Codes:
         """Return a big-endian binary block of 16-bit codes."""
         reply = self._ask(message, _LONGEST_REPLY)
-        try:
-            first, length = pyvisa.util.parse_ieee_block_header(reply, len(reply))
-        except ValueError:
-            length = -1
+        first, length = _block(reply)
         if length < 0:
             raise InstrumentError(
                 f"{self.name}: {message} was answered without a binary block ({reply[:20]!r}); try again"
@@ -191,6 +188,9 @@ class ScpiInstrument:
             self._reply_due = True
             self._link.write(message)
             reply = self._link.read_bytes(longest + 1, break_on_termchar=True)
+            # On a stream, a newline byte among the codes ends a read too.
+            while self._link.read_termination and len(reply) <= min(sum(_block(reply)), longest):
+                reply += self._link.read_bytes(longest + 1 - len(reply), break_on_termchar=True)
             if len(reply) > longest:
                 raise InstrumentError(
                     f"{self.name}: {message} was answered by more than {longest} bytes; check its address, "
@@ -209,7 +209,8 @@ class ScpiInstrument:
                 with self._report_losses("resuming the dialogue"):
                     usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
                     try:
-                        self._link.read_bytes(_LONGEST_REPLY, break_on_termchar=True)
+                        is_stream = bool(self._link.read_termination)  # its codes may have newline bytes
+                        self._link.read_bytes(_LONGEST_REPLY, break_on_termchar=not is_stream)
                     except pyvisa.VisaIOError as error:
                         if error.error_code != _LATE:
                             raise
@@ -233,6 +234,14 @@ class ScpiInstrument:
                 f"{self.name} is gone: {doing!r} failed ({error}). Its output state is unknown; "
                 "check its cable and power, then open the bench again"
             ) from error
+
+
+def _block(reply: bytes) -> tuple[int, int]:
+    """Return the start and the length of the data of a binary block; (0, -1) for other replies."""
+    try:
+        return pyvisa.util.parse_ieee_block_header(reply, 0) if reply.startswith(b"#") else (0, -1)
+    except ValueError:
+        return 0, -1
 
 
 # Settings as declarations: assigning one sends it, reads it back, and keeps the instrument's value. This
