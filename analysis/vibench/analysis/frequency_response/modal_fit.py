@@ -340,6 +340,43 @@ class ModalFit:
         )
 
 
+class _Sums:
+    """Sums of modes and a background at lines, with real factors fitted for given poles."""
+
+    def __init__(self, lines: Lines, background: Background) -> None:
+        self._lines = lines
+        self.target, self.behind = (
+            lines.independent(each) for each in (lines.value, background(lines.frequency_hz))
+        )
+
+    def basis(self, poles: Reals) -> Reals:
+        """Return the shapes of all modes and of the background."""
+        return np.hstack((self._lines.independent(self._lines.modes(poles)), self.behind))
+
+    def factors(self, poles: Reals) -> tuple[Reals, Reals, Reals]:
+        """Return the best factors, the residual, and an orthonormal basis of the shapes."""
+        onto, size, turn = np.linalg.svd(self.basis(poles), full_matrices=False)
+        kept = size > np.finfo(np.float64).eps * onto.shape[0] * size[0]
+        onto, along = onto[:, kept], onto[:, kept].T @ self.target
+        return turn[kept].T @ (along / size[kept]), self.target - onto @ along, onto
+
+    def pole_rates(self, poles: Reals, factors: Reals) -> Reals:
+        """Return the derivatives of a sum by each pole, with fixed factors."""
+        return self._lines.independent(_rates(self._lines.modes, poles, factors))
+
+    def misfit(self, poles: Reals) -> Reals:
+        """Return the residual."""
+        return self.factors(poles)[1]
+
+    def misfit_rates(self, poles: Reals) -> Reals:
+        """Return the derivatives of the residual by each pole."""
+        # Without the terms in which the factors follow the poles: they leave the gradient unchanged
+        # (Kaufman 1975, BIT 15, 49-57).
+        factors, _, onto = self.factors(poles)
+        rates = self.pole_rates(poles, factors)
+        return np.asarray(onto @ (onto.T @ rates) - rates)
+
+
 def modal_fit(
     band: FrequencyResponse, lines: Lines, start: Reals, reach: Reals, background: Background
 ) -> ModalFit | None:
@@ -359,26 +396,16 @@ def modal_fit(
     background
         Shapes to add to the modes.
     """
-    target, behind = lines.independent(lines.value), lines.independent(background(lines.frequency_hz))
-
-    def basis(poles: Reals) -> Reals:
-        return np.hstack((lines.independent(lines.modes(poles)), behind))
-
-    def factors(poles: Reals) -> tuple[Reals, Reals]:
-        columns = basis(poles)
-        found = np.asarray(np.linalg.lstsq(columns, target, rcond=None)[0], dtype=np.float64)
-        return found, np.asarray(target - columns @ found)
-
+    sums = _Sums(lines, background)
+    freedom = sums.target.size - 2 * start.size - sums.behind.shape[1]
+    if freedom < 1:
+        return None
     top = np.tile([np.inf, np.log(LARGEST_DAMPING)], start.size // 2)
-
     low, high = start - reach, np.minimum(start + reach, np.maximum(top, start + 1e-6))
-
-    def misfit(poles: Reals) -> Reals:
-        return factors(poles)[1]
-
     result = scipy.optimize.least_squares(
-        misfit,
+        sums.misfit,
         start,
+        jac=sums.misfit_rates,
         bounds=(low, high),
         x_scale=reach / 20,
         xtol=1e-9,
@@ -388,13 +415,12 @@ def modal_fit(
     poles = np.asarray(result.x, dtype=np.float64)
     if not result.success or np.any(np.minimum(poles - low, high - poles) < _EDGE * reach):
         return None
-    found, left = factors(poles)
+    found, left, _ = sums.factors(poles)
     # Joint Jacobian and covariance of poles and factors.
-    follows = np.hstack((_rates(lambda moved: basis(moved) @ found, poles), basis(poles)))
+    follows = np.hstack((sums.pole_rates(poles, found), sums.basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
-    freedom = left.size - follows.shape[1]
     # If the factor of a mode is exactly zero, its pole is undetermined.
-    if freedom < 1 or not np.diag(curvature).all() or _condition(curvature) > _WORST_CONDITION:
+    if not np.diag(curvature).all() or _condition(curvature) > _WORST_CONDITION:
         return None
     squares = lines.squares(left)
     chi_square = float(np.sum(squares)) / freedom
@@ -430,7 +456,8 @@ def modal_fit(
             fine_hz = np.clip(np.linspace(top_hz[0] - reach_hz, top_hz[0] + reach_hz, _FINE_POINTS), *ends_hz)
             top_hz = fine_hz[[int(np.argmax(np.abs(curve(fine_hz, poles) @ found)))]]
         value = curve(top_hz, poles) @ found
-        changes = np.hstack((_rates(lambda moved: curve(top_hz, moved) @ found, poles), curve(top_hz, poles)))
+        moved = _rates(lambda poles: mode_shapes(top_hz, poles), poles, found)
+        changes = np.hstack((moved, curve(top_hz, poles)))
         along = np.real(np.conj(value / np.abs(value))[:, None] * changes)[0]
         return Resonance(
             frequency_hz=natural_hz,
@@ -466,7 +493,14 @@ def _condition(curvature: Reals) -> float:
     return float(np.linalg.cond(curvature / np.outer(size, size)))
 
 
-def _rates(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
-    """Return the derivatives of a shape by each pole, by central differences."""
-    steps = _STEP * np.eye(poles.size)
-    return np.stack([(shape(poles + step) - shape(poles - step)) / (2 * _STEP) for step in steps], axis=-1)
+def _rates(shapes: Callable[[Reals], Complexes], poles: Reals, factors: Reals) -> Complexes:
+    """Return the derivatives of a sum of modes by each pole, by central differences.
+
+    Each pole changes the two shapes of its own mode only.
+    """
+    rates = []
+    for each in range(poles.size):
+        pair = slice(each // 2 * 2, each // 2 * 2 + 2)
+        step = _STEP * np.eye(2)[each % 2]
+        rates.append((shapes(poles[pair] + step) - shapes(poles[pair] - step)) @ factors[pair] / (2 * _STEP))
+    return np.stack(rates, axis=-1)
