@@ -28,9 +28,11 @@ excitation = {{ kind = "dwell", amplitude_vpp = 1, frequency_hz = 20, duration_s
 [[channels]]
 source = "{first}"
 role = "drive_voltage"
+scale = 1
 [[channels]]
 source = "{second}"
 role = "m0_velocity"
+scale = 1
 """
 TEXT = frozenset({".csv", ".txt", ".unv"})
 NAMES = {

@@ -190,7 +190,7 @@ def test_wav_samples_are_fractions_of_full_scale(tmp_path, dtype, full):
     fractions = np.clip(signals()[0], -0.9, 0.9)
     stored = (fractions * full).astype(dtype)
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), np.stack((stored, -stored), axis=1))
-    meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 10.0"), ("2", "m0_velocity", ""))
+    meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 10.0"), ("2", "m0_velocity", "scale = 1.0"))
     _, values = imported(tmp_path / "a.wav", meaning)
     exact = stored.astype(float) / full
     np.testing.assert_allclose(values, np.stack((10 * exact, -exact)), rtol=0, atol=1e-8)
@@ -201,7 +201,7 @@ def test_wav_of_24_bits_keeps_every_bit(tmp_path):
     with wave.open(str(tmp_path / "a.wav"), "wb") as file:
         file.setparams((1, 3, int(RATE_HZ), 0, "NONE", ""))
         file.writeframes(counts.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3].tobytes())
-    _, values = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")))
+    _, values = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0")))
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
 
 

@@ -24,15 +24,15 @@ def signal(times):
     return np.stack((np.cos(phase), 30.0 * np.sin(phase), 0.5 * np.cos(phase + 1.0)))
 
 
-def imported(path, names=("u", "a", "v")):
-    """Return the samples of a file, lost ones as NaN."""
+def imported(path, names=("u", "a", "v"), **more):
+    """Return the samples of a file, lost ones as NaN; ``more`` are keys of its channels."""
     plan = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 37, "settle_s": 0, "duration_s": 0.5}
     roles = ("drive_voltage", "base_acceleration", "m0_velocity")
     content = {
         "started_utc": "2026-03-01T12:00:00Z",
         "sample_rate_hz": RATE_HZ,
         "measurement": {"name": "m", "excitation": plan},
-        "channels": [{"source": name, "role": role} for name, role in zip(names, roles, strict=True)],
+        "channels": [{"source": name, "role": role, **more} for name, role in zip(names, roles, strict=True)],
     }
     made = import_recording(path, validated(content, ImportMapping, "test"), path.with_name("made.h5"))
     with open_recording(made) as recording:
@@ -189,3 +189,122 @@ def test_motion_of_a_universal_file_without_labels_is_in_its_stated_length(tmp_p
         made = pyuff.prepare_58(binary=0, data=scale * row, x=TIMES, id1=name, **kinds, **axes, **about)
         pyuff.UFF(str(path)).write_sets([made], "add")
     is_right(imported(path))
+
+
+def to_tdms(path, channels):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(path) as writer:
+        objects = [
+            nptdms.ChannelObject("G", name, values, facts) for name, (values, facts) in channels.items()
+        ]
+        writer.write_segment(objects)
+    return tuple(f"G/{name}" for name in channels)
+
+
+def to_hdf5(path, channels):
+    with h5py.File(path, "w") as file:
+        for name, (values, facts) in channels.items():
+            file.create_dataset(name, data=values).attrs.update(facts)
+    return tuple(f"/{name}" for name in channels)
+
+
+def to_mat(path, channels):
+    savemat(path, {name: {"y": values, **facts} for name, (values, facts) in channels.items()})
+    return tuple(f"{name}.y" for name in channels)
+
+
+def to_mat73(path, channels):
+    """Write structs as MATLAB does in HDF5: texts are codes of letters."""
+    with h5py.File(path, "w") as file:
+        for name, (values, facts) in channels.items():
+            group = file.create_group(name)
+            group["y"] = np.atleast_2d(values)
+            for fact, value in facts.items():
+                codes = [[ord(letter)] for letter in value] if isinstance(value, str) else [[value]]
+                group.create_dataset(fact, data=np.array(codes, "u2" if isinstance(value, str) else "f8"))
+                group[fact].attrs["MATLAB_class"] = np.bytes_("char" if isinstance(value, str) else "double")
+    return tuple(f"/{name}/y" for name in channels)
+
+
+WRITERS = {".tdms": to_tdms, ".h5": to_hdf5, ".mat": to_mat, "73.mat": to_mat73}
+
+
+def with_facts(tmp_path, suffix, values, facts):
+    """Write volts, acceleration and velocity with the facts of each; return the import as a function."""
+    path = tmp_path / f"facts{suffix}"
+    channels = dict(zip("uav", zip(values, facts, strict=True), strict=True))
+    names = WRITERS[suffix](path, channels)
+    return lambda **more: imported(path, names, **more)
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("word", ["unit", "EU", "engineering_unit", "PhysicalUnit", "y_units", "Einheit"])
+def test_a_unit_under_any_usual_name_is_applied(tmp_path, suffix, word):
+    volts, acceleration, velocity = signal(TIMES)
+    units = [{word: unit} for unit in ("V", "g", "mm/s")]
+    is_right(with_facts(tmp_path, suffix, (volts, acceleration / G, 1000 * velocity), units)())
+
+
+def test_a_unit_of_one_variable_is_not_applied_to_others(tmp_path):
+    values = dict(zip("uav", signal(TIMES), strict=True)) | {"a": signal(TIMES)[1] / G, "a_unit": "g"}
+    savemat(tmp_path / "a.mat", values)
+    is_right(imported(tmp_path / "a.mat"))
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize("name", ["wf_xunit_string", "x_unit"])
+def test_an_increment_has_the_unit_of_its_axis(tmp_path, suffix, name):
+    in_ms, in_hz = ([{"wf_increment": 1e3 / RATE_HZ, name: unit}] * 3 for unit in ("ms", "Hz"))
+    is_right(with_facts(tmp_path, suffix, signal(TIMES), in_ms)())
+    with pytest.raises(InvalidRequest, match=r"axis in 'Hz' instead of times.*time = \"even\""):
+        with_facts(tmp_path, suffix, signal(TIMES), in_hz)()
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+@pytest.mark.parametrize(
+    "facts",
+    [
+        ({}, {}, {"t0": 0.0025}),
+        ({"delay": 0.0}, {"delay": 0.0}, {"delay": 0.0025}),
+        ({}, {}, {"trigger_time": "12:00:00.0025"}),
+        ({"first_sample": 0.0}, {"first_sample": 0.0}, {"first_sample": 13.0}),
+        tuple({"start_time": f"01/03/2026 12:00:0{second}"} for second in (0, 0, 1)),
+    ],
+)
+def test_starts_that_cannot_be_compared_are_refused(tmp_path, suffix, facts):
+    imported_with = with_facts(tmp_path, suffix, signal(TIMES), facts)
+    with pytest.raises(
+        InvalidRequest, match=r"(give delay_s|states when some channels start).*time = \"even\""
+    ):
+        imported_with()
+    if "t0" not in facts[2]:
+        imported_with(delay_s=0.001)
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_counts_need_a_scale(tmp_path, suffix):
+    scales = np.array([1e-4, 1e-2, 1e-4])
+    counts = np.rint(signal(TIMES) / scales[:, None]).astype(np.int16)
+    with pytest.raises(InvalidRequest, match=r"counts without a unit.*V per count as scale"):
+        with_facts(tmp_path, suffix, counts, [{}] * 3)()
+    units = [
+        {"unit": unit, "conversion": scale} for unit, scale in zip(("V", "m/s2", "m/s"), scales, strict=True)
+    ]
+    with pytest.raises(InvalidRequest, match=r"conversion = 0.0001.*give scale"):
+        with_facts(tmp_path, suffix, counts, units)()
+    samples = with_facts(tmp_path, suffix, counts, [{}] * 3)(scale=1.0) * scales[:, None]
+    np.testing.assert_allclose(samples, signal(TIMES), atol=0.006)
+
+
+def test_units_behind_the_functions_of_a_universal_file_apply_to_them(tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    file = pyuff.UFF(str(tmp_path / "a.uff"))
+    axis = {"abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": 1 / RATE_HZ}
+    kinds = {"abscissa_spec_data_type": 17, "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0}
+    nodes = {"rsp_node": 1, "rsp_dir": 1, "ref_node": 1, "ref_dir": 1}
+    for kind, factor, values in zip((0, 12, 11), (1, 1000, 1000), signal(TIMES), strict=True):
+        own = {"ordinate_spec_data_type": kind, "x": TIMES, "data": factor * values, "id1": "c"}
+        file.write_sets({"type": 58, "func_type": 1, **axis, **kinds, **nodes, **own}, "add")
+    units = {"units_code": 5, "length": 1000.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
+    file.write_sets({"type": 164, "units_description": "mm", "temp_mode": 1, **units}, "add")
+    is_right(imported(tmp_path / "a.uff", ("1", "2", "3")))

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from vibench.acquisition import shortened
+
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._mapping import ImportMapping
@@ -36,6 +38,14 @@ _START = re.compile(
     r"(?:(?:(?:wf|time|t|x)[ _]?)?start(?:ing)?(?:[ _]?(?:time|offset|value))?|[tx]_?0"
     rf"|(?:time|t)[ _]?offset){_UNIT}",
     re.IGNORECASE,
+)
+_SHIFT = re.compile(
+    r"(?:.*[ _])?(?:delay|latency|skew|lag|(?:pre|post)?[ _]?trigger|(?:first|offset)[ _]?sample|sample"
+    r"[ _]?offset|begin)(?:[ _].*)?",
+    re.IGNORECASE,
+)
+_AXIS_UNIT = re.compile(
+    r"(?:(?:wf|x|abscissa|axis|time|d?t)[ _]?)+units?(?:[ _]?(?:strings?|labels?|names?))?", re.IGNORECASE
 )
 _TIME = re.compile(
     rf"(?:(?:x|rel|relative|elapsed)[ _]?)?(?:times?|zeit|temps|t|sec|seconds|sekunden)"
@@ -73,26 +83,43 @@ _LONGEST_PAUSE = 10
 """Largest ratio of the time span, in sample intervals, to the samples; more means wrong times."""
 
 
-def stated_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]:
-    """Return the first sample rate that the facts state (nearest fact first), and any contradiction.
+def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a `SourceChannel` that facts state of times, from facts with the nearest first.
 
-    A fact is a rate or an interval; its name may end with the unit: ``"dt_ms"``, ``"Sample rate [kHz]"``.
+    A fact is a rate, an interval, a start, or the unit of one; a name may end with the unit: ``"dt_ms"``,
+    ``"Sample rate [kHz]"``.
     """
-    rates_hz = list(_rates_hz(facts))
+    facts = tuple(facts)
+    units = {name.strip().casefold(): _text(value).strip() for name, value in facts if "unit" in name.lower()}
+    axis = next((unit for name, unit in units.items() if _AXIS_UNIT.fullmatch(name)), "")
+    rates_hz = list(_rates_hz(facts, units, axis))
     other = next((each for each in rates_hz if not agrees(each, (rates_hz[0], rates_hz[0]))), None)
     trouble = "" if other is None else f"says {rates_hz[0]:.9g} and {other:.9g} samples/s"
-    return (rates_hz[0] if rates_hz else None), trouble
+    if axis.casefold() not in SECONDS:
+        trouble = f"has an axis in {axis!r} instead of times"
+    return {
+        "sample_rate_hz": rates_hz[0] if rates_hz else None,
+        "time_trouble": trouble,
+        "start_s": stated_start_s(facts),
+        "shifts": tuple(
+            (name, _text(value))
+            for name, value in facts
+            if _SHIFT.fullmatch(name.strip()) or (_START.fullmatch(name.strip()) and _moment(value) is None)
+        ),
+    }
 
 
-def _rates_hz(facts: Iterable[tuple[str, Any]]) -> Iterator[float]:
+def _rates_hz(facts: Iterable[tuple[str, Any]], units: Mapping[str, str], axis: str) -> Iterator[float]:
     for name, value in facts:
         number, unit = _number(value)
         if not 0 < number < inf:
             continue
+        named = (f"{name.strip().casefold()}{end}" for end in ("_unit", "_units", " unit", " units"))
+        unit = unit or next((units[each] for each in named if each in units), "")
         if found := _RATE.fullmatch(name.strip()):
             yield number * _HERTZ.get((found["unit"] or unit).casefold(), 1.0)
         elif found := _INTERVAL.fullmatch(name.strip()):
-            bounds = rate_bounds(number, 0.0, found["unit"] or unit)
+            bounds = rate_bounds(number, 0.0, found["unit"] or unit or axis)
             yield from () if bounds is None else bounds[:1]
 
 
@@ -121,11 +148,20 @@ def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
         number, unit = _number(value)
         if isfinite(number):
             offsets_s.append(number * SECONDS.get((found["unit"] or unit).casefold(), 1.0))
-        else:
-            with suppress(ValueError):
-                moment = datetime.fromisoformat(_text(value).strip())
-                moments_s.append((moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp())
+        elif (moment_s := _moment(value)) is not None:
+            moments_s.append(moment_s)
     return sum((*moments_s[:1], *offsets_s[:1])) if moments_s or offsets_s else None
+
+
+def _moment(value: Any) -> float | None:
+    """Return a number or an ISO date as a number of seconds; None for other texts."""
+    number, _ = _number(value)
+    if isfinite(number):
+        return number
+    with suppress(ValueError):
+        moment = datetime.fromisoformat(_text(value).strip())
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    return None
 
 
 def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | None":
@@ -133,7 +169,9 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
 
     Any channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
     """
-    found, unit = _TIME.fullmatch(channel.label.strip()), channel.unit.casefold()
+    found = _TIME.fullmatch(channel.label.strip())
+    # Climate and Forecast conventions, 4.4: "seconds since 2026-03-01".
+    unit = re.sub(r"\s+since\s.*", "", channel.unit.casefold())
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or unit in _NO_UNITS else None
     is_named = found is not None and unit in SECONDS
@@ -147,12 +185,12 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
         scan.add(block)
     axis = scan.axis()
     if found is not None and is_named:
-        return replace(axis, unit=channel.unit or found["unit"] or "", is_named=True)
+        return replace(axis, unit=unit or found["unit"] or "", is_named=True)
     if axis.interval == 1:
         return replace(axis, unit=None)
     # Numbers under another name may have any unit, so the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
-    return replace(axis, unit=channel.unit if unit in SECONDS else "", uncertainty=uncertainty)
+    return replace(axis, unit=unit if unit in SECONDS else "", uncertainty=uncertainty)
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
@@ -428,6 +466,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
                 f"{path.name} {each.time_trouble} ({each.name}); export it again, or {_IGNORE}"
             )
     rate_hz = _rate_hz(placed, mapping, path)
+    _require_one_shift(placed, mapping, path)
     offsets = _offsets(placed, rate_hz, path)
     cut = [
         tuple(replace(one, place=one.place + round(offset)) for one in pieces(each))
@@ -543,12 +582,30 @@ def _same(rates_hz: Sequence[float], samples: int) -> bool:
     )
 
 
+def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> None:
+    """Raise InvalidRequest if channels differ in a stated delay or start that cannot be interpreted."""
+    unclear = [
+        each
+        for each, mapped in zip(channels, mapping.channels, strict=True)
+        if "delay_s" not in mapped.model_fields_set
+    ]
+    for first, each in pairwise(unclear):
+        if differing := sorted({*first.shifts} ^ {*each.shifts}):
+            said = ", ".join(f"{name} = {shortened(value)}" for name, value in differing)
+            raise InvalidRequest(
+                f"{path.name} states {said} for {first.name} and {each.name}, which may shift their times; "
+                f"give delay_s of both in the mapping, or {_IGNORE}"
+            )
+
+
 def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> list[float]:
     """Return the start of each channel after the first one, in sample intervals."""
     known = {each.start_s: each for each in channels if each.start_s is not None}
-    if len(known) < 2 or (max(known) - min(known)) * rate_hz < _APART / 100:
-        return [0.0 for _ in channels]
     unknown = [each.name for each in channels if each.start_s is None]
+    # Channels without a stated start begin at zero, if that is where the others begin.
+    stated = (*known, 0.0) if unknown else tuple(known)
+    if not known or (max(stated) - min(stated)) * rate_hz < _APART / 100:
+        return [0.0 for _ in channels]
     if unknown:
         raise InvalidRequest(
             f"{path.name} states when some channels start, but not {', '.join(unknown)}; choose "

@@ -16,7 +16,7 @@ from typing import TextIO
 import numpy as np
 
 from ..signals.arrays import Reals
-from ._alignment import UNITS, stated_rate_hz, stated_start_s
+from ._alignment import UNITS, stated_times
 from ._clock_times import ClockTimes
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel, TableSource
@@ -140,9 +140,7 @@ Facts = Sequence[tuple[str, float]]
 
 
 def _channel(name: str, samples: int, label: str, unit: str, own: Facts, shared: Facts) -> SourceChannel:
-    rate_hz, trouble = stated_rate_hz((*own, *shared))
-    start_s = stated_start_s(own)
-    return SourceChannel(name, samples, label, rate_hz, unit, start_s=start_s, time_trouble=trouble)
+    return SourceChannel(name, samples, label, unit=unit, **stated_times((*own, *shared)))
 
 
 def _may_be_grouped(column: Reals) -> bool:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,14 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz, stated_start_s
-from ._source_channel import SourceChannel, scale_among, unit_among
+from ._alignment import stated_times
+from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
 """HDF5's message for a truncated file."""
-EXACT_KINDS = {"i": 4, "u": 2}
-"""Most bytes of signed and unsigned integers that a recording can store exactly."""
-
+MOST_LETTERS = 1000
+"""Longest text of MATLAB that is read."""
 
 Facts = tuple[tuple[str, Any], ...]
 
@@ -94,44 +93,43 @@ def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
 def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
     known: dict[str, Facts] = {}
     for dataset in (item for _, item in walk(file) if _holds_samples(item)):
-        facts = (*dataset.attrs.items(), *_facts(dataset.parent, known))
-        rate_hz, trouble = stated_rate_hz(facts)
-        values = {"sample_rate_hz": rate_hz, "time_trouble": trouble, "start_s": stated_start_s(facts)}
+        beside = _facts(dataset.parent, known)
+        times = stated_times((*dataset.attrs.items(), *beside, *_facts_above(dataset.parent, known)))
         if dataset.ndim == 1:
-            yield _channel(dataset, dataset.name, dataset.shape[0], 0, values), _Place(dataset.name, None)
+            channel = _channel(dataset, dataset.name, dataset.shape[0], 0, beside)
+            yield replace(channel, **times), _Place(dataset.name, None)
             continue
         has_time_first = dataset.shape[0] >= dataset.shape[1]
         samples, rows = dataset.shape if has_time_first else dataset.shape[::-1]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
-            yield _channel(dataset, name, samples, row, values), _Place(dataset.name, row, has_time_first)
+            channel = _channel(dataset, name, samples, row, beside)
+            yield replace(channel, **times), _Place(dataset.name, row, has_time_first)
 
 
 def _holds_samples(item: h5py.HLObject) -> bool:
     return (
         isinstance(item, h5py.Dataset)
         and item.dtype.kind in "iuf"
+        and item.attrs.get("MATLAB_class") not in {b"char", b"logical"}
         and item.ndim in {1, 2}
         and min(item.shape) > 0
         and max(item.shape) >= FEWEST_SAMPLES
     )
 
 
-def _channel(
-    dataset: h5py.Dataset, name: str, samples: int, place: int, values: Mapping[str, Any]
-) -> SourceChannel:
-    scale = abs(_number(dataset, "scale_factor", 1.0))
-    is_exact = dataset.dtype.itemsize <= EXACT_KINDS.get(dataset.dtype.kind, 0)
-    is_exact = is_exact and _number(dataset, "add_offset", 0.0) == 0.0
+def _channel(dataset: h5py.Dataset, name: str, samples: int, place: int, beside: Facts) -> SourceChannel:
+    own = tuple(dataset.attrs.items())
+    step = exact_step(dataset.dtype) if _number(dataset, "add_offset", 0.0) == 0.0 else None
+    scale = scale_among((*own, *beside), are_counts=step is not None)
     return SourceChannel(
         name=name,
         samples=samples,
         label=name.rsplit("/", 1)[-1],
-        unit=unit_among(dataset.attrs.items(), place),
-        stated_scale="" if "scale_factor" in dataset.attrs else scale_among(dataset.attrs.items()),
-        step=scale if is_exact else None,
+        unit=unit_among(own, place) or unit_among(beside, place, dataset.name.rsplit("/", 1)[-1]),
+        stated_scale="" if "scale_factor" in dataset.attrs else scale,
+        step=None if step is None else step * abs(_number(dataset, "scale_factor", 1.0)),
         origin=_origin(dataset.file),
-        **values,
     )
 
 
@@ -142,14 +140,37 @@ def _origin(file: h5py.File) -> Origin | None:
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Return named attributes and single values of a group and then of its parents."""
+    """Return named attributes, texts and single values of a group."""
     if group.name not in known:
         hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
         items = [(name, group[name]) for name in hard]
-        single = [(name, one[()]) for name, one in items if isinstance(one, h5py.Dataset) and one.size == 1]
-        around = () if group.name == "/" else _facts(group.parent, known)
-        known[group.name] = (*group.attrs.items(), *single, *around)
+        single = [(name, _value(one)) for name, one in items if isinstance(one, h5py.Dataset)]
+        known[group.name] = (
+            *group.attrs.items(),
+            *((name, value) for name, value in single if value is not None),
+        )
     return known[group.name]
+
+
+def _facts_above(group: h5py.Group, known: dict[str, Facts]) -> Facts:
+    """Return the facts of the groups that contain a group, the nearest first."""
+    if group.name == "/":
+        return ()
+    return (*_facts(group.parent, known), *_facts_above(group.parent, known))
+
+
+def _value(dataset: h5py.Dataset) -> Any:
+    """Return a single value, or texts of MATLAB (codes of letters, in cells references to them)."""
+    if dataset.size > MOST_LETTERS or dataset.size == 0:
+        return None
+    match dataset.attrs.get("MATLAB_class"):
+        case b"char":
+            rows = np.atleast_2d(dataset[()].T)
+            return np.array(["".join(map(chr, row)).strip() for row in rows])
+        case b"cell":
+            cells = [_value(dataset.file[each]) for each in np.ravel(dataset[()]) if each]
+            return np.array([str(np.ravel(each)[0]) for each in cells if each is not None])
+    return dataset[()] if dataset.size == 1 else None
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:

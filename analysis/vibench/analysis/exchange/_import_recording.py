@@ -220,6 +220,12 @@ def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:
             f"{name} says {found.stated_scale} for {found.name}, and not whether this was applied to its "
             "numbers; give scale in the mapping"
         )
+    if found.are_counts and not (found.unit or mapped.file_unit) and mapped.scale is None:
+        what, one = ("counts", "count") if found.full_scale is None else ("fractions of full scale", "1")
+        raise InvalidRequest(
+            f"{name} has {what} without a unit for {found.name}; give {unit} per {one} as scale in the "
+            "mapping"
+        )
     full_scale = mapped.full_scale or found.full_scale
     return ChannelHeader(
         role=mapped.role,

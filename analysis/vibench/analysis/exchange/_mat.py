@@ -21,11 +21,11 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz, stated_start_s
+from ._alignment import stated_times
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
-from ._source_channel import SourceChannel, TableSource, scale_among, unit_among
+from ._source_channel import SourceChannel, TableSource, exact_step, scale_among, unit_among
 
 # The elements of a MATLAB 5 file are checked first, because scipy's reader crashes on wrong types.
 #
@@ -214,20 +214,36 @@ def _numbers(
     struct: Mapping[str, Any], prefix: str, around: tuple[tuple[str, Any], ...]
 ) -> Iterator[tuple[SourceChannel, Any]]:
     # Some programs store start and increment in a struct beside the values.
-    own = {**struct, **(axis if isinstance(axis := struct.get("x_values"), dict) else {})}
+    axis, quantity = _part(struct, "x_values"), _part(struct, "quantity")
+    labels = {"x_unit": _part(axis, "quantity").get("label", ""), "unit": quantity.get("label", "")}
+    own = {**{name: label for name, label in labels.items() if label}, **struct, **axis}
+    own |= _part(quantity, "unit_transformation")
     facts = (*((name, value) for name, value in own.items() if np.size(value) == 1), *around)
-    start_s = stated_start_s(facts)
-    rate_hz, trouble = stated_rate_hz(facts)
-    scale = "" if "scale_factor" in struct else scale_among(facts)
+    times = stated_times(facts)
     for name, value in struct.items():
         match value:
             case dict():
                 yield from _numbers(value, f"{prefix}{name}.", facts)
             case np.ndarray() if _holds_samples(value):
+                step = exact_step(value.dtype)
+                scale = scale_among(facts, are_counts=step is not None)
                 for place, (channel, row) in enumerate(_channels(f"{prefix}{name}", value)):
-                    unit = unit_among(struct.items(), place)
-                    with_unit = replace(channel, unit=unit, stated_scale=scale, sample_rate_hz=rate_hz)
-                    yield replace(with_unit, start_s=start_s, time_trouble=trouble), row
+                    yield (
+                        replace(
+                            channel,
+                            unit=unit_among(own.items(), place, name),
+                            step=step,
+                            stated_scale="" if "scale_factor" in struct else scale,
+                            **times,
+                        ),
+                        row,
+                    )
+
+
+def _part(struct: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return a struct inside a struct; empty if there is none."""
+    part = struct.get(name)
+    return part if isinstance(part, dict) else {}
 
 
 def _holds_samples(values: np.ndarray[Any, Any]) -> bool:

@@ -12,6 +12,8 @@ from vibench.acquisition.recording import Origin
 
 from ..signals.arrays import Reals
 
+EXACT_KINDS = {"i": 4, "u": 2}
+"""Most bytes of signed and unsigned integers that a recording can store exactly."""
 LEAST_INTERVAL_S = 1e-100
 """Shortest accepted interval between samples, so that its inverse is finite."""
 SECONDS = {
@@ -41,30 +43,54 @@ def text_of(raw: bytes) -> str:
         return raw.decode("latin-1")
 
 
-_UNIT = re.compile(r"(?:ni[ _]?)?(?:y[ _]?)?units?(?:[ _]?(?:labels?|strings?|names?|descriptions?))?", re.I)
+_UNIT = re.compile(
+    r"(?:(?:ni|y|eng(?:ineering)?\.?|phys(?:ical)?|meas(?:ure(?:d|ment)?)?|channel|data|signal|sensor|values?"
+    r"|ordinate|display)[ _.-]?)*units?(?:[ _.-]?(?:y|labels?|strings?|names?|descriptions?|texts?))?"
+    r"|eu|einheit(?:en)?|unit[e\u00e9]s?",
+    re.I,
+)
 _SCALE = re.compile(
     r"scale|scaling|(?:(?:scal\w*|cal\w*)[ _]?)?factor|gain|slope|lsb|(?:volts?|v)[ _]?per[ _]?\w+", re.I
 )
 
 
-def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0) -> str:
-    """Return the stated unit, or the one at a place of a list of units; empty if there is none."""
-    for name, value in facts:
-        if _UNIT.fullmatch(name) and (units := np.ravel(value)).size and units.dtype.kind in "SUO":
+_COUNT_SCALE = re.compile(
+    rf"{_SCALE.pattern}|sens\w*|conv\w*|mult\w*|resol\w*|calib\w*|coeff\w*|sf|c1|to_\w+|units?_per_\w+", re.I
+)
+
+
+def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0, label: str = "") -> str:
+    """Return the stated unit, or the one at a place of a list of units; empty if there is none.
+
+    ``LABEL_unit`` is the unit of the channel of that label only.
+    """
+    own = re.compile(rf"{re.escape(label)}[ _.-]?units?", re.I)
+    for name, value in sorted(facts, key=lambda fact: own.fullmatch(fact[0]) is None):
+        is_unit = _UNIT.fullmatch(name) or (label and own.fullmatch(name))
+        if is_unit and (units := np.ravel(value)).size and units.dtype.kind in "SUO":
             unit = units[place if units.size > 1 and place < units.size else 0]
             # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
             return text_of(unit if isinstance(unit, bytes) else str(unit).encode("utf-8", "surrogateescape"))
     return ""
 
 
-def scale_among(facts: Iterable[tuple[str, Any]]) -> str:
-    """Return a stated scale, such as ``"gain = 0.001"``, that may or may not be applied to the numbers."""
+def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -> str:
+    """Return a stated scale, such as ``"gain = 0.001"``, that may or may not be applied to the numbers.
+
+    A sensitivity or calibration is usually applied, except to integers.
+    """
+    scale = _COUNT_SCALE if are_counts else _SCALE
     for name, value in facts:
-        if _SCALE.fullmatch(name) and np.size(value) == 1 and np.ravel(value).dtype.kind in "iuf":
+        if scale.fullmatch(name) and np.size(value) == 1 and np.ravel(value).dtype.kind in "iuf":
             number = float(np.ravel(value)[0])
             if number != 1.0:
                 return f"{name} = {number:.6g}"
     return ""
+
+
+def exact_step(dtype: np.dtype[Any]) -> float | None:
+    """Return the step of integers that can be stored exactly; None for other numbers."""
+    return 1.0 if dtype.itemsize <= EXACT_KINDS.get(dtype.kind, 0) else None
 
 
 @dataclass(frozen=True)
@@ -95,9 +121,16 @@ class SourceChannel:
     time_unit: str | None = None
     """Unit of the channel's times, empty if not stated; None without times."""
     stated_scale: str = ""
-    """Scale in the file that may not be applied to its numbers; empty if there is none."""
+    """Scale stated in the file, which its numbers may or may not include; empty if there is none."""
+    shifts: tuple[tuple[str, str], ...] = ()
+    """Facts that may shift its times in an unknown way, such as a delay: names and values."""
     time_trouble: str = ""
     """Contradiction in the file's time information; empty if there is none."""
+
+    @property
+    def are_counts(self) -> bool:
+        """Whether its numbers are counts, or fractions of a full scale."""
+        return self.step == 1.0 or self.full_scale is not None
 
     @property
     def rates_hz(self) -> tuple[float, float]:

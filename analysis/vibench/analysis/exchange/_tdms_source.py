@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import restarts, stated_rate_hz, stated_start_s
-from ._source_channel import SourceChannel, scale_among, unit_among
+from ._alignment import restarts, stated_start_s, stated_times
+from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
@@ -96,22 +96,26 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
     own = channel.properties
     paths = (channel.path, file[channel.group_name].path, "/")
     facts = [fact for path in paths for each in statements.get(path, {}).values() for fact in each]
-    rate_hz, trouble = stated_rate_hz(facts)
+    times = stated_times((*own.items(), *facts))
     starts_s = {
         first: start_s
         for first, each in (statements[channel.path] if own else {}).items()
         if (start_s := stated_start_s(each)) is not None and first < len(channel)
     }
-    runs, jumps = restarts(starts_s, rate_hz, len(channel))
+    runs, jumps = restarts(starts_s, times["sample_rate_hz"], len(channel))
+    step = exact_step(channel.dtype)
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
         samples=len(channel),
         label=channel.name,
-        sample_rate_hz=rate_hz,
+        step=step,
         unit="s" if channel.dtype.kind == "M" else unit_among(own.items()),
-        stated_scale=scale_among(own.items()),
-        start_s=next(iter(starts_s.values()), stated_start_s(own.items())),
+        stated_scale=scale_among(own.items(), are_counts=step is not None),
         start_error_s=START_ERROR_S,
         runs=runs,
-        time_trouble=trouble or jumps,
+        **times
+        | {
+            "start_s": next(iter(starts_s.values()), times["start_s"]),
+            "time_trouble": times["time_trouble"] or jumps,
+        },
     )

@@ -197,7 +197,8 @@ def open_uff(path: Path) -> Iterator[UffSource]:
 
 
 def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
-    number, length = 0, "m"
+    found: list[tuple[list[str], str, _Body | None]] = []
+    length = first = ""
     while line := file.readline():
         if line.strip() != DELIMITER.strip().encode():
             continue
@@ -206,15 +207,17 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
             begin, _, factors = file.tell(), _line(file), _line(file)
             per_metre = _real(factors[:25]) or 1.0
             length = LENGTHS.get(round(per_metre, 2), f"m/{per_metre:g}")
+            first = first or length
             file.seek(begin)
         if kind[:6].strip() != "58":
             _skip_text(file)
             continue
-        number += 1
         header = [_line(file) for _ in range(HEADER_LINES)]
-        body = _body(file, kind, header)
+        found.append((header, length, _body(file, kind, header)))
+    for number, (header, length, body) in enumerate(found, start=1):
         if body is not None:
-            yield _channel(number, header, length), body
+            # Units may also follow the functions.
+            yield _channel(number, header, length or first), body
 
 
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
@@ -269,7 +272,7 @@ def _channel(number: int, header: list[str], length: str) -> SourceChannel:
     unit, start, increment = header[7][46:66].strip(), _real(header[6][30:43]), _real(header[6][43:56])
     second = SECONDS.get(unit.casefold())
     # Without a unit label, motion is in the units of dataset 164.
-    motion = MOTIONS.get(_whole(header[8][:10]), "") if length != "m" else ""
+    motion = MOTIONS.get(_whole(header[8][:10]), "") if length else ""
     return SourceChannel(
         name=str(number),
         samples=int(header[6][10:20]),
