@@ -98,7 +98,7 @@ def test_a_full_disk_is_reported_in_one_sentence(refusal):
 
 
 @pytest.mark.thorough
-def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vibench_here, tmp_path):
+def test_doctor_shows_versions_folders_and_permissions_but_no_secrets(vibench_here, tmp_path):
     environment = {"VIBENCH_RIG_TOKEN": "do-not-tell", "VIBENCH_STATE_DIR": str(tmp_path / "state")}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
     sections = json.loads(told.stdout)

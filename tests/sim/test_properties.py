@@ -128,7 +128,7 @@ def slower(specimen, scale):
 
 @settings(max_examples=25, deadline=None)
 @given(contact=laws, log_scale=st.floats(-3.0, 3.0))
-def test_motion_scales_with_time(contact, log_scale):
+def test_another_unit_of_time_gives_the_same_motion(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
     slow = end(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
     slow[3:] *= scale

@@ -193,7 +193,7 @@ def measure(
     ] = False,
     time_limit: Annotated[
         str | None,
-        option("Distribute this time over measurements as their until requires.", "TIME", name="--within"),
+        option("Divide this time among the measurements by their `until`.", "TIME", name="--within"),
     ] = None,
     as_json: AsJson = False,
     twin: Annotated[

@@ -103,8 +103,8 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     unknown = "whether the fast loop holds the branch is not known: "
     if isinstance(fast.plant.specimen.contact, RigidStops):
         raise LimitExceeded(
-            f"{unknown}rigid stops push with no finite force. Nothing was played; give the specimen of "
-            "the hardware configuration another contact law, such as hertz"
+            f"{unknown}rigid stops have no finite contact force. Nothing was played; choose another "
+            "contact law for the specimen in the hardware configuration, such as hertz"
         )
     hold = branch_hold(
         fast.plant,

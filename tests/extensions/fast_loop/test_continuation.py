@@ -252,7 +252,7 @@ def test_a_branch_without_start_or_force_in_the_model_is_refused():
     with pytest.raises(LimitExceeded, match="finds no motion that repeats every period at start_hz = 95"):
         require_held(fast_loop(stops), plan)
     rigid = stops.specimen.model_copy(update={"contact": "rigid:0.8"})
-    with pytest.raises(LimitExceeded, match="rigid stops push with no finite force"):
+    with pytest.raises(LimitExceeded, match="rigid stops have no finite contact force"):
         require_held(fast_loop(stops.model_copy(update={"specimen": rigid})), plan)
 
 

@@ -189,7 +189,7 @@ def test_a_refusal_of_the_board_ends_silent_with_its_message(played):
 
 
 @pytest.mark.thorough
-def test_a_gate_that_trips_ends_the_run_that_plays(found, tmp_path):
+def test_a_tripped_gate_ends_the_run(found, tmp_path):
     board, rig = found
     plan = BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=90, high_hz=118

@@ -213,7 +213,7 @@ def _search(
             break
         next_hz = search.next_hz()
         if plan.low_hz < next_hz < plan.high_hz:
-            # The tries are in the converter's time, the drive in the generator's.
+            # The converter's clock measures trial frequencies, the generator's clock sets them.
             next_hz *= states[-1].frequency_hz / states[-1].drive_hz
         if next_hz == frequency_hz:
             lock = LockResult.AT_THE_EDGE

@@ -238,7 +238,7 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
     points
         Fourier coefficients of each drive period, shape (periods, orders).
     noise
-        Rms of the coefficients in silence, all orders together; unit of the points.
+        Rms of the coefficients of all orders without drive, in the unit of the points.
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)

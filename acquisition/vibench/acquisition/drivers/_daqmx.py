@@ -30,7 +30,7 @@ from ._overload import overload_ranges
 # Longer than any single read (`LONGEST_READ_S` plus its margin): a server that is silent for this time
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 60.0
-# A second of four channels at the highest rate is beyond gRPC's default of 4 MB.
+# One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
     ("grpc.max_receive_message_length", _NO_LIMIT),

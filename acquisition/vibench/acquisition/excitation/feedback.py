@@ -47,10 +47,10 @@ class Settling(FrozenModel):
 
 
 class BaseLevel(FrozenModel):
-    """A level of the base's motion that feedback holds by the generator's setting.
+    """Level of the base's motion that feedback holds by adjusting the generator's amplitude.
 
-    The level is that of the fundamental, without motion that impacts add at other frequencies. The setting
-    of the plan, ``amplitude_vpp``, is then the largest that may be used.
+    Only the fundamental counts; impacts add motion at other frequencies. ``amplitude_vpp`` of the plan is
+    then the largest amplitude that may be used.
     """
 
     acceleration_m_per_s2: HeldMetresPerS2 | None = None

@@ -116,7 +116,7 @@ class Decimator:
         self._half = (taps.size - 1) // 2
         # The engine sums eight products at a time; padding gets zero weight.
         self._taps = np.concatenate([np.zeros(-taps.size % _TOGETHER), taps])
-        # The filter uses half its length ahead; zeros stand for the time before the record.
+        # Half of the filter needs later samples; those before the first one are zero.
         self._pending = np.zeros((channels, self._taps.size - 1 - self._half if factor > 1 else 0))
         self._received = 0
         self._given = 0

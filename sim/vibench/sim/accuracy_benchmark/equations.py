@@ -52,7 +52,7 @@ def law_of(specimen: Specimen) -> Law:
         case PowerLaw(reference=reference, terms=terms):
             return Law(np.inf, np.inf, reference=reference, terms=terms)
         case RigidStops():
-            raise ValueError("Rigid stops push with no finite force: give a law that yields, such as hertz.")
+            raise ValueError("Rigid stops have no finite contact force: give another law, such as hertz.")
         case law:
             return Law(lower, upper, *law.stops.term, law.stops.loss, beside=law.stops.spring_beside)
 

@@ -144,7 +144,7 @@ def spring_of(specimen: Specimen) -> RestoringForce:
             return LINEAR
         case RigidStops():
             raise ValueError(
-                "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
+                "Rigid stops have no finite contact force: follow the motion in time instead, or use Hertz."
             )
         case law:
             return GapSpring(*law.stops.term, upper, lower, law.stops.loss, law.stops.spring_beside)
