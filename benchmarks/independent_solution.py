@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
+from vibench.cli.paper.textbook_methods import Law, Place, law_of, numbers_of, rates
 from vibench.sim import Harmonic, Specimen
-from vibench.sim.accuracy_benchmark.equations import Law, Place, law_of, numbers_of, rates
 from vibench.sim.specimen.state import Floats
 
 Rates = Callable[[float, Floats], Floats]

@@ -10,9 +10,40 @@ import numpy as np
 
 from vibench.cli.paper.case import ALIKE, BY_ODE45, SCORED_S, Case, damping
 from vibench.cli.paper.reading import MODERATE_M, Evidence, Reading
-from vibench.cli.paper.textbook_methods import ode45, runge_kutta, textbook_exponents, textbook_states
+from vibench.cli.paper.textbook_methods import Tableau, TextbookMethod, march, ode45, textbook_exponents
 from vibench.sim import Accuracy, Harmonic, base_transmissibility
 from vibench.sim.study import solve_study
+
+RUNGE_KUTTA = Tableau(
+    np.array([0.0, 0.5, 0.5, 1.0]),
+    np.diag([0.5, 0.5, 1.0], -1),
+    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
+    np.zeros(4),
+)
+"""Classical method of fourth order."""
+
+
+def runge_kutta(step_s):
+    """Return the classical fourth-order method with fixed steps.
+
+    Raises ValueError when the step is not positive and finite.
+    """
+    if not 0.0 < step_s < np.inf:
+        raise ValueError(f"A step of {step_s} s is not allowed: it must be positive and finite.")
+    return TextbookMethod(f"Runge-Kutta, steps of {step_s:g} s", RUNGE_KUTTA, step_s)
+
+
+def textbook_states(specimen, drive, method, duration_s, initial_states):
+    """Integrate motions from time zero and return their final states, shape (n, 6); NaN after divergence.
+
+    ``initial_states`` has shape (n, 6): x, y, z, vx, vy, vz, absolute [m, m/s]. Raises ValueError for rigid
+    stops.
+    """
+    states = np.array(initial_states, dtype=np.float64).T
+    drives = [drive] * states.shape[1]
+    ends, _ = march(states[:, np.newaxis], duration_s, duration_s, specimen, drives, method)
+    return ends[:, 0].T
+
 
 SHOWN_HZ = (90.0, 95.0, 100.0, 105.0, 250.0, 260.0, 270.0, 280.0)
 NEAR_HZ, SECOND_HZ = np.arange(80.0, 110.0, 0.01), np.arange(230.0, 310.0, 0.01)

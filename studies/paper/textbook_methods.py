@@ -1,5 +1,7 @@
-"""Explicit Runge-Kutta methods without detection of contacts, for comparison. SI units.
+"""The paper's equations and explicit Runge-Kutta methods in textbook form, for comparison. SI units.
 
+The equations share nothing with the engine: no modes, no special unknowns in contact, and no polynomial
+instead of a sine. The methods do not detect contacts.
 Their steps cross a contact at arbitrary points; the error changes the energy of every impact, and the
 exponent of chaos. Dormand and Prince's pair is controlled like MATLAB's `ode45` (Shampine and Reichelt, The
 MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
@@ -8,14 +10,13 @@ MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.integrate import RK45
 
-from vibench.sim import Harmonic, Specimen
-from vibench.sim.accuracy_benchmark.equations import Place, law_of, numbers_of, rates
+from vibench.sim import Harmonic, NoContact, PowerLaw, RigidStops, Specimen
 
 from .responses import Reals
 
@@ -27,6 +28,79 @@ LOST_M = 1.0
 """Displacement beyond which a motion has diverged."""
 SLOWEST_PER_S = 1e-9
 """Reference speed of a state initially at rest."""
+
+
+class Place(IntEnum):
+    """Position of m1 relative to the stops."""
+
+    ON_LOWER = -1
+    FLIGHT = 0
+    ON_UPPER = 1
+    ANYWHERE = 2
+    """Determined by p."""
+
+
+class Law(NamedTuple):
+    """A law as numbers: (k d^exponent + beside d) (1 + loss dd/dt) at the depth d; powers of p at every p."""
+
+    lower: float
+    upper: float
+    """Clearances; infinite where there is no stop."""
+    stiffness: float = 0.0
+    exponent: float = 1.0
+    loss: float = 0.0
+    reference: float = 1.0
+    terms: tuple[tuple[int, float], ...] = ()
+    """Exponent and force at the reference [N] of each term."""
+    beside: float = 0.0
+    """Stiffness of a linear spring parallel to the stop [N/m]."""
+
+
+def law_of(specimen: Specimen) -> Law:
+    """Return a specimen's contact law as numbers."""
+    lower, upper = specimen.gaps_m
+    match specimen.contact:
+        case NoContact():
+            return Law(np.inf, np.inf)
+        case PowerLaw(reference=reference, terms=terms):
+            return Law(np.inf, np.inf, reference=reference, terms=terms)
+        case RigidStops():
+            raise ValueError("Rigid stops have no finite contact force: give another law, such as hertz.")
+        case law:
+            return Law(lower, upper, *law.stops.term, law.stops.loss, beside=law.stops.spring_beside)
+
+
+def numbers_of(specimen: Specimen, drive: Harmonic) -> Reals:
+    """Return masses, stiffnesses, dampings, and drive amplitude, angular frequency and phase, shape (12,)."""
+    of_drive = (drive.amplitude_m, 2.0 * np.pi * drive.frequency_hz, drive.phase_rad)
+    return np.array([*specimen.masses, *specimen.stiffnesses, *specimen.dampings, *of_drive])
+
+
+def _stop_force(depth: Reals, rate: Reals, law: Law) -> Reals:
+    return (law.stiffness * depth**law.exponent + law.beside * depth) * (1.0 + law.loss * rate)
+
+
+def rates(time_s: float | Reals, state: Reals, place: Place, law: Law, numbers: Reals) -> Reals:
+    """Return d/dt of x, y, z, vx, vy, vz. On a stop the force is zero below depth 0; in flight there is none.
+
+    ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
+    """
+    m0, m1, m2, k0, k1, k2, c0, c1, c2, amplitude, omega, phase = numbers
+    x, y, z, vx, vy, vz = state
+    angle = omega * time_s + phase
+    base, base_rate = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
+    p, rate = y - z, vy - vz
+    inner = k1 * p + c1 * rate
+    # A trial step of an implicit method may overflow.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if place is not Place.FLIGHT and law.stiffness > 0.0:
+            inner = inner + _stop_force(np.maximum(p - law.upper, 0.0), rate, law)
+            inner = inner - _stop_force(np.maximum(-p - law.lower, 0.0), -rate, law)
+        for power, force in law.terms:
+            inner = inner + force * (p / law.reference) ** power
+        outer = k2 * (z - x) + c2 * (vz - vx)
+        ahead = (outer + k0 * (base - x) + c0 * (base_rate - vx)) / m0
+        return np.array([vx, vy, vz, ahead, -inner / m1, (inner - outer) / m2])
 
 
 class Tableau(NamedTuple):
@@ -52,26 +126,10 @@ class TextbookMethod:
     """Absolute tolerance, both in metres and in metres per second."""
 
 
-_RUNGE_KUTTA = Tableau(
-    np.array([0.0, 0.5, 0.5, 1.0]),
-    np.diag([0.5, 0.5, 1.0], -1),
-    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
-    np.zeros(4),
-)
 _FIFTH = np.append(RK45.B, 0.0)
 _DORMAND_PRINCE = Tableau(
     np.append(RK45.C, 1.0), np.vstack([np.pad(RK45.A, ((0, 0), (0, 2))), _FIFTH]), _FIFTH, RK45.E
 )
-
-
-def runge_kutta(step_s: float) -> TextbookMethod:
-    """Return the classical fourth-order method with fixed steps.
-
-    Raises ValueError when the step is not positive and finite.
-    """
-    if not 0.0 < step_s < math.inf:
-        raise ValueError(f"A step of {step_s} s is not allowed: it must be positive and finite.")
-    return TextbookMethod(f"Runge-Kutta, steps of {step_s:g} s", _RUNGE_KUTTA, step_s)
 
 
 def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0) -> TextbookMethod:
@@ -86,20 +144,6 @@ def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0
         )
     name = f"ode45, tolerances {relative:g} and {absolute:g}"
     return TextbookMethod(name, _DORMAND_PRINCE, longest_s, relative, absolute)
-
-
-def textbook_states(
-    specimen: Specimen, drive: Harmonic, method: TextbookMethod, duration_s: float, initial_states: ArrayLike
-) -> Reals:
-    """Integrate motions from time zero and return their final states, shape (n, 6); NaN after divergence.
-
-    ``initial_states`` has shape (n, 6): x, y, z, vx, vy, vz, absolute [m, m/s]. Raises ValueError for rigid
-    stops.
-    """
-    states = np.array(initial_states, dtype=np.float64).T
-    drives = [drive] * states.shape[1]
-    ends, _ = _march(states[:, np.newaxis], duration_s, duration_s, specimen, drives, method)
-    return ends[:, 0].T
 
 
 def textbook_exponents(
@@ -118,7 +162,7 @@ def textbook_exponents(
     """
     states = np.zeros((6, 2, len(drives)))
     states[:, 1] = APART_M / math.sqrt(6.0) * _scales(drives)
-    return _march(states, settle_s + duration_s, settle_s, specimen, drives, method)[1]
+    return march(states, settle_s + duration_s, settle_s, specimen, drives, method)[1]
 
 
 def _scales(drives: Sequence[Harmonic]) -> Reals:
@@ -143,7 +187,7 @@ def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMe
     return np.where(error <= method.relative, longer, shorter * step_s)
 
 
-def _march(
+def march(
     states: Reals,
     until_s: float,
     settle_s: float,

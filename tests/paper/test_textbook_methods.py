@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks.independent_solution import independent_state, state_error
-from vibench.cli.paper.textbook_methods import ode45, runge_kutta, textbook_exponents, textbook_states
+from benchmarks.paper_tables import runge_kutta, textbook_states
+from vibench.cli.paper.textbook_methods import ode45, textbook_exponents
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent
 
 DRIVE = Harmonic(130.0, 20e-6, 0.3)

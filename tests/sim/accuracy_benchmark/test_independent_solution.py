@@ -44,5 +44,5 @@ def test_a_start_beyond_the_gap_is_in_contact():
 
 
 def test_rigid_stops_are_refused_in_a_sentence():
-    with pytest.raises(ValueError, match=r"Rigid stops .* give a law that yields"):
+    with pytest.raises(ValueError, match=r"Rigid stops .* give another law"):
         independent_state(replace(gong2025(), contact=RigidStops(0.8)), STILL, 0.01, MOVING)
