@@ -443,6 +443,7 @@ def estimate_campaign(
     durations_s = [measured_s(each) for each in missing]
     bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
     rest_s = campaign.rest_s * max(0, len(missing) - 1)
+    disk = next(each for each in (folder.resolve(), *folder.resolve().parents) if each.exists())
     return CampaignEstimate(
         recordings=len(missing),
         kept=len(planned) - len(missing),
@@ -451,13 +452,8 @@ def estimate_campaign(
         lead_in_s=sum(each.excitation.lead_in_s for each in missing),
         largest_bytes=round(max(durations_s, default=0.0) * bytes_per_s),
         total_bytes=round(sum(durations_s) * bytes_per_s * WRITTEN_SHARE),
-        free_bytes=shutil.disk_usage(_existing_part(folder)).free,
+        free_bytes=shutil.disk_usage(disk).free,
         searching=sum(
             isinstance(each.excitation, AbstractFeedback) or each.until is not None for each in missing
         ),
     )
-
-
-def _existing_part(folder: Path) -> Path:
-    """Return the folder, or the nearest existing one above it."""
-    return next(each for each in (folder.resolve(), *folder.resolve().parents) if each.exists())

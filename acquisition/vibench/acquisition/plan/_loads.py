@@ -71,7 +71,12 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     # All different tones, waveforms and sources of streams of a plan, at their highest level.
     tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
     broad = [
-        _BroadPlay(model, terminal_v, partial(_of_waveform, each, number), _lines_hz(each))
+        _BroadPlay(
+            model,
+            terminal_v,
+            partial(_of_waveform, each, number),
+            np.arange(1.0, len(each.values) // 2) * float(each.repetition_hz),
+        )
         for number, each in enumerate(waveforms)
     ]
     broad += [_BroadPlay(model, terminal_v, partial(_of_source, each), _band_hz(each)) for each in sources]
@@ -138,10 +143,6 @@ class _BroadPlay:
         self, transfer: Callable[[BaseQuantity, Floats], ComplexArray], quantity: BaseQuantity
     ) -> Load:
         return self._follow(lambda hz: self._terminal_v * transfer(quantity, hz))
-
-
-def _lines_hz(waveform: Waveform) -> Floats:
-    return np.arange(1, len(waveform.values) // 2, dtype=np.float64) * np.float64(waveform.repetition_hz)
 
 
 def _band_hz(source: SampleSource) -> Floats:

@@ -275,14 +275,12 @@ class Sweep(FrozenModel):
             case SweepAxis.DIRECTION:
                 return str(value)
             case SweepAxis.EXCITATION:
-                kinds = [str(each.get("kind", self._template_kind())) for each in self.excitations]
+                template = self.measurement.get("excitation", {}).get("kind", "excitation")
+                kinds = [str(each.get("kind", template)) for each in self.excitations]
                 kind = kinds[value]
                 return kind if kinds.count(kind) == 1 else f"{kind}{value + 1}"
             case SweepAxis.LEVEL | SweepAxis.FREQUENCY:
                 return f"{value:.7g}{_UNITS[axis]}".replace(".", "p").replace("+", "")
-
-    def _template_kind(self) -> str:
-        return str(self.measurement.get("excitation", {}).get("kind", "excitation"))
 
 
 def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:

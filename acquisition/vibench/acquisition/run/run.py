@@ -1,5 +1,6 @@
 """Run a measurement: check, ramp up, settle, record, ramp down, and always silence."""
 
+import math
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack
@@ -61,8 +62,8 @@ def require_time_for_commands(measurement: Measurement, generator: FunctionGener
             raise ConfigurationError(
                 f"step_s = {step_s:g} s is too short: the generator takes {latency_s:.3g} s for a setting, "
                 f"and the drive would fall behind the plan. Nothing was played; give step_s of at least "
-                f"{_rounded_up(ROOM * latency_s):.2f} s, or shorten generator.settle_s if the instrument "
-                "allows it"
+                f"{math.ceil(100 * ROOM * latency_s) / 100:.2f} s, or shorten generator.settle_s if the "
+                "instrument allows it"
             )
         return 0.0
     settled = sum(phase.state is RunState.SETTLING for phase in known_phases(measurement))
@@ -77,11 +78,6 @@ def _commands_of_a_step(measurement: Measurement) -> int:
         step.play.level for step in islice(measurement.excitation.steps(), 2) if isinstance(step.play, Tone)
     }
     return len(levels)
-
-
-def _rounded_up(step_s: float) -> float:
-    """Round up to 0.01 s."""
-    return -(-step_s // 0.01) * 0.01
 
 
 def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] | None:

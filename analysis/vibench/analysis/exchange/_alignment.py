@@ -584,11 +584,8 @@ def _same(rates_hz: Sequence[float], samples: int) -> bool:
 
 def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> None:
     """Raise InvalidRequest if channels differ in a stated delay or start that cannot be interpreted."""
-    unclear = [
-        each
-        for each, mapped in zip(channels, mapping.channels, strict=True)
-        if "delay_s" not in mapped.model_fields_set
-    ]
+    both = zip(channels, mapping.channels, strict=True)
+    unclear = [each for each, mapped in both if "delay_s" not in mapped.model_fields_set]
     for first, each in pairwise(unclear):
         if differing := sorted({*first.shifts} ^ {*each.shifts}):
             said = ", ".join(f"{name} = {shortened(value)}" for name, value in differing)

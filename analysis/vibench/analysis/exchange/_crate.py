@@ -80,7 +80,8 @@ def pack_folder(
         zip exists or cannot be written.
     """
     _require_addresses(facts)
-    paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)
+    files = (each for each in sorted(folder.rglob("*")) if each.is_file() and each != crate)
+    paths = tuple(each for each in files if each.name != METADATA and each.suffix not in {".tmp", ".part"})
     outside = [each for each in paths if not each.resolve().is_relative_to(folder.resolve())]
     if outside:
         raise InvalidRequest(
@@ -120,10 +121,6 @@ def _require_addresses(facts: CrateFacts) -> None:
             f"{facts.organisation_url!r} is not the address of an organisation; nothing was packed, give one "
             "like https://ror.org/03yrm5c26"
         )
-
-
-def _belongs(path: Path) -> bool:
-    return path.is_file() and path.name != METADATA and path.suffix not in {".tmp", ".part"}
 
 
 def _about(

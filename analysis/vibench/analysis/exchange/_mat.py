@@ -226,18 +226,10 @@ def _numbers(
                 yield from _numbers(value, f"{prefix}{name}.", facts)
             case np.ndarray() if _holds_samples(value):
                 step = exact_step(value.dtype)
-                scale = scale_among(facts, are_counts=step is not None)
+                scale = "" if "scale_factor" in struct else scale_among(facts, are_counts=step is not None)
                 for place, (channel, row) in enumerate(_channels(f"{prefix}{name}", value)):
-                    yield (
-                        replace(
-                            channel,
-                            unit=unit_among(own.items(), place, name),
-                            step=step,
-                            stated_scale="" if "scale_factor" in struct else scale,
-                            **times,
-                        ),
-                        row,
-                    )
+                    unit = unit_among(own.items(), place, name)
+                    yield replace(channel, unit=unit, step=step, stated_scale=scale, **times), row
 
 
 def _part(struct: Mapping[str, Any], name: str) -> dict[str, Any]:

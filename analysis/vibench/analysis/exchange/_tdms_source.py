@@ -103,6 +103,8 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
         if (start_s := stated_start_s(each)) is not None and first < len(channel)
     }
     runs, jumps = restarts(starts_s, times["sample_rate_hz"], len(channel))
+    times["time_trouble"] = times["time_trouble"] or jumps
+    times["start_s"] = next(iter(starts_s.values()), times["start_s"])
     step = exact_step(channel.dtype)
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
@@ -113,9 +115,5 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
         stated_scale=scale_among(own.items(), are_counts=step is not None),
         start_error_s=START_ERROR_S,
         runs=runs,
-        **times
-        | {
-            "start_s": next(iter(starts_s.values()), times["start_s"]),
-            "time_trouble": times["time_trouble"] or jumps,
-        },
+        **times,
     )

@@ -134,7 +134,7 @@ def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[Colli
             found.append(CollisionNumbers(Way.TRACKED, each.name, motion.parameters, level))
     if not found:
         return None, "; ".join(why) or "no recording collides"
-    return min(found, key=_width), ""
+    return min(found, key=lambda one: max((gap.high - gap.low) / gap.value for gap in one.gaps)), ""
 
 
 def numbers_from_statistics(
@@ -172,10 +172,6 @@ def _fit_shaker(recording: Recording, results: CampaignResults, specimen: Specim
     weakest = results.noise[0].analysis
     with open_recording(weakest.facts.path) as noise:
         return fit_shaker(noise, weakest, specimen)
-
-
-def _width(found: CollisionNumbers) -> float:
-    return max((each.high - each.low) / each.value for each in found.gaps)
 
 
 def _refusal(motion: HiddenMotion) -> str:

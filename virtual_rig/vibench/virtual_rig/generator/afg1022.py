@@ -242,10 +242,6 @@ def _ask_phase(generator: AFG1022, channel: int, parameters: Parameters) -> byte
     return scpi.as_number(math.radians(generator.settings(channel).phase_deg))
 
 
-def _write_lock(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    generator.lock_frequencies(channel, locked=scpi.boolean(only(parameters)))
-
-
 def _memory(parameter: bytes) -> str:
     name = scpi.memory_name(scpi.text(parameter))
     if name is None:
@@ -348,7 +344,8 @@ COMMANDS = (
     action("[SOURce#:]PHASe:INITiate", "AFG1062", lambda generator: generator.align_phases()),
     Command(_DUTY.header, _DUTY.source, _write_duty, _DUTY.ask),
     Command("[SOURce#:]FREQuency:CONCurrent[:STATe]", "drivers",
-        _write_lock, lambda generator, *_: b"1" if generator.frequencies_are_locked else b"0"),
+        lambda each, channel, given: each.lock_frequencies(channel, locked=scpi.boolean(only(given))),
+        lambda generator, *_: b"1" if generator.frequencies_are_locked else b"0"),
     choice("[SOURce#:]FREQuency:MODE", "IVI; sweep: not simulated", ("CW", "SWEep"),
         lambda s: "SWEep" if s.mode is RunMode.SWEEP else "CW",
         lambda s, word: without_mode(RunMode.SWEEP, s, word == "SWEep")),

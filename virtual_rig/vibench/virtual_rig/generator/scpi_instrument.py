@@ -321,10 +321,6 @@ def _spoil(reply: bytes) -> bytes:
     )
 
 
-def _decimal(value: int) -> bytes:
-    return str(int(value)).encode("ascii")
-
-
 def _next_error(instrument: ScpiInstrument) -> bytes:
     code = instrument.status.next_error()
     return f'{int(code)},"{code.text}"'.encode("ascii")
@@ -337,7 +333,7 @@ COMMON_COMMANDS = (
     action("*TRG", "IEEE 488.2, 10.37", lambda instrument: instrument.trigger()),
     action("*WAI", "IEEE 488.2, 10.39", lambda _: None),
     Command("*OPC", "IEEE 488.2, 10.18", lambda each, *_: each.status.operation_complete(), lambda *_: b"1"),
-    report("*ESR", "IEEE 488.2, 10.12", lambda instrument: _decimal(instrument.status.take_events())),
+    report("*ESR", "IEEE 488.2, 10.12", lambda instrument: b"%d" % int(instrument.status.take_events())),
     report("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", _next_error),
 )
 

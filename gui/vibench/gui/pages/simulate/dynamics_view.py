@@ -43,11 +43,6 @@ class AnswerPicture(Protocol[Shown_contra]):
         """Draw a result."""
 
 
-def _no_curves(_answer: object) -> tuple[Curve, ...]:
-    """Return no curves, because exponents and chains cannot be compared with a recording."""
-    return ()
-
-
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
     """Request type of a tab, and functions that describe its result."""
@@ -60,7 +55,7 @@ class DynamicsKind(Generic[Request, Answer]):
     """Class of the result, built from request, pieces so far and elapsed time [s]."""
     before: str
     """Text about cost and error that is shown before a result exists."""
-    curves: Callable[[Answer], tuple[Curve, ...]] = _no_curves
+    curves: Callable[[Answer], tuple[Curve, ...]] = lambda _: ()
 
 
 @dataclass
