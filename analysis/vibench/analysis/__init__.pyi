@@ -70,8 +70,9 @@ from .results.spectral_functions import scan_files as scan_files, spectral_funct
 from .signals.window import Window as Window
 from .uncertainty.expected import (
     Expected as Expected,
+    TimeShare as TimeShare,
     expected_recorded_s as expected_recorded_s,
     expected_uncertainty as expected_uncertainty,
     recorded_s as recorded_s,
+    within as within,
 )
-from .uncertainty.time_budget import TimeShare as TimeShare, within as within

@@ -10,8 +10,7 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from vibench.analysis.hidden_motion import Hidden, Numbers, hidden_motion
-from vibench.analysis.hidden_motion._hidden_motion import hidden_motion_of
-from vibench.analysis.hidden_motion._measured_masses import measured_masses
+from vibench.analysis.hidden_motion._hidden_motion import hidden_motion_of, measured_masses
 from vibench.analysis.hidden_motion._prepared_motion import prepared_motion
 from vibench.analysis.hidden_motion._tracking_model import tracked_specimen
 from vibench.sim import HuntCrossley, LinearGap, RigidStops, gong2025

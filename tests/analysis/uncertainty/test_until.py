@@ -11,7 +11,7 @@ from vibench.acquisition.plan import Campaign, Dwell, Measurement, SteppedSine, 
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import expected_recorded_s, expected_uncertainty, recorded_s, within
 from vibench.analysis.uncertainty.budget import WIDENING, Budget, Cause, Contribution
-from vibench.analysis.uncertainty.time_budget import time_to_wishes_s
+from vibench.analysis.uncertainty.expected import time_to_wishes_s
 
 ROOT = Path(__file__).parents[3]
 RIG = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")

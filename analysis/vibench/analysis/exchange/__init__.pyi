@@ -17,11 +17,12 @@ from ._export import (
 from ._import_recording import (
     import_recording as import_recording,
 )
+from ._labelled import (
+    sep005 as sep005,
+    xarray_dataset as xarray_dataset,
+)
 from ._mapping import (
     ImportMapping as ImportMapping,
-)
-from ._sep005 import (
-    sep005 as sep005,
 )
 from ._source import (
     opened_source as opened_source,
@@ -33,7 +34,4 @@ from ._uff import (
     FunctionAxis as FunctionAxis,
     FunctionType as FunctionType,
     UniversalFunction as UniversalFunction,
-)
-from ._xarray_dataset import (
-    xarray_dataset as xarray_dataset,
 )

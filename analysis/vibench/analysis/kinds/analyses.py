@@ -7,10 +7,9 @@ from vibench.acquisition.instruments import PlugInKind
 from vibench.acquisition.plan import Family, rows_by_kind
 
 from .analysis_kind import AnalysisKind
-from .dwell import DWELL
 from .noise import REPEATED_NOISE, STREAMED_NOISE
+from .sine import DWELL, SWEEP
 from .stepped import RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
-from .sweep import SWEEP
 
 ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
     {

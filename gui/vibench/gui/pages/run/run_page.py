@@ -1,6 +1,8 @@
 """The Run page: arm, start and watch a test; the pictures show the newest samples."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
 from pathlib import Path
 from typing import TypeAlias
 
@@ -18,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition.engine import DRIVING, EngineClient, EngineState, EngineStatus, RunStatus, TwinSwitch
-from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
+from vibench.acquisition.plan import EXCITATION_KINDS, Family, Measurement, rows_by_kind
 from vibench.acquisition.recording import REJECTED
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
@@ -27,7 +29,6 @@ from ...engine_link.bridge import measurement_called
 from ...forms.editor import Choice
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
-from ...page.kind_views import KIND_VIEWS, OF_A_BAND, LivePicture
 from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.user_actions import UserActions
 from ...widgets.boxes import (
@@ -55,6 +56,39 @@ from .live_plots import (
     sweep_envelope,
     sweep_history,
 )
+
+
+class LivePicture(Enum):
+    """A picture of the Run page that is updated during a run."""
+
+    FREQUENCY_RESPONSE = auto()
+    HISTORY = auto()
+    """Responses against the actual drive frequency."""
+    ENVELOPE = auto()
+    SPECTRUM = auto()
+    PORTRAIT = auto()
+
+
+@dataclass(frozen=True)
+class KindView:
+    """The two pictures shown when a run of a kind starts."""
+
+    left: LivePicture
+    right: LivePicture
+
+
+OF_A_BAND = KindView(LivePicture.FREQUENCY_RESPONSE, LivePicture.SPECTRUM)
+OF_A_SINE = KindView(LivePicture.HISTORY, LivePicture.PORTRAIT)
+KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
+    {
+        Family.NOISE: OF_A_BAND,
+        Family.SWEEP: OF_A_SINE,
+        Family.DWELL: OF_A_SINE,
+        Family.STEPPED: OF_A_SINE,
+    },
+    {},
+)
+"""Live pictures by kind of excitation; the second table is for kinds that differ from their family."""
 
 _ROW = 1.9
 """Height of a level meter, in font heights."""

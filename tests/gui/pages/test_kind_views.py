@@ -1,7 +1,7 @@
 """Every kind of excitation has its live plots."""
 
 from vibench.acquisition.plan import EXCITATION_KINDS, Family
-from vibench.gui.page.kind_views import KIND_VIEWS, LivePicture
+from vibench.gui.pages.run.run_page import KIND_VIEWS, LivePicture
 
 
 def test_every_kind_has_live_plots_and_only_noise_shows_a_whole_band():

@@ -1,9 +1,10 @@
-"""A recording or a part of it as a labelled Dataset."""
+"""Samples for other Python packages: dictionaries for SDyPy (SEP 005), and a labelled xarray.Dataset."""
 
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,44 @@ from vibench.acquisition.recording import ChannelHeader, Recording
 
 from ..errors import InvalidRequest
 from ..recordings.facts import require_checked
-from ._excerpt import excerpt
+from ._excerpt import Excerpt, excerpt
 
 if TYPE_CHECKING:
     import xarray
+
+QUANTITIES = {"velocity": "v", "acceleration": "a", "displacement": "d", "force": "f"}
+
+
+def sep005(excerpt: Excerpt) -> list[dict[str, Any]]:
+    """Return the channels of an excerpt as SDyPy's packages expect them; lost samples are NaN.
+
+    Parameters
+    ----------
+    excerpt
+        Result of `excerpt` for an open recording.
+
+    Returns
+    -------
+    list of dict
+        For each channel ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` if SEP
+        005 defines a letter for it, ``start_timestamp`` of the first sample, and ``group``, the recording.
+    """
+    recording = excerpt.recording
+    rate = recording.sample_rate_hz
+    start = datetime.fromisoformat(recording.started_utc) + timedelta(seconds=excerpt.start / rate)
+    return [
+        {
+            "data": np.concatenate(list(excerpt.channel_blocks(channel.role))),
+            "name": channel.role,
+            "unit_str": channel.unit,
+            "fs": rate,
+            **({"quantity": QUANTITIES[channel.quantity]} if channel.quantity in QUANTITIES else {}),
+            "start_timestamp": start.isoformat(),
+            "group": excerpt.name,
+        }
+        for channel in excerpt.channels
+    ]
+
 
 BETWEEN = -1
 """Segment number of samples outside all segments."""

@@ -1,19 +1,29 @@
-"""Branches of exact motions, from a search and from bifurcations."""
+"""Branches of exact motions, from a search and from bifurcations, and of harmonic balances."""
 
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..periodic.balance_branch import (
+    BalanceOptions,
+    balance,
+    balance_branch_within,
+    first_order_guesses,
+    orbit_guess,
+)
 from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent, OrbitShape
 from ..periodic.branch_following import DrivePath, parameter_value
 from ..periodic.continuation import ArcEnd, ArcSteps
+from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet, structure_of
 from ..periodic.orbit_branch import periodic_branch_within
+from ..periodic.restoring_force import PowerSpring, spring_of
 from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Specimen, state_scales
@@ -120,7 +130,7 @@ def branches_from(
                 began = time.perf_counter()
 
 
-STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
+SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
 """Distances from a bifurcation at which to search for a new branch, relative to the gap."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
@@ -139,7 +149,7 @@ def shot_branches(
     low: float,
     high: float,
     search: MotionSearch = MotionSearch(),  # noqa: B008 - frozen
-    steps: ArcSteps = STEPS,
+    steps: ArcSteps = SHOT_STEPS,
 ) -> Iterator[FoundBranch]:
     """Yield the branches of periodic motions found in a range, one by one.
 
@@ -226,15 +236,15 @@ def _leaving(
     return None
 
 
+def _has_left(orbit: PeriodicOrbit) -> bool:
+    return simplest(orbit) is orbit and float(np.abs(orbit.signs.apart).max(initial=1.0)) > LEFT
+
+
 def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
     """Return the scaled eigenvector of the multiplier nearest to -1; its largest component is 1."""
     values, vectors = np.linalg.eig(mapping.derivative(state, drive))
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(direction / np.abs(direction).max())
-
-
-def _has_left(orbit: PeriodicOrbit) -> bool:
-    return simplest(orbit) is orbit and float(np.abs(orbit.signs.apart).max(initial=1.0)) > LEFT
 
 
 UPDATES_TO_HOLD = 10.0
@@ -274,3 +284,63 @@ def least_growth_time_s(loop_time_s: float) -> float:
     if not 0.0 < loop_time_s < math.inf:
         raise ValueError(f"A loop time of {loop_time_s} s is not allowed: positive and finite.")
     return UPDATES_TO_HOLD * loop_time_s
+
+
+BALANCE_STEPS = ArcSteps(first=0.01, longest=0.03, shortest=1e-7, tolerance=1e-10, most_points=3000)
+
+
+def balanced_branches(
+    specimen: Specimen,
+    path: DrivePath,
+    low: float,
+    high: float,
+    options: BalanceOptions,
+    search: MotionSearch = MotionSearch(),  # noqa: B008 - frozen
+    steps: ArcSteps = BALANCE_STEPS,
+) -> Iterator[FoundBranch]:
+    """Yield the branches of harmonic balances found in a range, one by one.
+
+    Parameters
+    ----------
+    specimen
+        Any law except rigid stops. For power laws, every first-order solution at ``search.places`` values
+        starts a branch (Gong et al. 2025, eq. 5); for other laws, every motion of the
+        drive's period that `periodic_motions` finds there.
+    path, low, high, steps
+        As for `shot_branches`.
+    options
+        Harmonics from ``fewest`` to ``most``; 1 and 1 is the paper's first-order balance.
+    search
+        Settings of the search for starts.
+
+    Yields
+    ------
+    Branches of motions with the drive's period; subharmonic motions are not included.
+    """
+    steps = replace(steps, until_s=time.monotonic() + search.time_s)
+    structure, spring = structure_of(specimen), spring_of(specimen)
+    shape = OrbitShape.MIRRORED if options.kept is HarmonicSet.ODD else OrbitShape.REPEATED
+
+    def follow(start: BranchStart[Balance]) -> FoundBranch:
+        branch = balance_branch_within(structure, spring, start.motion, path, low, high, options, steps)
+        return FoundBranch(branch, shape, periods=1, origin=start.origin, has_twin=False)
+
+    starts = partial(_starts, specimen, options, search, steps.until_s)
+    return branches_from(specimen, path, (low, high), search, starts, follow, lambda _: (), steps.until_s)
+
+
+def _starts(
+    specimen: Specimen, options: BalanceOptions, search: MotionSearch, until_s: float, drive: Harmonic
+) -> Iterator[BranchStart[Balance]]:
+    structure, spring = structure_of(specimen), spring_of(specimen)
+    where = drive.frequency_hz, drive.amplitude_m
+    if isinstance(spring, PowerSpring):
+        guesses, origin = iter(first_order_guesses(structure, spring, *where)), BranchOrigin.FIRST_ORDER
+    else:
+        orbits = periodic_motions(specimen, drive, search, until_s)
+        guesses = (orbit_guess(orbit) for orbit in orbits if orbit.period_map.periods == 1)
+        origin = BranchOrigin.SEARCH
+    for guess in guesses:
+        found = balance(structure, spring, *where, options, guess)
+        if found.outcome is not BalanceEnd.NO_SOLUTION:
+            yield BranchStart(found, origin, drive, found.state[None, :])
