@@ -6,7 +6,7 @@ from math import nan
 
 from vibench.acquisition.recording import SegmentLabel
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.kinds.stepped import stepped_analysis
+from vibench.analysis.kinds.sine import stepped_analysis
 from vibench.analysis.overlay.draws import Draw
 from vibench.analysis.overlay.simulated_channels import SimulatedChannels
 from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineAnalysis

@@ -20,12 +20,11 @@ from vibench.acquisition.plan import (
 from vibench.analysis import Simulation
 from vibench.analysis.figures.bench_levels import bench_levels_figure
 from vibench.analysis.figures.dwells import dwells_figure, spectrum_columns
-from vibench.analysis.figures.excitation import excitation_figure
+from vibench.analysis.figures.noise import excitation_figure, transmission_levels_figure
 from vibench.analysis.figures.stepped_sine import STEPPED_FREQUENCIES, stepped_sine_figure
 from vibench.analysis.figures.style import SIMULATED, prefixed
 from vibench.analysis.figures.sweep import regions_text, sweep_figure
 from vibench.analysis.figures.transmission import transmission_figure
-from vibench.analysis.figures.transmission_levels import transmission_levels_figure
 from vibench.analysis.recordings.checks import measurement_checks
 from vibench.analysis.report._drawings import sweep_findings
 from vibench.analysis.results.campaign_results import result_of

@@ -9,7 +9,7 @@ from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import OddMultisine
 from vibench.analysis import analyse
-from vibench.analysis.figures.distortion import distortion_caption, distortion_figure
+from vibench.analysis.figures.noise import distortion_caption, distortion_figure
 from vibench.analysis.frequency_response.distortion import distortion
 
 REPETITION_HZ, PERIODS, REALISATIONS, SETTLE_S = 4.0, 4, 4, 0.5

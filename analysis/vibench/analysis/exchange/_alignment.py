@@ -24,24 +24,25 @@ UNITS = {*_HERTZ, *SECONDS, "\u00b5s"} - {""}
 _WORDS = "|".join(re.escape(each) for each in sorted(UNITS, key=len, reverse=True))
 _UNIT = rf"(?:[ _/,]*(?:in )?[\[(]?(?P<unit>{_WORDS})[\])]?)?"
 _RATE = re.compile(
-    rf"(?:(?:(?:sampl\w*?|scan|acquisition|daq)[ _]?)?rate|sampl\w*?[ _]?freq\w*|samples[ _]?per[ _]?sec\w*"
-    rf"|f_?s(?:amp\w*)?|sr|sps|sfreq|abtast(?:rate|frequenz)){_UNIT}",
+    rf"(?:(?:(?:sampl\w*?|scan|acq\w*|daq)[ _]?)?rate|sampl\w*?[ _]?freq\w*|samples[ _]?per[ _]?sec\w*"
+    rf"|f_?s(?:amp\w*)?|freq\w*[ _]?sampl\w*|sr|sps|sfreq|abtast(?:rate|frequenz)){_UNIT}",
     re.IGNORECASE,
 )
 _INTERVAL = re.compile(
     r"(?:(?:sampl\w*?|scan)[ _]?(?:interval|period|time)|interval|t_?s(?:amp\w*)?|(?:d|delta)[ _]?[tx]"
-    r"|[tx][ _]?(?:d|delta)|time[ _]?(?:step|delta)|(?:(?:time|wf|x)[ _]?)?(?:increment|spacing))"
+    r"|[tx][ _]?(?:d|delta|step)|time[ _]?(?:step|delta)"
+    r"|(?:(?:time|wf|x|abscissa)[ _]?)?(?:inc(?:rement)?|spacing))"
     rf"{_UNIT}",
     re.IGNORECASE,
 )
 _START = re.compile(
     r"(?:(?:(?:wf|time|t|x)[ _]?)?start(?:ing)?(?:[ _]?(?:time|offset|value))?|[tx]_?0"
-    rf"|(?:time|t)[ _]?offset){_UNIT}",
+    rf"|(?:time|t|x|abscissa)[ _]?(?:offset|zero|origin|first|min)|first[ _]?(?:time|t|x)){_UNIT}",
     re.IGNORECASE,
 )
 _SHIFT = re.compile(
-    r"(?:.*[ _])?(?:delay|latency|skew|lag|(?:pre|post)?[ _]?trigger|(?:first|offset)[ _]?sample|sample"
-    r"[ _]?offset|begin)(?:[ _].*)?",
+    r".*(?:delay|latency|skew|trigger|first[ _]?sample|sample[ _]?offset).*"
+    r"|(?:.*[ _])?(?:lag|begin)(?:[ _].*)?",
     re.IGNORECASE,
 )
 _AXIS_UNIT = re.compile(
@@ -79,6 +80,10 @@ _MOST_REPEATED = 100
 """Most samples by which times may go back; more means that another record begins."""
 FARTHEST = 2**40
 """Largest counted gap between two times, in sample intervals."""
+_DATENUM = (693_000, 770_000)
+"""Days since the year 0 from 1897 to 2108, as MATLAB's ``datenum`` counts them."""
+_MOST_CHANNELS = 64
+"""Most values of one fact that may belong to the channels of a table."""
 _LONGEST_PAUSE = 10
 """Largest ratio of the time span, in sample intervals, to the samples; more means wrong times."""
 
@@ -95,6 +100,10 @@ def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     rates_hz = list(_rates_hz(facts, units, axis))
     other = next((each for each in rates_hz if not agrees(each, (rates_hz[0], rates_hz[0]))), None)
     trouble = "" if other is None else f"says {rates_hz[0]:.9g} and {other:.9g} samples/s"
+    for name, value in facts:
+        is_of_times = any(form.fullmatch(name.strip()) for form in (_RATE, _INTERVAL, _START))
+        if is_of_times and 1 < np.size(value) <= _MOST_CHANNELS and len({*np.ravel(value)}) > 1:
+            trouble = f"states several values of {name}"
     if axis.casefold() not in SECONDS:
         trouble = f"has an axis in {axis!r} instead of times"
     return {
@@ -131,7 +140,7 @@ def _number(value: Any) -> tuple[float, str]:
 
 def _text(value: Any) -> str:
     single = np.ravel(value)
-    if single.size != 1:
+    if single.size != 1 and not (1 < single.size <= _MOST_CHANNELS and np.all(single == single[0])):
         return ""
     return text_of(single[0]) if isinstance(single[0], bytes) else str(single[0])
 
@@ -147,7 +156,8 @@ def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
             continue
         number, unit = _number(value)
         if isfinite(number):
-            offsets_s.append(number * SECONDS.get((found["unit"] or unit).casefold(), 1.0))
+            unit = found["unit"] or unit or ("d" if _DATENUM[0] < number < _DATENUM[1] else "")
+            offsets_s.append(number * SECONDS.get(unit.casefold(), 1.0))
         elif (moment_s := _moment(value)) is not None:
             moments_s.append(moment_s)
     return sum((*moments_s[:1], *offsets_s[:1])) if moments_s or offsets_s else None
@@ -608,7 +618,8 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
             f"{path.name} states when some channels start, but not {', '.join(unknown)}; choose "
             f"channels of one kind, or {_IGNORE}"
         )
-    if max(each.start_error_s for each in channels) * rate_hz > _APART:
+    digit_s = float(np.spacing(max(map(abs, known))))
+    if max(digit_s, *(each.start_error_s for each in channels)) * rate_hz > _APART:
         raise InvalidRequest(
             f"the channels of {path.name} start at different times, with too few digits to align them; "
             f"export them with one start, or {_IGNORE}"

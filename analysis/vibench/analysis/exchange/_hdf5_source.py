@@ -64,8 +64,8 @@ class Hdf5Source:
                 raw = dataset[start:stop, row]
             case _Place(row=row):
                 raw = dataset[row, start:stop]
-        values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0)
-        values += _number(dataset, "add_offset", 0.0)
+        values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0, place.row or 0)
+        values += _number(dataset, "add_offset", 0.0, place.row or 0)
         for name in {"_FillValue", "missing_value"} & dataset.attrs.keys():
             values[raw == dataset.attrs[name]] = np.nan
         return values
@@ -120,7 +120,7 @@ def _holds_samples(item: h5py.HLObject) -> bool:
 
 def _channel(dataset: h5py.Dataset, name: str, samples: int, place: int, beside: Facts) -> SourceChannel:
     own = tuple(dataset.attrs.items())
-    step = exact_step(dataset.dtype) if _number(dataset, "add_offset", 0.0) == 0.0 else None
+    step = exact_step(dataset.dtype) if _number(dataset, "add_offset", 0.0, place) == 0.0 else None
     scale = scale_among((*own, *beside), are_counts=step is not None)
     return SourceChannel(
         name=name,
@@ -128,7 +128,7 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int, place: int, beside:
         label=name.rsplit("/", 1)[-1],
         unit=unit_among(own, place) or unit_among(beside, place, dataset.name.rsplit("/", 1)[-1]),
         stated_scale="" if "scale_factor" in dataset.attrs else scale,
-        step=None if step is None else step * abs(_number(dataset, "scale_factor", 1.0)),
+        step=None if step is None else step * abs(_number(dataset, "scale_factor", 1.0, place)),
         origin=_origin(dataset.file),
     )
 
@@ -173,5 +173,9 @@ def _value(dataset: h5py.Dataset) -> Any:
     return dataset[()] if dataset.size == 1 else None
 
 
-def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:
-    return float(np.ravel(dataset.attrs[name])[0]) if name in dataset.attrs else otherwise
+def _number(dataset: h5py.Dataset, name: str, otherwise: float, place: int) -> float:
+    """Return an attribute, or its value for a row or column of a table."""
+    numbers = np.ravel(dataset.attrs.get(name, otherwise))
+    if numbers.size not in {1, min(dataset.shape)}:
+        raise UnusableData(f"{dataset.name} has {numbers.size} numbers in {name}; export the file again")
+    return float(numbers[place if numbers.size > 1 else 0])

@@ -29,6 +29,7 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest, UnusableData
+from ..recordings.channels import DRIVE
 from ..signals.arrays import Flags, Reals
 from ._alignment import Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
@@ -189,12 +190,18 @@ def import_recording(
         writer = create_recording(out, header)
         try:
             _write(writer, source, wanted, parts, samples, observer)
+            _require_samples(writer, path)
         except BaseException:
             # An incomplete import is deleted, since its source still exists.
             writer.finish(RecordingState.FAILED, "the import was not completed")
             out.unlink(missing_ok=True)
             raise
         return writer.finish(RecordingState.COMPLETE, f"imported from {path.name}")
+
+
+def _require_samples(writer: RecordingWriter, path: Path) -> None:
+    if not writer.samples:
+        raise UnusableData(f"{path.name} has no sample with numbers in all channels; choose others")
 
 
 def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
@@ -219,6 +226,11 @@ def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:
         raise InvalidRequest(
             f"{name} says {found.stated_scale} for {found.name}, and not whether this was applied to its "
             "numbers; give scale in the mapping"
+        )
+    if found.quantity not in {"", quantity} and mapped.role != DRIVE and not mapped.file_unit:
+        raise InvalidRequest(
+            f"{name} says that {found.name} is a {found.quantity}, and {mapped.role} is not; choose another "
+            "channel or role, or give file_unit if the file is wrong"
         )
     if found.are_counts and not (found.unit or mapped.file_unit) and mapped.scale is None:
         what, one = ("counts", "count") if found.full_scale is None else ("fractions of full scale", "1")

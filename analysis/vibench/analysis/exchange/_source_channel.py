@@ -7,6 +7,7 @@ from math import inf
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibench.acquisition.recording import Origin
 
@@ -44,8 +45,9 @@ def text_of(raw: bytes) -> str:
 
 
 _UNIT = re.compile(
-    r"(?:(?:ni|y|eng(?:ineering)?\.?|phys(?:ical)?|meas(?:ure(?:d|ment)?)?|channel|data|signal|sensor|values?"
-    r"|ordinate|display)[ _.-]?)*units?(?:[ _.-]?(?:y|labels?|strings?|names?|descriptions?|texts?))?"
+    r"(?:(?:wf|ni|y|eng(?:ineering)?\.?|phys(?:ical)?|meas(?:ure(?:d|ment)?)?|channel|data|signal|sensor|values?"
+    r"|ordinate|display)[ _.-]?)*units?"
+    r"(?:[ _.-]?(?:y|labels?|strings?|names?|descriptions?|texts?|of[ _]measure\w*))?"
     r"|eu|einheit(?:en)?|unit[e\u00e9]s?",
     re.I,
 )
@@ -54,6 +56,8 @@ _SCALE = re.compile(
 )
 
 
+MOST_SCALES = 64
+"""Most scales of the channels of a table; more numbers are samples."""
 _COUNT_SCALE = re.compile(
     rf"{_SCALE.pattern}|sens\w*|conv\w*|mult\w*|resol\w*|calib\w*|coeff\w*|sf|c1|to_\w+|units?_per_\w+", re.I
 )
@@ -62,16 +66,23 @@ _COUNT_SCALE = re.compile(
 def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0, label: str = "") -> str:
     """Return the stated unit, or the one at a place of a list of units; empty if there is none.
 
-    ``LABEL_unit`` is the unit of the channel of that label only.
+    ``LABEL_unit`` is the unit of the channel of that label only. Several units are joined by "or".
     """
     own = re.compile(rf"{re.escape(label)}[ _.-]?units?", re.I)
-    for name, value in sorted(facts, key=lambda fact: own.fullmatch(fact[0]) is None):
-        is_unit = _UNIT.fullmatch(name) or (label and own.fullmatch(name))
-        if is_unit and (units := np.ravel(value)).size and units.dtype.kind in "SUO":
-            unit = units[place if units.size > 1 and place < units.size else 0]
-            # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
-            return text_of(unit if isinstance(unit, bytes) else str(unit).encode("utf-8", "surrogateescape"))
-    return ""
+    named = [(name, value) for name, value in facts if label and own.fullmatch(name)]
+    found = dict.fromkeys(
+        _text_at(np.ravel(value), place) for name, value in named or facts if named or _UNIT.fullmatch(name)
+    )
+    return " or ".join(filter(None, found))
+
+
+def _text_at(texts: NDArray[Any], place: int) -> str:
+    """Return the text at a place of a list, or the only one; empty for numbers."""
+    if not texts.size or texts.dtype.kind not in "SUO":
+        return ""
+    text = texts[place if texts.size > 1 and place < texts.size else 0]
+    # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
+    return text_of(text if isinstance(text, bytes) else str(text).encode("utf-8", "surrogateescape")).strip()
 
 
 def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -> str:
@@ -81,10 +92,10 @@ def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -
     """
     scale = _COUNT_SCALE if are_counts else _SCALE
     for name, value in facts:
-        if scale.fullmatch(name) and np.size(value) == 1 and np.ravel(value).dtype.kind in "iuf":
-            number = float(np.ravel(value)[0])
-            if number != 1.0:
-                return f"{name} = {number:.6g}"
+        numbers = np.ravel(value)
+        is_scale = scale.fullmatch(name) and numbers.dtype.kind in "iuf" and numbers.size <= MOST_SCALES
+        if is_scale and np.any(numbers != 1.0):
+            return f"{name} = {', '.join(f'{float(each):.6g}' for each in numbers)}"
     return ""
 
 
@@ -105,6 +116,8 @@ class SourceChannel:
     sample_rate_hz: float | None = None
     """Sample rate; None if the file does not state it exactly."""
     unit: str = ""
+    quantity: str = ""
+    """Quantity in the file, if its numbers may have any unit of it."""
     step: float | None = None
     """Step between values that were stored as integers, to store them exactly."""
     origin: Origin | None = None

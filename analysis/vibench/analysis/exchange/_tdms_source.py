@@ -1,6 +1,7 @@
 """Read National Instruments' TDMS with npTDMS."""
 
 import logging
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,9 @@ SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
 LONGEST_NS = 1000 * 86400 * 10**9
 """Time stamps are taken modulo a thousand days, so that a double resolves them to 15 ns."""
+SCALES = set("Linear Polynomial RTD Table Thermocouple Thermistor Strain Add Subtract AdvancedAPI".split())
+"""Scales that npTDMS applies; it ignores others."""
+_SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 START_ERROR_S = 1e-6
 """Start times are stored in microseconds."""
 
@@ -106,13 +110,14 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
     times["time_trouble"] = times["time_trouble"] or jumps
     times["start_s"] = next(iter(starts_s.values()), times["start_s"])
     step = exact_step(channel.dtype)
+    unknown = [f"{n} = {v}" for n, v in own.items() if _SCALE_TYPE.fullmatch(n) and v not in SCALES]
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
         samples=len(channel),
         label=channel.name,
         step=step,
         unit="s" if channel.dtype.kind == "M" else unit_among(own.items()),
-        stated_scale=scale_among(own.items(), are_counts=step is not None),
+        stated_scale=", ".join(unknown) or scale_among(own.items(), are_counts=step is not None),
         start_error_s=START_ERROR_S,
         runs=runs,
         **times,

@@ -27,6 +27,7 @@ from vibench.acquisition.recording import ChannelHeader, Origin, Recording, Reco
 
 from ..errors import UnusableData
 from ..signals.arrays import Complexes, Reals
+from ._alignment import agrees
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
 
@@ -205,7 +206,7 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
         kind = _line(file)
         if kind.strip() == UNITS:
             begin, _, factors = file.tell(), _line(file), _line(file)
-            per_metre = _real(factors[:25]) or 1.0
+            per_metre = _real(factors[:25]) or 0.0
             length = LENGTHS.get(round(per_metre, 2), f"m/{per_metre:g}")
             first = first or length
             file.seek(begin)
@@ -271,21 +272,30 @@ def _channel(number: int, header: list[str], length: str) -> SourceChannel:
     label = header[0].strip()
     unit, start, increment = header[7][46:66].strip(), _real(header[6][30:43]), _real(header[6][43:56])
     second = SECONDS.get(unit.casefold())
+    bounds = None if increment is None else rate_bounds(increment, DIGITS * abs(increment), unit)
+    direction, kind = header[5][51:55].strip(), _whole(header[8][:10])
+    trouble = ""
+    if bounds is None and increment:
+        trouble = f"has an axis in {unit!r} with steps of {increment:g}"
+    elif bounds is not None and rates and not agrees(rates[0], bounds):
+        trouble = f"says {rates[0]:.9g} samples/s, and its increment says {sum(bounds) / 2:.9g}"
     # Without a unit label, motion is in the units of dataset 164.
-    motion = MOTIONS.get(_whole(header[8][:10]), "") if length else ""
+    motion = MOTIONS.get(kind, "") if length else ""
+    own = header[8][46:66].strip().removesuffix("NONE") or motion.replace("m", length, 1)
+    quantities = {each: name for name, (each, *_) in QUANTITIES.items() if each in MOTIONS}
     return SourceChannel(
         name=str(number),
         samples=int(header[6][10:20]),
         label="" if label == "NONE" else label,
         sample_rate_hz=rates[0] if rates else None,
         origin=next(filter(None, map(read_origin, header[:5])), None),
-        unit=header[8][46:66].strip().removesuffix("NONE") or motion.replace("m", length, 1),
-        rate_bounds_hz=None if increment is None else rate_bounds(increment, DIGITS * increment, unit),
+        unit=own,
+        quantity="" if own else quantities.get(kind, ""),
+        stated_scale=f"direction = {direction}" if direction.startswith("-") else "",
+        rate_bounds_hz=bounds,
         start_s=start * second if start is not None and second is not None else None,
         start_error_s=DIGITS * abs(start) * second if start is not None and second is not None else 0.0,
-        time_trouble=f"states its start in {unit!r}, which is not a unit of time"
-        if start and second is None
-        else "",
+        time_trouble=trouble,
     )
 
 

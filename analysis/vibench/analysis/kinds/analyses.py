@@ -8,8 +8,7 @@ from vibench.acquisition.plan import Family, rows_by_kind
 
 from .analysis_kind import AnalysisKind
 from .noise import REPEATED_NOISE, STREAMED_NOISE
-from .sine import DWELL, SWEEP
-from .stepped import RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
+from .sine import DWELL, RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE, SWEEP
 
 ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
     {

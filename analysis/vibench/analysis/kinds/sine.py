@@ -1,21 +1,30 @@
-"""Sweeps and dwells: responses over frequency or at one, collisions, and kind of motion."""
+"""Sweeps, dwells and steps: responses over frequency or at one, collisions, and kind of motion."""
 
 from collections.abc import Callable
 from functools import partial
-from math import inf
+from math import inf, nan
 
 import numpy as np
 
 from vibench.acquisition.recording import SegmentLabel
 
 from ..chaos.verdict import MotionKind
-from ..comparison.recording_curves import dwell_traces, sweep_traces
+from ..comparison.recording_curves import dwell_traces, stepped_traces, sweep_traces
 from ..frequency_response.request import FrequencyResponseRequest
 from ..overlay.draws import Draw
 from ..overlay.ensemble import Ending, Quantity
-from ..overlay.overlay import dwell_overlay, dwell_quantities, sweep_endings, sweep_overlay, sweep_quantities
+from ..overlay.overlay import (
+    SteppedSineOverlay,
+    dwell_overlay,
+    dwell_quantities,
+    stepped_overlay,
+    stepped_quantities,
+    sweep_endings,
+    sweep_overlay,
+    sweep_quantities,
+)
 from ..overlay.simulated_channels import SimulatedChannels
-from ..recordings.channels import Channels
+from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts, known_specimen
 from ..sine.collision_region import collisions
@@ -32,6 +41,14 @@ from ..sine.dwell_analysis import (
     settled_envelope,
     terminal_levels,
 )
+from ..sine.jumps import SteppedLevelAnalysis
+from ..sine.stepped_response import (
+    SteppedResponse,
+    SteppedSineAnalysis,
+    Steps,
+    settled_check,
+    stepped_response,
+)
 from ..sine.sweep import SweptMotion
 from ..sine.sweep_analysis import (
     Sweep,
@@ -42,7 +59,7 @@ from ..sine.sweep_analysis import (
     played_check,
     smooth_jumps,
 )
-from ..uncertainty.quantities import dwell_budgets, sweep_budgets
+from ..uncertainty.quantities import dwell_budgets, stepped_budgets, sweep_budgets
 from .analysis_kind import AnalysisKind
 
 
@@ -133,3 +150,52 @@ DWELL = AnalysisKind(
     budgets=dwell_budgets,
     place=lambda plan: (plan.frequency_hz, plan.amplitude_vpp),
 )
+
+
+Setting = Callable[[Steps, Stretch], float]
+
+
+def _stepped_quantities(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
+    return stepped_quantities(analysis.response)
+
+
+def stepped_analysis(
+    setting_vpp: Setting,
+    label: SegmentLabel = SegmentLabel.STEP,
+    result: type[SteppedSineAnalysis] = SteppedSineAnalysis,
+) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
+    """Return the analysis of a kind that records each step in a segment called ``label``."""
+
+    def analyse(
+        facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest
+    ) -> SteppedSineAnalysis:
+        response = stepped_response(channels, plan, label, setting_vpp)
+        planned_hz = np.array(
+            [each.numbers["frequency_hz"] for each in channels.stretches(label)], dtype=float
+        )
+        frequency = frequency_check(response.frequency_hz, planned_hz)
+        checks = (*measurement_checks(facts), frequency, settled_check(response))
+        return result(facts, checks, plan, response)
+
+    def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
+        response = stepped_response(channels, analysis.excitation, label, setting_vpp)
+        return Draw(lambda: response, stepped_quantities(response), (), *channels.played_impacts(label))
+
+    return AnalysisKind(
+        family="stepped_sine",
+        analyse=analyse,
+        draws=lambda analysis: partial(draw, analysis),
+        compared=_stepped_quantities,
+        lay=stepped_overlay,
+        curves=stepped_traces,
+        budgets=stepped_budgets,
+    )
+
+
+STEPPED_SINE = stepped_analysis(lambda plan, _: plan.amplitude_vpp)
+STEPPED_LEVEL = stepped_analysis(
+    lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), result=SteppedLevelAnalysis
+)
+# With feedback the setting differs from the plan's and is unknown for each step.
+SETTLED_SINE = stepped_analysis(lambda *_: nan)
+RESONANCE_TRACKING = stepped_analysis(lambda *_: nan, SegmentLabel.RESONANCE)

@@ -13,11 +13,10 @@ from vibench.acquisition.plan import EXCITATION_KINDS, Family, excitation_text, 
 from ..chaos.verdict import MotionKind
 from ..figures.backbone import backbone_figure
 from ..figures.bench_levels import bench_levels_figure
-from ..figures.distortion import distortion_figure
 from ..figures.dwells import dwells_figure
 from ..figures.ensemble_band import agreement_text
-from ..figures.excitation import excitation_figure
 from ..figures.hysteresis import hysteresis_figure
+from ..figures.noise import distortion_figure, excitation_figure, transmission_levels_figure
 from ..figures.portraits import portraits_figure, verdict_text
 from ..figures.scan import scan_figure
 from ..figures.stepped_sine import (
@@ -29,10 +28,8 @@ from ..figures.stepped_sine import (
     stepped_sine_figure,
 )
 from ..figures.style import DrawnFigure
-from ..figures.sweep import regions_text, sweep_figure
-from ..figures.sweep_orders import sweep_orders_figure
+from ..figures.sweep import regions_text, sweep_figure, sweep_orders_figure
 from ..figures.transmission import transmission_figure
-from ..figures.transmission_levels import transmission_levels_figure
 from ..frequency_response.scan import scans_of
 from ..kinds.analysis_kind import (
     AnyResult,

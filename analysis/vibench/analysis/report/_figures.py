@@ -2,9 +2,8 @@
 
 from ..figures.branches import branches_figure, draw_line
 from ..figures.chain import chain_figure
-from ..figures.contact_forces import contact_forces_figure
-from ..figures.exponent_spectrum import exponent_spectrum_figure
 from ..figures.maps import map_figure
+from ..figures.predictions import contact_forces_figure, curve_figure, exponent_spectrum_figure
 from ..figures.style import (
     COLLIDING,
     LEVEL_STYLES,
@@ -20,7 +19,6 @@ from ..figures.style import (
     new_figure,
     styled,
 )
-from ..figures.tradeoff import curve_figure
 
 __all__ = [
     "COLLIDING",
