@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import binary_opening, maximum_filter1d
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Flags, Reals
@@ -100,10 +100,10 @@ def collisions(sweep: SweptMotion) -> Collisions:
     sweep. An interval counts as colliding when this residual exceeds three limits: 4 times the noise, 2 % of
     order 1, and twice the residual simulated without contact under the recorded base motion. The noise is the
     larger of two estimates: the sixth difference of the samples, and the quietest tenth of the sweep if it
-    can be smooth. Single intervals follow their neighbours, as do those with drop-outs of the laser.
-    Orders 2 and 3 above a tenth of order 1, and above twice those without contact, also show impacts. If no
-    specimen is known, they are required, at frequencies whose double and triple the sweep has not just
-    passed.
+    can be smooth. Intervals follow their neighbours, as do those with drop-outs of the laser. A residual of
+    twice its limits counts if two intervals in a row show impacts, and is otherwise not determined. Orders 2
+    and 3 above a tenth of order 1, and above twice those without contact, show impacts. If no specimen is
+    known, they are required, at frequencies whose double and triple the sweep has not just passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -122,23 +122,25 @@ def collisions(sweep: SweptMotion) -> Collisions:
     most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))
     smooth = np.maximum(_DISTORTION, most) * fundamental
     threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
-    above = residual > threshold
+    above, is_clear = residual > threshold, sweep.is_clear & (residual > _CLEARLY * threshold)
     is_known = bool(np.isfinite(sweep.linear_residual).all())
+    is_clear[0] &= is_known  # An unknown specimen may still ring of its start.
     inside = np.zeros(above.size, dtype=np.bool_)
     regions = []
-    for run in _merge_runs(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s)):
+    is_voted = _majority(above, votes) | binary_opening(is_clear & impacts, np.ones(2, np.bool_))
+    for run in _merge_runs(_runs(is_voted), round(_MERGE_S / sweep.interval_s)):
         first, last = _trim_run(above, *run, votes)
         if is_known or np.mean(_seen_impacts(sweep)[first : last + 1]) >= _ENOUGH:
             regions.append(_region(sweep, residual / threshold, first, last))
             inside[first : last + 1] = True
-    hz, is_unclear = sweep.frequency_hz, _majority(above | (ringing > _TOO_FAST), votes) & ~inside
+    hz, unclear = sweep.frequency_hz, (_majority(above | (ringing > _TOO_FAST), votes) | is_clear) & ~inside
     return Collisions(
         regions=tuple(regions),
         residual_rms=residual,
         threshold=threshold,
         is_colliding=inside,
         is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, smooth),
-        too_fast_hz=tuple((float(hz[first]), float(hz[last])) for first, last in _runs(is_unclear)),
+        too_fast_hz=tuple((float(hz[first]), float(hz[last])) for first, last in _runs(unclear)),
         noise_rms=noise,
     )
 
@@ -217,20 +219,18 @@ def _region(sweep: SweptMotion, excess: Reals, first: int, last: int) -> Collisi
     clear = np.flatnonzero(excess[first : last + 1] > _CLEARLY) + first
     if clear.size == 0:
         clear = np.array([(first + last) // 2])
-    end = excess.size - 1
     return CollisionRegion(
         start=_edge(sweep, first, first - 1, int(clear[0])),
         stop=_edge(sweep, last, last + 1, int(clear[-1])),
         reaches_start=first == 0,
-        reaches_stop=last == end,
+        reaches_stop=last == excess.size - 1,
     )
 
 
 def _edge(sweep: SweptMotion, edge: int, outside: int, inside: int) -> Edge:
     """Return an edge, bounded by the nearest quiet and the nearest clearly colliding interval."""
     end = sweep.frequency_hz.size - 1
-    quiet_hz = float(sweep.frequency_hz[min(max(outside, 0), end)])
-    clear_hz = float(sweep.frequency_hz[inside])
+    quiet_hz, clear_hz = (float(sweep.frequency_hz[at]) for at in (min(max(outside, 0), end), inside))
     half_hz = 0.5 * abs(sweep.sweep_rate_hz_per_s) * sweep.interval_s
     return Edge(
         frequency_hz=float(sweep.frequency_hz[edge]),
