@@ -125,6 +125,7 @@ def without_segments(path):
         (interrupted, r"a\.h5\.part does: it is being recorded, or was interrupted"),
         (empty, "is empty"),
         (text, "is not a readable HDF5 file"),
+        (text, "If another program wrote it, convert it with vibench import"),
         (cut_short, "cut short"),
         (another_hdf5, "no recording of vibench"),
         (newer, "format version 2.*reads version 1.*Update"),

@@ -65,8 +65,8 @@ def open_hdf5(path: Path) -> h5py.File:
             ) from error
         require_reachable(str(path), error)
         raise RecordingError(
-            f"{path} is not a readable HDF5 file ({error}). It was cut short, or is something else;"
-            " copy it again from where it was recorded."
+            f"{path} is not a readable HDF5 file ({error}). If another program wrote it, convert it"
+            " with vibench import; if it was cut short, copy it again from where it was recorded."
         ) from error
     try:
         _require_ours(path, file)
