@@ -183,7 +183,7 @@ def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_p
     result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
     assert result.returncode == 1
     said = " ".join(result.stderr.replace("│", " ").split())
-    assert f"{words[-1].removeprefix('--gap=')!r} is not a number; give one in SI units" in said
+    assert f"{words[-1].removeprefix('--gap=')!r} is not a number; give one in SI units without the" in said
 
 
 @pytest.mark.parametrize(
