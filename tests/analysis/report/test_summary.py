@@ -79,6 +79,7 @@ def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
 
 
 def test_undecided_motion_is_named_and_long_lists_are_shortened():
+    assert "undecided at 1 Vpp." in said(dwells=(dwell(1.0, MotionKind.UNDECIDED),) * 2), "up and down"
     assert said(dwells=(dwell(1.0, MotionKind.UNDECIDED),)) == "At 260 Hz the motion is undecided at 1 Vpp."
     many = tuple(dwell(1.0, MotionKind.PERIODIC, 200.0 + each) for each in range(50))
     words = said(dwells=many)

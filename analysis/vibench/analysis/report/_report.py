@@ -113,7 +113,7 @@ def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
         levels = kinds.setdefault(verdict_text(each.analysis.motion.verdict), [])
         levels.append(f"{each.analysis.excitation.amplitude_vpp:g}")
     for frequency_hz, kinds in by_place.items():
-        texts = [f"{kind} at {_join(levels)} Vpp" for kind, levels in kinds.items()]
+        texts = [f"{kind} at {_join(list(dict.fromkeys(levels)))} Vpp" for kind, levels in kinds.items()]
         yield f"At {frequency_hz:g} Hz the motion is {_join(texts)}."
 
 
