@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_460,
-    "analysis": 33_370,
+    "analysis": 33_358,
     "cli": 5_110,
     "extensions": 2_680,
     "gui": 12_160,

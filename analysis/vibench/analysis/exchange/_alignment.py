@@ -618,8 +618,7 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
             f"{path.name} states when some channels start, but not {', '.join(unknown)}; choose "
             f"channels of one kind, or {_IGNORE}"
         )
-    digit_s = float(np.spacing(max(map(abs, known))))
-    if max(digit_s, *(each.start_error_s for each in channels)) * rate_hz > _APART:
+    if max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels)) * rate_hz > _APART:
         raise InvalidRequest(
             f"the channels of {path.name} start at different times, with too few digits to align them; "
             f"export them with one start, or {_IGNORE}"

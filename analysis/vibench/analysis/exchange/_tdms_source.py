@@ -19,8 +19,8 @@ SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
 LONGEST_NS = 1000 * 86400 * 10**9
 """Time stamps are taken modulo a thousand days, so that a double resolves them to 15 ns."""
-SCALES = set("Linear Polynomial RTD Table Thermocouple Thermistor Strain Add Subtract AdvancedAPI".split())
-"""Scales that npTDMS applies; it ignores others."""
+SCALES = {"Linear", "Polynomial", "RTD", "Table", "Thermocouple", "Thermistor", "Strain", "Add", "Subtract"}
+"""Scales that npTDMS applies by numbers in the file."""
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 START_ERROR_S = 1e-6
 """Start times are stored in microseconds."""

@@ -201,10 +201,8 @@ def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
     found = analysis.spectrogram
     top = float(found.amplitude.max())
     decibel = 20 * np.log10(np.maximum(found.amplitude / top, 10 ** (-_RANGE_DB / 20)))
-    levels = {"vmin": -_RANGE_DB, "vmax": 0.0}
-    shown = axes.pcolormesh(
-        found.time_s, found.frequency_hz, decibel, cmap="viridis", rasterized=True, **levels
-    )
+    shown = axes.pcolormesh(found.time_s, found.frequency_hz, decibel, cmap="viridis", rasterized=True)
+    shown.set_clim(-_RANGE_DB, 0)
     factor, unit = style.prefixed(top, "m/s")
     figure.colorbar(shown, ax=axes, label=f"dB re {factor * top:.3g} {unit}")
     axes.set_xlabel("time of the sweep [s]")

@@ -370,8 +370,7 @@ class _Sums:
 
     def misfit_rates(self, poles: Reals) -> Reals:
         """Return the derivatives of the residual by each pole."""
-        # Without the terms in which the factors follow the poles: they leave the gradient unchanged
-        # (Kaufman 1975, BIT 15, 49-57).
+        # Factors that follow the poles leave the gradient unchanged (Kaufman 1975, BIT 15, 49-57).
         factors, _, onto = self.factors(poles)
         rates = self.pole_rates(poles, factors)
         return np.asarray(onto @ (onto.T @ rates) - rates)
