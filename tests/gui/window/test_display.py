@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from vibench.gui.window import display
+from vibench.gui import __main__ as display
 
 
 def started(tmp_path, **environment):
