@@ -308,3 +308,21 @@ def test_units_behind_the_functions_of_a_universal_file_apply_to_them(tmp_path):
     units = {"units_code": 5, "length": 1000.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
     file.write_sets({"type": 164, "units_description": "mm", "temp_mode": 1, **units}, "add")
     is_right(imported(tmp_path / "a.uff", ("1", "2", "3")))
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".mat"])
+@pytest.mark.parametrize(
+    ("fact", "numbers", "said"),
+    [("t0", (0, 0, 0.0025), "several values of t0"), ("gain", (1.0, 0.1, 10.0), "gain = 1, 0.1, 10")],
+)
+def test_several_starts_or_gains_of_one_table_are_refused(tmp_path, suffix, fact, numbers, said):
+    facts = {fact: np.array(numbers, dtype=float)}
+    if suffix == ".h5":
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            file["y"] = signal(TIMES)
+            file["y"].attrs.update(facts)
+    else:
+        savemat(tmp_path / "a.mat", {"y": signal(TIMES), **facts})
+    names = [f"{'/' * (suffix == '.h5')}y#{number}" for number in (1, 2, 3)]
+    with pytest.raises(InvalidRequest, match=said):
+        imported(tmp_path / f"a{suffix}", names)

@@ -17,7 +17,7 @@ from vibench.acquisition import shortened
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._mapping import ImportMapping
-from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
+from ._source_channel import MOST_CHANNELS, SECONDS, SourceChannel, rate_bounds, text_of
 
 _HERTZ = {"hz": 1.0, "s/s": 1.0, "khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6}
 UNITS = {*_HERTZ, *SECONDS, "\u00b5s"} - {""}
@@ -82,8 +82,6 @@ FARTHEST = 2**40
 """Largest counted gap between two times, in sample intervals."""
 _DATENUM = (693_000, 770_000)
 """Days since the year 0 from 1897 to 2108, as MATLAB's ``datenum`` counts them."""
-_MOST_CHANNELS = 64
-"""Most values of one fact that may belong to the channels of a table."""
 _LONGEST_PAUSE = 10
 """Largest ratio of the time span, in sample intervals, to the samples; more means wrong times."""
 
@@ -102,7 +100,7 @@ def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     trouble = "" if other is None else f"says {rates_hz[0]:.9g} and {other:.9g} samples/s"
     for name, value in facts:
         is_of_times = any(form.fullmatch(name.strip()) for form in (_RATE, _INTERVAL, _START))
-        if is_of_times and 1 < np.size(value) <= _MOST_CHANNELS and len({*np.ravel(value)}) > 1:
+        if is_of_times and _are_several(value) and len({*np.ravel(value)}) > 1:
             trouble = f"states several values of {name}"
     if axis.casefold() not in SECONDS:
         trouble = f"has an axis in {axis!r} instead of times"
@@ -140,9 +138,14 @@ def _number(value: Any) -> tuple[float, str]:
 
 def _text(value: Any) -> str:
     single = np.ravel(value)
-    if single.size != 1 and not (1 < single.size <= _MOST_CHANNELS and np.all(single == single[0])):
+    if single.size != 1 and not (_are_several(single) and np.all(single == single[0])):
         return ""
     return text_of(single[0]) if isinstance(single[0], bytes) else str(single[0])
+
+
+def _are_several(value: Any) -> bool:
+    """Return whether a fact has one plain value for each channel of a table."""
+    return 1 < np.size(value) <= MOST_CHANNELS and np.ravel(value).dtype.kind in "iufSU"
 
 
 def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:

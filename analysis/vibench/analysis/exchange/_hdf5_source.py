@@ -144,11 +144,8 @@ def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
     if group.name not in known:
         hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
         items = [(name, group[name]) for name in hard]
-        single = [(name, _value(one)) for name, one in items if isinstance(one, h5py.Dataset)]
-        known[group.name] = (
-            *group.attrs.items(),
-            *((name, value) for name, value in single if value is not None),
-        )
+        values = ((name, _value(one)) for name, one in items if isinstance(one, h5py.Dataset))
+        known[group.name] = (*group.attrs.items(), *(each for each in values if each[1] is not None))
     return known[group.name]
 
 

@@ -25,7 +25,7 @@ from ._alignment import stated_times
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
-from ._source_channel import SourceChannel, TableSource, exact_step, scale_among, unit_among
+from ._source_channel import MOST_CHANNELS, SourceChannel, TableSource, exact_step, scale_among, unit_among
 
 # The elements of a MATLAB 5 file are checked first, because scipy's reader crashes on wrong types.
 #
@@ -218,7 +218,7 @@ def _numbers(
     labels = {"x_unit": _part(axis, "quantity").get("label", ""), "unit": quantity.get("label", "")}
     own = {**{name: label for name, label in labels.items() if label}, **struct, **axis}
     own |= _part(quantity, "unit_transformation")
-    facts = (*((name, value) for name, value in own.items() if np.size(value) == 1), *around)
+    facts = (*((name, value) for name, value in own.items() if np.size(value) <= MOST_CHANNELS), *around)
     times = stated_times(facts)
     for name, value in struct.items():
         match value:

@@ -56,8 +56,8 @@ _SCALE = re.compile(
 )
 
 
-MOST_SCALES = 64
-"""Most scales of the channels of a table; more numbers are samples."""
+MOST_CHANNELS = 64
+"""Most values of one fact for the channels of a table; more numbers are samples."""
 _COUNT_SCALE = re.compile(
     rf"{_SCALE.pattern}|sens\w*|conv\w*|mult\w*|resol\w*|calib\w*|coeff\w*|sf|c1|to_\w+|units?_per_\w+", re.I
 )
@@ -93,7 +93,7 @@ def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -
     scale = _COUNT_SCALE if are_counts else _SCALE
     for name, value in facts:
         numbers = np.ravel(value)
-        is_scale = scale.fullmatch(name) and numbers.dtype.kind in "iuf" and numbers.size <= MOST_SCALES
+        is_scale = scale.fullmatch(name) and numbers.dtype.kind in "iuf" and numbers.size <= MOST_CHANNELS
         if is_scale and np.any(numbers != 1.0):
             return f"{name} = {', '.join(f'{float(each):.6g}' for each in numbers)}"
     return ""

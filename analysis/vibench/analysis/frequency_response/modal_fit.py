@@ -495,7 +495,7 @@ def _condition(curvature: Reals) -> float:
 def _rates(shapes: Callable[[Reals], Complexes], poles: Reals, factors: Reals) -> Complexes:
     """Return the derivatives of a sum of modes by each pole, by central differences.
 
-    Each pole changes the two shapes of its own mode only.
+    A pole affects only the two shapes of its mode.
     """
     rates = []
     for each in range(poles.size):
