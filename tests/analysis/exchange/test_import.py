@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import random
+import struct
 import tempfile
 import tracemalloc
 import wave
@@ -203,6 +204,36 @@ def test_wav_of_24_bits_keeps_every_bit(tmp_path):
         file.writeframes(counts.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3].tobytes())
     _, values = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0")))
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
+
+
+def test_more_bits_than_a_wav_file_states_are_refused(tmp_path):
+    counts = np.random.default_rng(2).integers(-(2**22), 2**22, SAMPLES, dtype=np.int32)
+    meaning = mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0"))
+    for name, stored in (("left", counts << 8), ("right", counts)):
+        extensible = struct.pack("<HHIIHHHHI", 0xFFFE, 1, int(RATE_HZ), 4 * int(RATE_HZ), 4, 32, 22, 24, 4)
+        form = extensible + bytes.fromhex("0100000000001000800000aa00389b71")
+        body = b"WAVEfmt " + struct.pack("<I", len(form)) + form
+        body += b"data" + struct.pack("<I", 4 * SAMPLES) + stored.astype("<i4").tobytes()
+        (tmp_path / f"{name}.wav").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
+    _, values = imported(tmp_path / "left.wav", meaning)
+    np.testing.assert_array_equal(values[0], counts / 2.0**23)
+    with pytest.raises(UnusableData, match="states 24 bits, and its samples have more"):
+        imported(tmp_path / "right.wav", meaning)
+
+
+@pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 2), (2, SAMPLES)])
+def test_hdf5_chunks_that_were_never_written_are_lost_samples(tmp_path, shape):
+    axis = int(np.argmax(shape))
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        chunk = tuple(size if size < SAMPLES else 1000 for size in shape)
+        dataset = file.create_dataset("a", shape, chunks=chunk, dtype=float)
+        signal = signals()[1]
+        for part in (slice(0, 20_000), slice(25_000, SAMPLES)):
+            where = tuple(part if each == axis else slice(None) for each in range(len(shape)))
+            dataset[where] = signal[part, None] if len(shape) == 2 and axis == 0 else signal[part]
+    name = "a" if len(shape) == 1 else "a#2"
+    recording, _ = imported(tmp_path / "a.h5", mapping(tmp_path, (name, "m0_velocity", "")))
+    assert [(each.first_sample, each.last_sample) for each in recording.gaps] == [(20_000, 24_999)]
 
 
 def test_samples_near_a_stated_full_scale_are_overloads(tmp_path):

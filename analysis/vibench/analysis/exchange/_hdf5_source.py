@@ -68,6 +68,8 @@ class Hdf5Source:
         values += _number(dataset, "add_offset", 0.0, place.row or 0)
         for name in {"_FillValue", "missing_value"} & dataset.attrs.keys():
             values[raw == dataset.attrs[name]] = np.nan
+        if dataset.chunks:
+            _mark_unwritten(dataset, 0 if place.has_time_first else 1, start, values)
         return values
 
 
@@ -105,6 +107,14 @@ def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
             channel = _channel(dataset, name, samples, row, beside)
             yield replace(channel, **times), _Place(dataset.name, row, has_time_first)
+
+
+def _mark_unwritten(dataset: h5py.Dataset, axis: int, start: int, values: Reals) -> None:
+    """Replace samples of chunks that were never written, which HDF5 returns as a fill value, by NaN."""
+    length, corner = dataset.chunks[axis], [0] * dataset.ndim
+    for corner[axis] in range(start - start % length, start + len(values), length):
+        if dataset.id.get_chunk_info_by_coord(tuple(corner)).byte_offset is None:
+            values[max(corner[axis] - start, 0) : corner[axis] + length - start] = np.nan
 
 
 def _holds_samples(item: h5py.HLObject) -> bool:

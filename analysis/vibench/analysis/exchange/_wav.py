@@ -3,7 +3,6 @@
 Read WAV; integers are fractions of full scale, -1 to 1.
 """
 
-import os
 import struct
 import warnings
 import wave
@@ -65,6 +64,8 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 ORDERS = {b"RIFF": "<", b"RIFX": ">"}
 """Byte orders of sizes; RF64 files over 4 GiB store them elsewhere."""
 FIRST_CHUNK = 12
+EXTENSIBLE_BYTES = 40
+"""Size of a format chunk that states how many bits of a sample are used."""
 UNKNOWN_SIZE = 2**32 - 1
 """Size field of a file that was streamed, so that its size was not known."""
 OFFSETS = {"u": 128.0}
@@ -88,10 +89,13 @@ class WavSource:
 @contextmanager
 def open_wav(path: Path) -> Iterator[WavSource]:
     """Open a file; raises ValueError when it is not WAV, compressed or truncated."""
-    _require_whole(path)
+    bits = _valid_bits(path)
     rate, data = _read(path)
     table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
     is_integer = table.dtype.kind in "iu"
+    unused = 2 ** max(8 * table.itemsize - bits, 0) - 1
+    if table.dtype.kind == "i" and np.bitwise_or.reduce(table, axis=None) & unused:
+        raise ValueError(f"it states {bits} bits, and its samples have more")
     yield WavSource(
         table,
         tuple(
@@ -107,8 +111,9 @@ def open_wav(path: Path) -> Iterator[WavSource]:
     )
 
 
-def _require_whole(path: Path) -> None:
-    """Raise ValueError for a truncated file or several chunks of samples."""
+def _valid_bits(path: Path) -> int:
+    """Return the stated bits of a sample; raises ValueError for a truncated file or several data chunks."""
+    bits = 8 * BYTES
     with path.open("rb") as file:
         order = ORDERS.get(file.read(4))
         file.seek(FIRST_CHUNK)
@@ -117,7 +122,7 @@ def _require_whole(path: Path) -> None:
             name, size_bytes = file.read(4), file.read(4)
             if len(size_bytes) < len(name) or not name:
                 if chunks:
-                    return
+                    return bits
                 raise ValueError("it ends before its samples")
             (size,) = struct.unpack(f"{order}I", size_bytes)
             left = path.stat().st_size - file.tell()
@@ -127,7 +132,12 @@ def _require_whole(path: Path) -> None:
             chunks += name == b"data"
             if chunks > 1:
                 raise ValueError("it has samples in several chunks; only one can be read")
-            file.seek(size + size % 2, os.SEEK_CUR)
+            after = file.tell() + size + size % 2
+            if name == b"fmt " and size >= EXTENSIBLE_BYTES:
+                container, valid = struct.unpack(f"{order}14xHxxH", file.read(20))
+                bits = valid or container
+            file.seek(after)
+        return bits
 
 
 def _read(path: Path) -> tuple[int, NDArray[Any]]:
