@@ -193,27 +193,25 @@ def test_the_exponent_matches_the_motion_reached():
     assert quiet.lyapunov_per_s == pytest.approx(modal_form(gong2025()).rates.real.max())
 
 
-@pytest.mark.parametrize(
-    ("specimen", "drive", "duration"),
-    [
-        (
-            gong2025(6.483827302321825e-6, 27.07246318911318e-6, "power:3"),
-            Harmonic(441.2471126492003, 52.00892322654357e-6),
-            FixedDuration(20.0, 5.0),
-        ),
-        (
-            gong2025(30.90384489081641e-6, 13.596217218777594e-6, "linear_gap:1e6"),
-            Harmonic(163.6355123267624, 7.1261118269347125e-6),
-            FixedDuration(18.690249345786654, 3.0),
-        ),
-    ],
-)
-def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent(specimen, drive, duration):
+def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent():
+    """Each start is another realisation; on every computer some of these end during or after the window."""
     observe = (Observable.RESPONSE, Observable.LYAPUNOV)
-    found = solve_scene(Scene(specimen, drive, duration=duration, observe=observe, budget_s=0.0))
-    assert found.motion is MotionKind.CHAOTIC_SO_FAR
-    assert "chaos ended" in found.ended
-    assert found.lyapunov_per_s is None or found.lyapunov_per_s > 3.0 * found.lyapunov_error_per_s
+    cubic = gong2025(6.483827302321825e-6, 27.07246318911318e-6, "power:3")
+    linear = gong2025(30.90384489081641e-6, 13.596217218777594e-6, "linear_gap:1e6")
+    scenes = (
+        Scene(cubic, Harmonic(441.2471126492003, 52.00892322654357e-6), duration=FixedDuration(20.0, 5.0)),
+        Scene(linear, Harmonic(163.6355123267624, 7.1261118269347125e-6), duration=FixedDuration(12.0, 10.0)),
+    )
+    starts = [Given((each * 1e-6, 0.0, 0.0, 0.0, 0.0, 0.0)) for each in range(1, 13)]
+    found = [
+        solve_scene(replace(scene, observe=observe, budget_s=0.0, start=start))
+        for scene in scenes
+        for start in starts
+    ]
+    assert any(each.motion is MotionKind.CHAOTIC_SO_FAR and "chaos ended" in each.ended for each in found)
+    for each in found:
+        if each.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}:
+            assert each.lyapunov_per_s is None or each.lyapunov_per_s > 3.0 * each.lyapunov_error_per_s
 
 
 def test_a_diverging_motion_has_an_outcome_without_numbers():
