@@ -32,12 +32,12 @@ QUEUE_PATIENCE_S = 2.0
 
 @dataclass(frozen=True)
 class Batch:
-    """Writes that belong together, with the counters that then mark them as valid."""
+    """Writes that belong together, and the counters that mark them as valid afterwards."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
     """Offset in the file and data of each write."""
     counters: Mapping[int, int] = field(default_factory=dict)
-    """Value of each counter, by its offset, once the writes are safe."""
+    """Value of each counter once the writes are on the disk, by file offset."""
     reservations: tuple[tuple[int, int], ...] = ()
     """Offset and size of each range to reserve before the writes [bytes]."""
     samples: int = 0
@@ -58,7 +58,7 @@ class Committer:
         self._is_closing = False
         self._is_abandoned = False
         self.failure: OSError | None = None
-        """Error of the disk, if any."""
+        """Disk error that ended the writing; None without an error."""
         self._is_failure_seen = False
         self._counters: dict[int, int] = {}
         self._written_samples = 0
@@ -83,7 +83,7 @@ class Committer:
     def close(self) -> None:
         """Write and commit everything queued, and end the thread. Legal at any time.
 
-        Raises RecordingError when the disk does not respond; do not access it then.
+        Raises RecordingError when the disk does not respond; the disk must then not be accessed.
         """
         with self._changed:
             self._is_closing = True
@@ -98,7 +98,7 @@ class Committer:
             )
 
     def raise_unseen_failure(self) -> None:
-        """Raise a failure that no call has reported yet."""
+        """Raise RecordingError for a disk error that no call has reported yet."""
         if self.failure is not None and not self._is_failure_seen:
             self._require_health(has_room=True)
 
@@ -150,7 +150,7 @@ class Committer:
         return not is_last
 
     def _next(self) -> tuple[Batch | None, bool]:
-        """Return the next batch (None when a commit is due or all is done), and whether all is done."""
+        """Return the next batch (None if a commit is due or none is left), and whether all is written."""
         with self._changed:
             # With nothing to commit, wait for the next batch without a time limit.
             remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
@@ -188,16 +188,16 @@ Cell = str | int | float
 
 
 class TableWriter:
-    """Writes the rows of one table, at the places reserved in the file."""
+    """Encodes the rows of one table for their reserved offsets in the file."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places
         self.rows = 0
-        """Rows written so far."""
+        """Number of rows so far."""
 
     @property
     def free_rows(self) -> int:
-        """Rows that still fit."""
+        """Number of rows that still fit."""
         return self._places.table.capacity - self.rows
 
     def append(self, cells: Sequence[Cell]) -> Batch:
@@ -241,12 +241,12 @@ class OpenSegment:
     numbers_json: str
 
     def cells(self, last_sample: int, is_complete: int) -> tuple[Cell, ...]:
-        """Return the segment's row in the file."""
+        """Return the values of the segment's row in the table."""
         return (self.first_sample, last_sample, is_complete, self.label, self.numbers_json)
 
 
 class Journal:
-    """The tables of events, segments, overloads and gaps; each method returns the writes to queue."""
+    """Tables of events, segments, overloads and gaps; each method returns the writes to queue."""
 
     def __init__(self, places: Mapping[str, TablePlaces], roles: tuple[str, ...]) -> None:
         self._events = TableWriter(places[layout.EVENTS.name])
@@ -310,7 +310,7 @@ class Journal:
             )
         row, last = self._last_overload.get(overload.channel, (-1, overload))
         continues = row >= 0 and overload.first_sample <= last.last_sample + 1
-        # One row is kept free for each channel without an overload, so that every channel has one to extend.
+        # One row is kept free for each channel without an overload, so that each channel has a row to extend.
         untouched = len(self._roles) - len(self._last_overload)
         must_grow = row >= 0 and self._overloads.free_rows <= untouched
         if continues or must_grow:

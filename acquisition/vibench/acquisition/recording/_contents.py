@@ -26,7 +26,7 @@ from ._layout import (
 DEEPEST_JSON = 40
 """Deepest nesting of JSON that is accepted; a plan has about five levels."""
 SAME_SCALE = 1e-9
-"""Relative tolerance of scale_factor and add_offset against the values that other attributes give."""
+"""Allowed relative difference between stored and recomputed ``scale_factor`` and ``add_offset``."""
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -56,13 +56,13 @@ def _unknown_as_none(value: object) -> object:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Unknown = BeforeValidator(_unknown_as_none)
-"""Number that is NaN in the file if unknown."""
+"""Converter of NaN, which marks an unknown number in the file, to None."""
 Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
-"""Allowed sample rates: from one sample in two weeks to a terahertz [1/s]."""
+"""Sample rate; allowed are one sample in two weeks to a terahertz [1/s]."""
 
 
 class _AbstractFacts(BaseModel):
-    """Attributes of one HDF5 object; attributes of other programs and later versions are ignored."""
+    """Attributes of one HDF5 object; unknown attributes (other programs, later versions) are ignored."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
 
@@ -116,18 +116,18 @@ class ConfigurationFacts(_AbstractFacts):
     confirmations_json: dict[str, str | float]
     provenance_json: dict[str, JsonValue]
     bench_check_json: dict[str, JsonValue] = Field(default_factory=dict)
-    """Absent from files of earlier versions."""
+    """Result of the last bench check; empty for files of earlier versions, which do not contain it."""
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
-    """Validate the file's attributes; ``found`` has those that a growing file stores in datasets instead."""
+    """Return the file's validated attributes; ``found`` adds values that a growing file keeps in datasets."""
     return _read("the file", FileFacts, {**attributes, **found})
 
 
 def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
-    """Read the attributes of a channel.
+    """Return the header of a channel, read from the attributes of its dataset.
 
-    Raises RecordingError when an attribute is missing, has a wrong type or value, or contradicts others.
+    Raises RecordingError when an attribute is missing, has a wrong type or value, or contradicts another.
     """
     attributes = read_attributes(dataset)
     facts = _read(f"the channel {role!r}", ChannelFacts, attributes)
@@ -144,14 +144,14 @@ def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
 
 
 def configuration_facts(file: h5py.File) -> ConfigurationFacts:
-    """Read the texts of the configuration; raises RecordingError."""
+    """Return the parsed texts of ``/configuration``; raises RecordingError if one is not valid."""
     group = file[CONFIGURATION]
     texts = {name: _parse(name, read_text_dataset(group, name)) for name in group}
     return _read("the configuration", ConfigurationFacts, texts)
 
 
 def json_object(text: str) -> dict[str, Any]:
-    """Read a JSON object with finite numbers and limited depth; raises ValueError."""
+    """Parse a JSON object; raises ValueError for other JSON, infinite numbers or too deep nesting."""
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except RecursionError as error:

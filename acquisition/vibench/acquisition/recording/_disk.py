@@ -1,4 +1,4 @@
-"""Write at known offsets of a file in a known order, on a disk that may be full or lose power."""
+"""Access to a recording's file on a disk that may be full or lose power, and simulated disk faults."""
 
 import errno
 import os
@@ -18,7 +18,7 @@ class Disk(Protocol):
     """File operations of the committer."""
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``, at least into the cache of the system."""
+        """Write ``data`` at ``offset``, at least into the cache of the operating system."""
 
     def sync(self) -> None:
         """Return when everything written so far would survive a power cut."""
@@ -31,7 +31,7 @@ class Disk(Protocol):
 
 
 class PositionedFile(OpenFile):
-    """A file on a real disk, locked as being recorded while it is open; other programs may read it."""
+    """File on a real disk; its lock marks it as being recorded while open, and others may read it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -60,7 +60,7 @@ def sole_use(path: Path) -> Iterator[None]:
 
 
 def is_being_recorded(path: Path) -> bool:
-    """Whether a living process holds the file open for recording."""
+    """Whether a running process has the file open for recording."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         return not is_locked_alone(descriptor)
@@ -72,7 +72,7 @@ Heal = Callable[[], None]
 
 
 class DiskTrouble:
-    """Simulated fault of the disk; any thread may change it.
+    """Simulated disk fault; any thread may set or end it.
 
     From the second refusal on, ``on_refusal`` is called before the error is raised.
     """
@@ -97,7 +97,7 @@ class DiskTrouble:
         return self._speed_up
 
     def meet(self) -> None:
-        """Apply the current fault; raises OSError (ENOSPC) when the disk is full."""
+        """Apply the current fault: wait for a slow disk; raises OSError (ENOSPC) for a full disk."""
         with self._changed:
             # Wait for a slow disk; stop waiting as soon as the fault ends.
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)

@@ -1,8 +1,8 @@
-"""Find drop-outs of the vibrometer in its velocity, and bridge them from both sides.
+"""Find drop-outs in the vibrometer's velocity, and bridge them from the samples on both sides.
 
 Speckle interrupts the laser's signal for a fraction of a millisecond, and the decoder shows an arbitrary
 velocity. A drop-out jumps away from the motion within one sample and later returns to it. Real motion looks
-different: an impact changes the velocity for good, and ringing oscillates.
+different: an impact changes the velocity permanently, and ringing oscillates.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,37 +24,37 @@ LONGEST_S = 4e-3
 LOWEST_RATE_HZ = 20_000.0
 """Lowest sample rate [Hz]; below it, an impact may take only a few samples, like a drop-out."""
 _FAR = 60.0
-"""Least fourth difference at the edge of a drop-out, relative to the median."""
+"""Smallest fourth difference at the edge of a drop-out, relative to the median."""
 _HEARD = 6.0
-"""Least fourth difference of ringing of the converter's filter, relative to the median."""
+"""Smallest fourth difference in the ringing of the converter's filter, relative to the median."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
-"""Sharp corners closer together than this belong to one run [s]."""
+"""Largest spacing of the sharp corners of one run [s]."""
 _MOST_RUNS = 12
-"""Largest number of runs of sharp corners close together; more indicate motion."""
+"""Largest number of neighbouring runs of sharp corners in drop-outs; more runs indicate motion."""
 _FLANK_S = 1e-3
-"""Length of the motion on each side that a drop-out is compared with [s]."""
+"""Length of the motion on each side with which a drop-out is compared [s]."""
 _LEAST_HELD = 8
-"""Least number of equal samples that indicate a drop-out; a steep change (`_QUANTA`) is at both ends."""
+"""Smallest number of equal samples that indicate a drop-out, if both ends are steep (`_QUANTA`)."""
 _QUANTA = 4.0
-"""Least change at both ends of equal samples, relative to the smallest change in the channel."""
+"""Smallest change at both ends of equal samples, relative to the smallest change in the channel."""
 _LEAST_OF_FLANK = 0.25
-"""Least share of a flank that must be free of other drop-outs."""
+"""Smallest fraction of a flank that must be free of other drop-outs."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
 """Time that must follow a sample before it is known whether it belongs to a drop-out [s]."""
 _OUTSTANDING = 8.0
-"""Least distance of a drop-out from a smooth fit, relative to the rms residual of that fit in the flanks."""
+"""Least distance of a drop-out from a smooth fit, relative to the rms residual of the fit in the flanks."""
 _JUMP = 4.0
-"""Least change between samples at the edge of a drop-out, relative to the largest in the flanks."""
+"""Smallest change between samples at the edge of a drop-out, relative to the largest in the flanks."""
 _STEEP = 0.2
-"""The same change, relative to the largest distance from the fit; clipped peaks change more slowly."""
+"""The same, relative to the largest distance from the fit; clipped peaks change more slowly."""
 _MOST_PER_S = 400.0
 """Largest number of drop-outs per second; more indicate motion."""
 _ORDER = 48
 _CONTEXT = 12 * _ORDER
-"""Samples on each side for the linear prediction."""
+"""Number of samples on each side that the linear prediction uses."""
 _TOGETHER = 4 * _CONTEXT
-"""Longest group of drop-outs that is bridged at once, in samples."""
+"""Longest group of drop-outs that is bridged at once [samples]."""
 _BLOCK_S = 1.0
 
 
@@ -63,18 +63,18 @@ class Dropout(NamedTuple):
 
     first: int
     stop: int
-    """Sample after the last one."""
+    """Number of the sample after the last one."""
 
 
 def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
-    """Find drop-outs: jumps away from the motion that return to it.
+    """Return the drop-outs: jumps away from the motion that later return to it.
 
     Parameters
     ----------
     velocity
         About one second of velocity, shape (samples,); lost samples are NaN.
     sample_rate_hz
-        Sample rate; nothing is found below 20 kHz.
+        Sample rate [Hz]; below 20 kHz no drop-outs are reported.
     """
     flank = round(_FLANK_S * sample_rate_hz)
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
@@ -104,12 +104,12 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
 
 
 def _held(velocity: Samples, longest: float) -> list[Dropout]:
-    """Find drop-outs in which the decoder holds one value; noise may hide the corners at their edges."""
+    """Return drop-outs in which the decoder holds one value; noise may hide the corners at their edges."""
     change = np.abs(np.diff(velocity))
     moves = np.flatnonzero(change != 0.0)
     first, last, equal = moves[:-1], moves[1:], np.diff(moves)
     steep = change > _QUANTA * np.min(change, where=change > 0.0, initial=np.inf)
-    # A clipped peak has equal samples too, but at the channel's largest value.
+    # A clipped peak also has equal samples, but at the channel's largest magnitude.
     is_inside = np.abs(velocity[last]) < np.fmax.reduce(np.abs(velocity))
     held = (equal >= _LEAST_HELD) & (equal <= longest) & steep[first] & steep[last] & is_inside
     ends = zip(first[held].tolist(), last[held].tolist(), strict=True)
@@ -117,7 +117,7 @@ def _held(velocity: Samples, longest: float) -> list[Dropout]:
 
 
 def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
-    """Join drop-outs with less than a flank between them."""
+    """Return the drop-outs; those less than a flank apart are joined."""
     joined: list[Dropout] = []
     for each in found:
         if joined and each.first - joined[-1].stop < flank:
@@ -128,14 +128,14 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Return the first sample of a drop-out that may have started undetected, or the number of samples.
+    """Return the sample from which a drop-out may still be undetected; without one, the number of samples.
 
     Parameters
     ----------
     velocity
         Velocity of a channel that is still being recorded, shape (samples,).
     sample_rate_hz
-        Sample rate.
+        Sample rate [Hz].
     dropouts
         Drop-outs found in it.
     """
@@ -159,15 +159,15 @@ def _corners(velocity: Samples) -> tuple[Samples, float]:
 
 
 def _apart(places: Places, distance: float) -> list[Places]:
-    """Split sorted sample numbers where neighbours are more than ``distance`` apart."""
+    """Split sorted sample numbers where two neighbours are more than ``distance`` apart."""
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
 
 
 def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
     """Return drop-outs that together explain all of these runs of sharp corners; empty if none can.
 
-    The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the edges
-    of one drop-out could pass for two, with its constant level as the motion between them.
+    The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the two
+    edges of one drop-out could be taken for two drop-outs, with its constant level as motion between them.
     """
     ends = [0, *(each.stop for each in runs)]
     begins = [*(each.first for each in runs), velocity.size]
@@ -189,16 +189,16 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
 
 
 def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
-    """Return how many samples the converter's filter rings; `_SILENT` quiet samples in a row end it."""
+    """Return the ringing time of the converter's filter [samples]; `_SILENT` quiet samples end it."""
     heard = np.flatnonzero(rings[:longest])
     breaks = np.flatnonzero(np.diff(heard) > _SILENT)
     return int(heard[breaks[0]] if breaks.size else heard[-1])
 
 
 def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> float:
-    """Return the mean square residual of a smooth fit to both flanks; infinite if it is no drop-out.
+    """Return the mean square residual of a smooth fit to both flanks; infinite if this is not a drop-out.
 
-    A drop-out jumps far from that fit. A clipped peak is far from it too, but changes more slowly.
+    A drop-out jumps far away from the fit. A clipped peak is also far away, but changes more slowly.
     """
     near = velocity[dropout.first - before : dropout.stop + after]
     if not np.all(np.isfinite(near)):
@@ -221,7 +221,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     """Return the velocity, shape (samples,), with drop-outs bridged by linear prediction.
 
-    The bridge is the one with the smallest prediction error, for a predictor fitted to the samples around it
+    The bridge minimises the prediction error of a linear predictor fitted to the samples around the drop-out
     (Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330).
 
     Parameters
@@ -229,7 +229,7 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     velocity
         Velocity, shape (samples,); it is not modified.
     dropouts
-        Drop-outs that `found_dropouts` returned.
+        Drop-outs, as returned by `found_dropouts`.
     """
     mended, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:
@@ -293,7 +293,7 @@ class BridgedChannel:
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
             return values
-        # Include neighbouring drop-outs, whose samples cannot serve as context.
+        # Include neighbouring drop-outs, whose samples must not be used for the prediction.
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
@@ -325,6 +325,6 @@ class BridgedChannel:
         heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
         moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
         found = tuple(each for each in moved if first <= each.first < stop)
-        if end == stop + margin:  # otherwise a growing recording may still get samples here
+        if end == stop + margin:  # otherwise a growing recording may get more samples here
             known[self.role, place] = found
         return found

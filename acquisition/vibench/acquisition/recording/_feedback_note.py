@@ -35,7 +35,7 @@ class Held(StrEnum):
 
 
 class JumpSide(StrEnum):
-    """Branch of a response at a jump."""
+    """Side of a jump: the branch of the response before it or after it."""
 
     BEFORE = "before"
     AFTER = "after"
@@ -62,7 +62,7 @@ class LockResult(StrEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> "LockResult | None":
-        """Read values of older recordings."""
+        """Return the member for a value of an older recording."""
         return cls.LOST if value == "not met within the tries" else None
 
 
@@ -72,7 +72,7 @@ Way = Literal["up", "down"]
 
 
 class AbstractNote(BaseModel):
-    """Values of one result of a controller, in the order in which they are written."""
+    """Values of one result of a feedback controller, in the order in which they are written."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
 
@@ -124,7 +124,7 @@ class SegmentNote(AbstractNote):
 
 
 class DwellNote(AbstractNote):
-    """Number of level checks in a dwell, and how many were outside tolerance."""
+    """Number of level checks in a dwell, and number of those outside tolerance."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.DWELL]
@@ -133,7 +133,7 @@ class DwellNote(AbstractNote):
 
 
 class SweepNote(AbstractNote):
-    """Number of steps in a sweep, and how many had a level outside tolerance."""
+    """Number of steps in a sweep, and number of those with a level outside tolerance."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.SWEEP]
@@ -207,9 +207,9 @@ class ResonanceNote(AbstractNote):
     mode_u_hz: SixFigures | None = None
     damping_ratio: SixFigures | None = None
     harmonic: int = 1
-    """Harmonic of m0 whose phase is used: above 1 the resonance is superharmonic."""
+    """Harmonic of m0 whose phase is used: above 1 for a superharmonic resonance."""
     subharmonic: int = 1
-    """Drive periods in one period of m0: above 1 the resonance is subharmonic."""
+    """Drive periods in one period of m0: above 1 for a subharmonic resonance."""
     harmonic_m: SixFigures | None = None
     """Amplitude of that harmonic, or subharmonic [m]."""
 
@@ -225,11 +225,11 @@ class NoiseNote(AbstractNote):
     asked_rms: SixFigures
     """Requested rms acceleration in the band at full level, with notches [m/s2]."""
     within: SixFigures
-    """Share of the lines within the plan's tolerance of the level of this realisation."""
+    """Fraction of spectral lines within the plan's tolerance of this realisation's level."""
     worst_db: SixFigures
     worst_hz: SixFigures
     notched: SixFigures
-    """Share of lines that are lowered to limit the response."""
+    """Fraction of spectral lines that are lowered to limit the response."""
     kurtosis: SixFigures
     """Kurtosis of the base's acceleration; 3 for Gaussian noise."""
 
@@ -265,16 +265,16 @@ class BranchPointNote(AbstractNote):
     frequency_hz: SixFigures
     base_m: SixFigures
     base_u_m: SixFigures = 0.0
-    """Standard uncertainty from the scatter of the averaged values; 0 if the recording does not contain
+    """Standard uncertainty [m], from the scatter of the averaged values; 0 if the recording does not state
     it."""
     m0_m: SixFigures
     m0_u_m: SixFigures = 0.0
     phase_deg: SixFigures
-    """Phase of m0 over the base, as displacements."""
+    """Phase of the displacement of m0 relative to the base displacement [deg]."""
     residue: SixFigures
-    """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
+    """Rms of the harmonics from the second on of the base displacement, relative to its fundamental."""
     residue_acceleration: SixFigures
-    """Harmonics of the base's acceleration from the second on, rms, over its fundamental."""
+    """Rms of the harmonics from the second on of the base acceleration, relative to its fundamental."""
     reference_v: SixFigures
     """First coefficient of the controller's target [V]."""
     tries: int
@@ -297,13 +297,13 @@ class BranchStabilityNote(AbstractNote):
     """Number of the branch point with this motion."""
     stability: Stability
     multiplier: SixFigures | None
-    """Largest multiplier over a period under a prescribed base motion, magnitude; None if unknown."""
+    """Magnitude of the largest Floquet multiplier under prescribed base motion; None if unknown."""
     multiplier_u: SixFigures | None
     """Standard uncertainty; 95 % bounds are at 2.1 times this."""
     perturbation: SixFigures
-    """Requested rms change of the fundamentals of base and m0, relative; the larger of both."""
+    """Requested relative rms change of the fundamentals of base and m0; the larger of the two."""
     moved: SixFigures
-    """Relative change of the fundamental of m0 from before to after."""
+    """Relative change of the fundamental of m0 between before and after the perturbations."""
 
 
 class BranchEndNote(AbstractNote):

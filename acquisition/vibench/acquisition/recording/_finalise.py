@@ -1,7 +1,7 @@
 """Finish a recording: compress, seal, check and rename it to ``NAME.h5``, then delete ``NAME.h5.part``.
 
-HDF5's own filters run on one core, under a global lock. Threads make the same bytes here with zlib, which
-releases Python's lock: shuffle (all first bytes, all second bytes, ...), then deflate.
+HDF5's filters run on one core, under a global lock. Here, threads produce the same bytes with zlib, which
+releases Python's lock: shuffle (first bytes of all samples, then second bytes, ...), then deflate.
 """
 
 import hashlib
@@ -41,16 +41,16 @@ from ._seal import SealDepth, SealKey, SealState, check_seal, seal_key, write_se
 from ._tables import Columns
 
 # Labelled curves in NeXus format for other programs, one per channel.
-# Such programs do not scale counts, so the extremes of every bin are stored again in physical units. Drawn
-# as a line, they form the envelope of the recording.
+# These programs do not scale counts, so the extremes of every bin are stored again in physical units. Drawn
+# as a line, they form the envelope of the signal.
 
 SIGNAL = "values"
 FIRST_CHOICE = "m0_"
-"""Prefix of the role that is plotted by default; otherwise the first one."""
+"""Prefix of the channels plotted by default; if there is none, the first channel is plotted."""
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
-    """Add a channel's labelled curve; attributes ``default`` select the curve that programs show first."""
+    """Add a channel's labelled curve; the attributes ``default`` select the curve shown first."""
     if overview.low.size == 0:
         return
     view = file.require_group(layout.VIEW)
@@ -125,7 +125,7 @@ def _compress(pieces: Iterable[Counts], length: int) -> Iterator[bytes]:
 
 
 def _submit(pool: ThreadPoolExecutor, piece: Counts, length: int) -> Future[bytes]:
-    """Compress a piece in the pool, or here if the system starts no more threads."""
+    """Compress a piece in the pool, or in this thread if no further thread can be started."""
     try:
         return pool.submit(_chunk, piece, length)
     except RuntimeError:
@@ -152,8 +152,8 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     """Create and seal ``NAME.h5`` from ``NAME.h5.part``, which :func:`discard` deletes later.
 
     The caller must have locked the ``.part``, which is not changed. ``written`` has the checksum of each
-    channel's samples as recorded (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, writing
-    fails (the disk may be full), or the copy does not read back as it was written.
+    channel's recorded samples (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, writing
+    fails (the disk may be full), or the copy reads back differently than it was written.
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
@@ -176,12 +176,12 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
 
 
 def whereabouts(part: Path, error: Exception) -> str:
-    """Return where the committed samples are after an error of the disk, and what to do."""
+    """Return a sentence: where the committed samples are after a disk error, and what to do."""
     try:
         is_there = part.exists()
     except OSError:  # the folder does not respond
         is_there = False
-    # After FileNotFoundError the recording was removed; a file of this name is another one.
+    # After FileNotFoundError, the recording was removed; a file with this name is a different file.
     if is_there and not isinstance(error, FileNotFoundError):
         return f"All committed samples are safe in {part}; make room, then recover that file."
     return (
@@ -237,7 +237,7 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
 def _write_time(
     copy: h5py.File, samples: int, sample_rate_hz: float, digests: dict[str, str]
 ) -> h5py.Dataset:
-    """Write the time axis as sample numbers, which compress well, with the sample interval as scale."""
+    """Write the time axis as sample numbers, which compress well, with the sample interval as factor."""
     dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
     settings = {"chunks": (min(layout.CHUNK_SAMPLES, samples),), "compression": "gzip", "shuffle": True}
     dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **(settings if samples else {}))
@@ -312,7 +312,7 @@ def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:
 
 
 def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype[np.generic]:
-    """Return the narrowest type for a column's values."""
+    """Return the type of a stored column; text is as wide as its longest value."""
     if values.dtype.kind != "S":
         return values.dtype
     longest = max((len(value) for value in values.tolist()), default=0)
@@ -323,8 +323,8 @@ def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype
 def recover(path: Path | str) -> Path:
     """Finish an interrupted recording; return the path of ``NAME.h5``.
 
-    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. A crash may have left the ``.part`` alone, or with an
-    incomplete or complete compressed copy. All three cases are recovered.
+    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. After a crash there may be
+    only the ``.part``, or also an incomplete or complete compressed copy. All three cases are recovered.
 
     Raises RecordingError when there is nothing to recover, the file is still being recorded, or is not a
     recording of vibench.

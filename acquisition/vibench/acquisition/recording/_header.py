@@ -33,7 +33,7 @@ class Provenance:
     """Software and computer that made a recording."""
 
     started_utc: str
-    """ISO 8601, with microseconds, from the computer's clock."""
+    """Start time in ISO 8601 with microseconds, from the computer's clock."""
     host: str
     platform: str
     process: int
@@ -41,7 +41,7 @@ class Provenance:
     packages: Mapping[str, str]
     """Version of each package that affects the data, and digest of the native engine's sources."""
     commit: str
-    """Git commit when run from a checkout (``+changes`` when files differ from it), else empty."""
+    """Git commit of the checkout (``+changes`` if files were modified); empty for an installed wheel."""
 
 
 def collect_provenance() -> Provenance:
@@ -98,7 +98,7 @@ def _git(*arguments: str) -> str:
 ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")
 COUPLINGS = ("AC", "DC")
 _AC_CUT_HZ = 0.5
-"""-3 dB frequency of the AC coupling of NI 9234, 4431 and similar modules; first order."""
+"""-3 dB frequency of the first-order AC coupling of NI 9234, 4431 and similar modules [Hz]."""
 OPTIONAL = ("sensitivity", "volts_per_count")
 """Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
@@ -130,21 +130,21 @@ class ChannelHeader:
     role: str
     """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""
     physical_channel: str
-    """``"cDAQ1Mod1/ai0"``: the name the converter uses."""
+    """Name of the input in the converter's driver: ``"cDAQ1Mod1/ai0"``."""
     quantity: str
-    """``"voltage"``, ``"acceleration"``, ``"velocity"``, ``"displacement"``, ``"force"``."""
+    """Quantity: ``"voltage"``, ``"acceleration"``, ``"velocity"``, ``"displacement"``, ``"force"``."""
     unit: str
-    """UDUNITS text of the physical value: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
+    """Unit of the physical value in UDUNITS notation: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     physical_per_volt: float
     range_v: float
-    """Full scale of the input, plus and minus [V]."""
+    """Full scale of the input, symmetric about zero [V]."""
     volts_per_count: float | None = None
-    """Step of the converter [V]; None if unknown: volts are then stored to 2^-30 of the range."""
+    """Step of the converter [V]; None if unknown: the stored step is then 2^-30 of the range."""
     volts_at_zero_count: float = 0.0
-    """Offset of the converter's calibration [V]."""
+    """Voltage at count zero, from the converter's calibration [V]."""
     physical_offset: float = 0.0
     coupling: str = "AC"
-    """``"AC"`` or ``"DC"``."""
+    """Input coupling, ``"AC"`` or ``"DC"``."""
     iepe_current_a: float = 0.0
     sensitivity: float | None = None
     """Sensitivity from the calibration sheet, in ``sensitivity_unit``."""
@@ -153,7 +153,7 @@ class ChannelHeader:
     calibration_date: str = ""
     """ISO date of the sensor's calibration."""
     delay_s: float = 0.0
-    """Delay of the channel, for example of a vibrometer's decoder."""
+    """Delay of the channel, for example by a vibrometer's decoder [s]."""
     long_name: str = ""
 
     def __post_init__(self) -> None:
@@ -182,7 +182,7 @@ class ChannelHeader:
 
     @property
     def step_v(self) -> float:
-        """Volts between two neighbouring stored counts."""
+        """Voltage step between two neighbouring stored counts [V]."""
         return self.range_v * FINE_STEP if self.volts_per_count is None else self.volts_per_count
 
     @property
@@ -196,7 +196,7 @@ class ChannelHeader:
         return self.physical_per_volt * self.volts_at_zero_count + self.physical_offset
 
     def attributes(self) -> dict[str, Attribute]:
-        """Attributes of the channel's dataset: the CF names first, then the fields of this header."""
+        """Return the attributes of the channel's dataset: first CF names, then the fields of this header."""
         own = {each.name: getattr(self, each.name) for each in fields(self)}
         del own["role"], own["unit"]
         own["long_name"] = self.long_name or self.role.replace("_", " ")
@@ -212,7 +212,7 @@ class ChannelHeader:
 
     @classmethod
     def from_attributes(cls, role: str, attributes: Mapping[str, Attribute]) -> "ChannelHeader":
-        """Read back what :meth:`attributes` wrote."""
+        """Return the header of the channel ``role`` from the attributes that :meth:`attributes` returned."""
         given = {each.name: attributes[each.name] for each in fields(cls) if each.name in attributes}
         # Only NaN differs from itself.
         absent = {name: None for name in OPTIONAL if given.get(name) != given.get(name)}
@@ -224,16 +224,16 @@ class RecordingHeader:
     """Data written before the first sample."""
 
     channels: tuple[ChannelHeader, ...]
-    """In the order of the rows of a block."""
+    """Recorded channels, in the order of the rows of a block."""
     sample_rate_hz: float
     """Actual sample rate of the hardware."""
     expected_samples: int | None
-    """Planned length; None for a recording without a planned end."""
+    """Planned number of samples per channel; None for a recording without a planned end."""
     origin: Origin
     plan_json: str = "{}"
-    """The measurement's plan, complete, as JSON."""
+    """Complete plan of the measurement, as JSON."""
     bench_json: str = "{}"
-    """The bench configuration, complete, as JSON."""
+    """Complete bench configuration, as JSON."""
     requested_sample_rate_hz: float | None = None
     """Requested sample rate; None if it equals the actual one."""
     instruments: Mapping[str, Identity] = field(default_factory=dict)
@@ -264,7 +264,7 @@ class RecordingHeader:
                 raise RecordingError(f"{name} holds a JSON {type(parsed).__name__}; it must be an object.")
 
     def configuration(self) -> dict[str, str]:
-        """Texts of the group ``/configuration``, all JSON."""
+        """Return the texts of the group ``/configuration``, all JSON."""
         instruments = {name: asdict(identity) for name, identity in self.instruments.items()}
         return {
             "plan_json": self.plan_json,
@@ -276,7 +276,7 @@ class RecordingHeader:
         }
 
     def attributes(self) -> dict[str, Attribute]:
-        """Attributes of the file itself, apart from format and identity."""
+        """Return the attributes of the file, except its format and its identifier."""
         point = json.loads(self.plan_json).get("point")
         place = point if isinstance(point, dict) else {}
         return {
@@ -307,5 +307,5 @@ def _require_positive(name: str, value: float) -> None:
 
 
 def coupling_cut_hz(coupling: str) -> float:
-    """Return the -3 dB frequency of a converter's ``coupling``, first order [Hz]; 0 for ``"DC"``."""
+    """Return the -3 dB frequency of the first-order high-pass of a ``coupling`` [Hz]; 0 for ``"DC"``."""
     return _AC_CUT_HZ if coupling == "AC" else 0.0

@@ -17,11 +17,11 @@ from ..errors import RecordingError
 
 FORMAT = "vibench-recording"
 FORMAT_VERSION = 1
-"""Incremented whenever an older reader would misunderstand the file."""
+"""Version of the format; incremented whenever an older reader would misunderstand the file."""
 
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""Superblock 0, which every HDF5 reader since 1.8 understands, including MATLAB's."""
+"""HDF5 format versions: superblock 0, which every HDF5 reader since 1.8 understands, including MATLAB's."""
 
 SUFFIX = ".h5"
 PART_SUFFIX = ".part"
@@ -30,12 +30,12 @@ TMP_SUFFIX = ".tmp"
 CHUNK_SAMPLES = 51_200
 """Samples in one compressed chunk: one second at the rig's usual rate, 200 kB."""
 DEFLATE_LEVEL = 1
-"""Higher levels gain 4 % of size and cost a third of the speed."""
+"""Compression level; a higher level makes files 4 % smaller but a third slower to write."""
 
 COUNT_DTYPE = "<i4"
 COUNTER_DTYPE = "<i8"
 MISSING_COUNT = -(2**31)
-"""Value of a lost sample; CF's ``_FillValue``, so that readers show NaN."""
+"""Count of a lost sample; it is CF's ``_FillValue``, so that other programs show NaN."""
 LARGEST_COUNT = 2**31 - 1
 
 N_VALID = "n_valid"
@@ -55,7 +55,7 @@ SETTINGS = "settings"
 ROLE_WIDTH = 64
 STATE_WIDTH = 16
 TEXT_WIDTH = 480
-"""Maximum bytes of an event's text or of a reason; longer ones are cut with an ellipsis."""
+"""Largest size of an event's text or a reason [bytes]; longer texts are cut and end in an ellipsis."""
 KIND_WIDTH = 32
 NUMBERS_WIDTH = 512
 

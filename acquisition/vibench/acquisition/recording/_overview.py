@@ -1,7 +1,7 @@
 """Overview: the smallest and largest count of every 128 samples, for plots of whole recordings.
 
-It is computed when a recording is finished, and stored in the group ``overview``, so that a viewer opens a
-recording of hours as fast as one of seconds. Without an overview, the viewer reads the whole file once.
+It is computed when a recording is finished, and stored in the group ``overview``, so that a viewer opens
+long recordings as fast as short ones. Without an overview, the viewer reads the whole file once.
 """
 
 from collections.abc import Iterator
@@ -15,21 +15,21 @@ from . import _layout as layout
 from ._layout import read_attributes, write_attributes
 
 BIN_SAMPLES = 128
-"""Samples per bin. A finer plot of 1000 columns reads at most 128 000 samples: 10 ms for four channels."""
+"""Samples per bin. To plot finer detail, 1000 columns read at most 128 000 samples: 10 ms for 4 channels."""
 LOW_SUFFIX, HIGH_SUFFIX = "_low", "_high"
 _LARGEST = np.int32(layout.LARGEST_COUNT)
 
 
 @dataclass(frozen=True, eq=False)
 class CountOverview:
-    """Extremes of a channel's counts by bin; both are the missing count if all samples of a bin are lost."""
+    """Smallest and largest count of each bin; both are the missing count if all samples of a bin are lost."""
 
     low: Counts
     high: Counts
 
 
 def extremes(counts: Counts) -> CountOverview:
-    """Return the extremes of each bin of consecutive counts; a bin must start at the first count."""
+    """Return the extremes of each bin of consecutive counts; the first bin starts at the first count."""
     if counts.size == 0:
         return CountOverview(counts, counts)
     starts = np.arange(0, counts.size, BIN_SAMPLES)
@@ -44,7 +44,7 @@ def extremes(counts: Counts) -> CountOverview:
 
 
 class OverviewSums:
-    """Overview of a channel whose counts arrive in pieces; all but the last must be whole bins."""
+    """Overview of a channel whose counts arrive in pieces; each piece but the last must be whole bins."""
 
     def __init__(self) -> None:
         self._low: list[Counts] = []
@@ -63,13 +63,13 @@ class OverviewSums:
         self._high.append(found.high)
 
     def overview(self) -> CountOverview:
-        """Return the extremes of all counts."""
+        """Return the overview of all counts added so far."""
         nothing = [np.empty(0, dtype=layout.COUNT_DTYPE)]
         return CountOverview(np.concatenate(self._low or nothing), np.concatenate(self._high or nothing))
 
 
 def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_rate_hz: float) -> None:
-    """Write a channel's overview, scaled like its samples for readers of netCDF."""
+    """Write a channel's overview with the scale factors of its samples, for readers of netCDF."""
     group = file.require_group(layout.OVERVIEW)
     bins = overview.low.size
     if layout.BIN not in group:
@@ -90,7 +90,7 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
 
 
 def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | None:
-    """Read a channel's overview; None if it is missing or does not fit."""
+    """Read a channel's overview; None if it is missing or its shape is wrong."""
     group = file.get(layout.OVERVIEW)
     if not isinstance(group, h5py.Group) or read_attributes(group).get("samples_per_bin") != BIN_SAMPLES:
         return None

@@ -1,7 +1,7 @@
 """Create the file before its first sample, with all known data and reserved space.
 
-From then until the recording ends, only bytes at known offsets are written. HDF5 has already closed the
-file, so a crash cannot make its structure inconsistent.
+After that, until the recording ends, only bytes at known offsets are written. HDF5 has already closed the
+file, so a crash cannot damage its structure.
 """
 
 import os
@@ -29,17 +29,17 @@ from ._layout import Table, write_attributes, write_text_dataset
 
 MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
-"""Margin of the planned length: 5 % or 10 s, whichever is longer."""
+"""Margin added to the planned length: 5 % or 10 s, whichever is longer."""
 HOLD_ROOM_S = 600.0
-"""Additional length for the holds of a run [s]; disk space is reserved only as samples arrive."""
+"""Additional length for pauses during a run [s]; disk space is reserved only as samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
-"""Declared length without a planned end [s]; disk space is reserved only as samples arrive."""
+"""Declared length of a recording without a planned end [s]; disk space is reserved only as samples arrive."""
 RESERVE_AHEAD_S = 60.0
 """Length of each further reservation when a recording outgrows its reserved space [s]."""
 
 ROOM_FACTOR = 2
-"""Ratio of the disk space needed to the size of the samples: a compressed copy is made at the end."""
+"""Ratio of required disk space to the size of the samples: a compressed copy is made at the end."""
 
 ITEM_BYTES = 4
 
@@ -63,13 +63,13 @@ class Places:
     reason: int
     tables: Mapping[str, TablePlaces]
     capacity: int
-    """Most samples per channel that the file can take."""
+    """Largest number of samples per channel that fits into the file."""
     reserved: int
-    """Samples per channel with reserved space."""
+    """Number of samples per channel for which disk space is reserved."""
 
 
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
-    """Create ``part`` for the recording ``path`` and reserve its space.
+    """Create ``part`` for the recording ``path``, reserve its space, and return the offsets in the file.
 
     The file is written as ``.tmp`` and then renamed, so that a ``.part`` can always be opened; if the process
     is killed here, a ``.tmp`` without samples remains. Raises RecordingError when the file exists already,
@@ -100,7 +100,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
 
 
 def _lengths(header: RecordingHeader) -> tuple[int, int]:
-    """Return the declared samples, and the samples to reserve at once."""
+    """Return the declared and the initially reserved number of samples per channel."""
     if header.expected_samples is None:
         declared_s, ahead_s = OPEN_ENDED_S, RESERVE_AHEAD_S
         return round(declared_s * header.sample_rate_hz), round(ahead_s * header.sample_rate_hz)
@@ -199,7 +199,7 @@ def _claim(part: Path, places: Places) -> None:
 Answer = TypeVar("Answer")
 
 ATTEMPTS = 10
-"""Number of attempts if other programs change the file."""
+"""Largest number of attempts while other programs change the file."""
 
 _one_at_a_time = threading.Lock()
 
@@ -244,6 +244,6 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
 
 
 def _fingerprint(path: Path) -> tuple[int, int, int]:
-    """Return a value that changes when another program replaces the file."""
+    """Return inode, modification time [ns] and size, which change when another program changes the file."""
     status = path.stat()
     return (status.st_ino, status.st_mtime_ns, status.st_size)

@@ -41,7 +41,7 @@ from ._seal import (
 from ._tables import Event, EventKind, Gap, Segment
 
 LONGEST = 300
-"""Largest number of characters that a message quotes of a faulty name or text."""
+"""Largest number of characters of a faulty name or text that a message quotes."""
 
 _LOCKED_OTHERWISE = "file locking flag values don't match"
 """HDF5's message if this process has already opened the file with locks."""
@@ -77,7 +77,7 @@ def open_hdf5(path: Path) -> h5py.File:
 
 
 def name_now(path: Path) -> Path:
-    """Return the current name of a recording, which may have been finished meanwhile."""
+    """Return the current path of a recording: ``NAME.h5`` if the given ``.part`` was finished meanwhile."""
     if path.suffix != layout.PART_SUFFIX or path.exists():
         return path
     final = path.with_suffix("")
@@ -127,14 +127,14 @@ class OpenRecording:
         try:
             self.file: h5py.File = open_hdf5(self.path)
         except RecordingError:
-            # It may have been finished and renamed between the two lines above.
+            # The recording may have been finished and renamed between the two lines above.
             if name_now(self.path) == self.path:
                 raise
             self.path = name_now(self.path)
             self.file = open_hdf5(self.path)
         self.counts = CheckedCounts()
         self.described = ""
-        """Content at the time of opening, except samples."""
+        """``repr`` of the recording when opened: all content except samples and results."""
 
     def reopen(self) -> None:
         """Open the file again, to read its current content."""
@@ -143,7 +143,7 @@ class OpenRecording:
 
 
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
-"""Errors of h5py for damaged files."""
+"""Exceptions that h5py raises for damaged files."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class RecordingDescription:
     path: Path
     state: RecordingState
     reason: str
-    """Reason for its end; empty if unknown."""
+    """Reason why the recording ended; empty if unknown."""
     sample_rate_hz: float
     requested_sample_rate_hz: float
     origin: Origin
@@ -195,7 +195,7 @@ class Recording(RecordingDescription):
     channels: tuple[ChannelHeader, ...]
     plan: Mapping[str, Any]
     seal: str
-    """SHA-256 of the manifest, as stated in the file; empty without one. See `check_seal`."""
+    """SHA-256 of the manifest, as stored in the file; empty without a seal. See `check_seal`."""
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]
@@ -214,7 +214,7 @@ class Recording(RecordingDescription):
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes of all samples so far, uncompressed."""
+        """Uncompressed size of all samples so far [bytes]."""
         return 4 * len(self.roles) * self.samples
 
     @property
@@ -241,12 +241,12 @@ class Recording(RecordingDescription):
         raise RecordingError(f"{self.path} has no channel {role!r}; it has {', '.join(self.roles)}.")
 
     def time_s(self, start: int = 0, stop: int | None = None) -> Samples:
-        """Time of the samples since the first [s], by the converter's clock."""
+        """Return the times of samples since the first sample [s], by the converter's clock."""
         begin, end = self._range(start, stop)
         return np.arange(begin, end) / self.sample_rate_hz
 
     def read(self, role: str, start: int = 0, stop: int | None = None) -> Samples:
-        """Return samples ``start`` to ``stop`` (exclusive) in the channel's physical unit; lost ones are NaN.
+        """Return samples ``start`` to ``stop`` (exclusive) in the channel's unit; lost samples are NaN.
 
         Raises RecordingError when there is no such channel or range, or the file is damaged there.
         """
@@ -271,13 +271,13 @@ class Recording(RecordingDescription):
             ) from error
 
     def read_overview(self, role: str) -> CountOverview | None:
-        """Return the stored extremes of every 128 counts; None if the file has none."""
+        """Return the stored minimum and maximum of every 128 counts; None if they are not stored."""
         return read_overview(self._open.file, self.channel(role).role, self.samples)
 
     def blocks(
         self, roles: Sequence[str], samples: int, start: int = 0, stop: int | None = None
     ) -> Iterator[RecordedBlock]:
-        """Yield a range in blocks of ``samples`` (the last may be shorter)."""
+        """Yield the samples of a range in blocks of ``samples``; the last block may be shorter."""
         if samples < 1:
             raise RecordingError(f"Blocks of {samples} samples were requested; allowed are 1 and more.")
         begin, end = self._range(start, stop)
@@ -286,7 +286,7 @@ class Recording(RecordingDescription):
             yield RecordedBlock(first, np.stack([self.read(role, first, last) for role in roles]))
 
     def check_seal(self, depth: SealDepth | str, key: SealKey | None = None) -> SealCheck:
-        """Check the recording against its own seal, and against the one in a campaign's journal.
+        """Check the recording against its own seal, and against the seal in a campaign's journal.
 
         Raises RecordingError when the key cannot be read.
 
@@ -295,8 +295,8 @@ class Recording(RecordingDescription):
         depth
             ``"quick"`` reads all attributes, texts and tables; ``"whole"`` also reads all samples.
         key
-            Key to check the signature with, from `seal_key`; by default the key in the file that the variable
-            VIBENCH_SEAL_KEY names.
+            Key for checking the signature, from `seal_key`. Default: the key in the file named by the
+            environment variable VIBENCH_SEAL_KEY.
 
         Returns
         -------
@@ -329,11 +329,11 @@ class Recording(RecordingDescription):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process has checked the whole file; later reads are compared with that check."""
+        """Whether this process has checked the whole file; later reads are then compared with that check."""
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
-        """Check every saved result against its own seal; the key is as in `check_seal`."""
+        """Return the seal check of every saved result, by name; ``key`` as in `check_seal`."""
         used = seal_key() if key is None else key
         return {name: check_result(group, used) for name, group in result_groups(self._open.file).items()}
 
@@ -362,9 +362,9 @@ class Recording(RecordingDescription):
     ) -> str:
         """Save a result with its settings; return its name.
 
-        Nothing is overwritten: a name that exists gets ``-2``, ``-3``, ... The result is added
-        to a copy, which then replaces the file, so that a crash cannot harm the samples. ``roles`` are the
-        channels that were used (all by default); their checksums are stored with the result.
+        No result is overwritten: if the name exists, ``-2``, ``-3``, ... is appended. The result is added to
+        a copy, which then replaces the file, so that a crash cannot harm the samples. ``roles`` are the
+        channels used for the result (default: all); their checksums are stored with it.
 
         Raises RecordingError when the recording is not finished, an axis does not fit, or writing fails.
         """
@@ -407,8 +407,8 @@ def open_recording(path: Path | str) -> Recording:
 
     A ``NAME.h5.part`` that has been finished in the meantime is opened as ``NAME.h5``.
 
-    Raises RecordingError when the file is missing, empty, cut short, damaged, no recording, or from a newer
-    version.
+    Raises RecordingError when the file is missing, empty, truncated, damaged, not a recording, or written by
+    a newer version.
     """
     handle = OpenRecording(Path(path))
     try:
@@ -491,7 +491,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return samples, state and reason of a ``.part``; it is interrupted if its program has died."""
+    """Return samples, state and reason of a ``.part``; "interrupted" if its program no longer runs."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

@@ -22,7 +22,7 @@ COMPLEX_PART = "complex_part"
 """Attribute that marks the real or imaginary part of a complex array; only h5py reads complex numbers."""
 SETTINGS_JSON = "settings_json"
 AXES = "axes_json"
-"""Attribute of an array: the names of the arrays along its dimensions."""
+"""Attribute of an array: names of the axis arrays of its dimensions."""
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
@@ -102,7 +102,7 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
 def read_results(file: h5py.File) -> dict[str, SavedResult]:
     """Return every result of a recording, by name.
 
-    Raises RecordingError when one was changed after sealing, or is not a result.
+    Raises RecordingError when a result was changed after sealing, or an entry is not a result.
     """
     found = {}
     for name, group in result_groups(file).items():
@@ -153,7 +153,7 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, ResultArray]) -> None:
 
 
 def _real_parts(key: str, values: NDArray[Any]) -> list[tuple[str, NDArray[Any], dict[str, str]]]:
-    """Split a complex array into real ones that any reader understands; booleans become integers."""
+    """Split a complex array into two real arrays, which any program can read; booleans become integers."""
     if np.iscomplexobj(values):
         return [
             (key + REAL_SUFFIX, values.real, {COMPLEX_PART: "real"}),
@@ -199,7 +199,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
 
 
 def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of an array's axes; in files of earlier versions, scales are matched by length."""
+    """Return the names of an array's axes; earlier versions did not store them, so lengths are compared."""
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):

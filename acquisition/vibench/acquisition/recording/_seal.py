@@ -1,8 +1,8 @@
 """The seal of a recording: a checksum of its content, which shows any change.
 
-A manifest lists every group and dataset with two checksums: of its attributes, type and shape, and of its
-data. The SHA-256 of the manifest is the seal. With a key it is signed too (HMAC, RFC 2104). A seal
-without a signature shows only accidental changes: anyone can make a new seal, but no signature without a key.
+A manifest lists two checksums for every group and dataset: one of its attributes, type and shape, one of its
+data. The SHA-256 of the manifest is the seal. With a key, the seal is also signed (HMAC, RFC 2104). Without a
+signature it shows only accidental changes: anyone can compute a new seal, but a signature needs the key.
 ``docs/recording-format.md`` shows how to check it without this package; reasons: decision 0031.
 """
 
@@ -40,18 +40,18 @@ LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
 """HDF5 attributes that link axes; they contain addresses inside the file, not data."""
 PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 LARGEST_TABLE_BYTES = 500_000_000
-"""Largest array of several dimensions [bytes]; such arrays (of results) are read at once."""
+"""Largest multidimensional array [bytes]; such arrays (results) are read in one piece."""
 QUICK_BYTES = 65_536
-"""Most samples of a channel that a quick check reads [bytes]; it reads all texts and tables."""
+"""Largest channel that a quick check reads [bytes]; texts and tables are always read."""
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
-"""Environment variable with the path of the key's file, for every command and program."""
+"""Environment variable with the path of the key's file; used by all commands and programs."""
 SHORTEST_KEY = 16
 AS_SEALED = "as it was sealed"
 
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
-"""SHA-256 states by dataset path: one before each piece, and one at the end."""
+"""Intermediate SHA-256 states by dataset path: one before each piece of data, and one at the end."""
 
 
 class SealDepth(StrEnum):
@@ -63,7 +63,7 @@ class SealDepth(StrEnum):
 
 
 class SealState(StrEnum):
-    """Result of the check of a seal."""
+    """Result of a seal check."""
 
     INTACT = "intact"
     DAMAGED = "damaged"
@@ -80,12 +80,12 @@ class SealState(StrEnum):
 
 @dataclass(frozen=True)
 class SealCheck:
-    """Result of the check of a seal, with an explanation."""
+    """Result of a seal check, with an explanation."""
 
     state: SealState
     sentence: str
     seal: str
-    """SHA-256 of the manifest; empty without one."""
+    """SHA-256 of the manifest; empty without a seal."""
 
 
 class SealKey:
@@ -100,12 +100,12 @@ class SealKey:
         return self.signature(b"name of this key")[:16]
 
     def signature(self, text: bytes) -> str:
-        """Sign a text: HMAC-SHA-256 in hexadecimal digits."""
+        """Return the signature of a text: HMAC-SHA-256 in hexadecimal digits."""
         return hmac.new(self._secret, text, hashlib.sha256).hexdigest()
 
 
 def seal_key(path: Path | None = None) -> SealKey | None:
-    """Read the key from a file, by default the one that VIBENCH_SEAL_KEY names; None without a file.
+    """Return the key from a file, by default the file named by VIBENCH_SEAL_KEY; None without a file.
 
     Raises RecordingError when the file cannot be read, or the key is too short.
     """
@@ -128,7 +128,7 @@ def seal_key(path: Path | None = None) -> SealKey | None:
 
 
 def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -> None:
-    """Seal a finished recording; ``known`` has checksums of datasets, computed while they were written."""
+    """Seal a finished recording; ``known`` has the checksums of datasets computed during writing."""
     manifest = {
         path: {
             "attributes": _checksum_of_header(item),
@@ -145,9 +145,9 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
 def check_seal(
     file: h5py.File, depth: SealDepth, key: SealKey | None, states: ChannelStates | None = None
 ) -> SealCheck:
-    """Check a finished recording against its seal; adds the checksum states of its datasets to ``states``.
+    """Check a finished recording against its seal; add the checksum states of its datasets to ``states``.
 
-    Without a seal the samples are checked against the checksum of their channel.
+    Without a seal, the samples of each channel are checked against the checksum stored with the channel.
     """
     if layout.SEAL not in file:
         return _without_seal(file, depth, key)
@@ -186,7 +186,7 @@ def seal_of(file: h5py.File) -> str:
 
 
 def samples_id(file: h5py.File, roles: Sequence[str]) -> str:
-    """Return the SHA-256 of the channels' checksums that the file states; empty if one is missing."""
+    """Return the SHA-256 of the channels' stored checksums; empty if a checksum is missing."""
     stated = [str(read_attributes(file[role]).get("sha256", "")) for role in roles]
     return _sha256(" ".join(stated).encode()) if all(stated) else ""
 
@@ -201,7 +201,7 @@ class Identified(Protocol):
 
 
 def first_copies(recordings: Sequence[Identified]) -> list[int]:
-    """Return for each recording the index of the first one with the same samples or recording_id."""
+    """Return for each recording the index of the first recording with the same samples or recording_id."""
     seen: dict[str, int] = {}
     firsts = []
     for place, each in enumerate(recordings):
@@ -280,7 +280,7 @@ def _differing(
 
 
 def _is_long_signal(path: str, item: h5py.Dataset) -> bool:
-    """Return whether a dataset holds many samples, or their overview; all tables are in other groups."""
+    """Return whether a dataset is a long channel or its overview; all tables are in other groups."""
     return path.split("/")[1:-1] in ([], [layout.OVERVIEW]) and item.nbytes > QUICK_BYTES
 
 
@@ -338,7 +338,7 @@ def is_of_a_sealing_version(file: h5py.File) -> bool:
 
 
 def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCheck:
-    """Check the channels' own checksums, which cover no scale, table or plan."""
+    """Check the channels' checksums, which do not cover scales, tables and the plan."""
     roles = str(read_attributes(file).get("roles", "")).split() if depth is SealDepth.WHOLE else ()
     try:
         other = [role for role in roles if _data_sha256(file[role]) != read_attributes(file[role])["sha256"]]
@@ -392,7 +392,7 @@ def _sha256(raw: bytes) -> str:
 
 
 # Campaign journals list the seals of recordings, which reveals a different recording under the same name.
-# Every check of a seal compares it with them, so that all commands follow this rule.
+# Every seal check also compares with the journals, so that all commands detect this.
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 
@@ -428,7 +428,7 @@ def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
 
 
 def journal_objection(path: Path, seal: str) -> str:
-    """Return why a journal in the recording's folder contradicts its seal; empty if none does.
+    """Return why a journal in the recording's folder contradicts its seal; empty if no journal does.
 
     Both tables of a journal must have the same seal. If they differ, neither confirms the recording.
     """
@@ -472,7 +472,7 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
     """Open a database read-only, also in a read-only folder."""
     address = path.resolve().as_uri()
     try:
-        # A connection that may write would clean up when it is the last to close.
+        # If it could write, the last connection to close would clean up the database files.
         with closed_on_error(opened(f"{address}?mode=rw")) as connection:
             connection.execute("PRAGMA query_only = ON")
             connection.execute("SELECT 1 FROM sqlite_master").fetchone()
@@ -505,13 +505,13 @@ def was_checked(seal: str) -> bool:
 
 
 class CheckedCounts:
-    """Reader of the channels of one open file; keeps the last piece of each in memory."""
+    """Reader of the channels of one open file; keeps the last piece of each channel in memory."""
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[int, Counts]] = {}
 
     def read(self, seal: str, dataset: h5py.Dataset, begin: int, end: int) -> Counts:
-        """Return a range of a channel; raises ValueError if it was changed after the check."""
+        """Return the counts of a range; raises ValueError if they were changed after the check."""
         known = _KNOWN.get(seal)
         if known is None:
             return np.asarray(dataset[begin:end], dtype=np.int32)

@@ -35,12 +35,12 @@ class EventKind(StrEnum):
     """The drive deviated from its planned time or phase; the text says by how much."""
     END = "end"
     OFF = "off"
-    """The output was switched off after an early end; samples that show silence are read afterwards."""
+    """The output was switched off after an early end; the samples that confirm silence follow."""
     SILENCE = "silence"
 
 
 REJECTED = "average rejected"
-"""Text of a mark: results do not use the last noise realisation that began before the mark."""
+"""Text of a mark: the last noise realisation that began before it is excluded from results."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +77,12 @@ class Segment:
 
     @property
     def start(self) -> int:
-        """First sample, for ``recording.read(role, segment.start, segment.stop)``."""
+        """Number of the first sample, for ``recording.read(role, segment.start, segment.stop)``."""
         return self.first_sample
 
     @property
     def stop(self) -> int:
-        """One past the last sample."""
+        """Number of the sample after the last one."""
         return self.last_sample + 1
 
 
@@ -123,7 +123,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
 
 
 def first_number(group: h5py.Group, name: str) -> int:
-    """Return the whole number of a dataset with one element; raises RecordingError for anything else."""
+    """Return the integer in a dataset with one element; raises RecordingError for anything else."""
     dataset = group.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
         raise RecordingError(f"{group.name}/{name} is not a whole number")
@@ -131,7 +131,7 @@ def first_number(group: h5py.Group, name: str) -> int:
 
 
 def ending(file: h5py.File) -> tuple[RecordingState, str]:
-    """Return state and reason of a ``.part``; the state stays "recording" if its program died."""
+    """Return state and reason of a ``.part``; if its program was killed, the state is still "recording"."""
     state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
     is_whole = state in tuple(RecordingState)
     return RecordingState(state) if is_whole else RecordingState.RECORDING, reason
@@ -163,10 +163,10 @@ def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence
 
 
 def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
-    """Return the rows, limited to the valid samples.
+    """Return the rows of a table, limited to the valid samples.
 
     Rows are written before the counters, so after a crash they may refer to missing samples. A segment that
-    is still open, or loses its end here, becomes incomplete.
+    is still open, or whose end is cut off here, is marked incomplete.
     """
     if table is layout.SEGMENTS:
         return _clipped_segments(columns, n_valid)
@@ -181,7 +181,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
 def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
     first = np.minimum(columns["first_sample"], n_valid)
     last = columns["last_sample"]
-    # A power cut may leave a complete segment without its end. Only an empty one at sample 0 ends at -1.
+    # A power cut may leave a complete segment without its end. Only an empty segment at sample 0 ends at -1.
     is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
     is_cut = is_open | (last >= n_valid)
     return {
@@ -193,7 +193,7 @@ def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
 
 
 def events(columns: Columns) -> tuple[Event, ...]:
-    """Rows of ``/events``."""
+    """Return the rows of ``/events``."""
     return tuple(
         Event(int(row[0]), float(row[1]), decode(row[2]), decode(row[3]))
         for row in zip(*(columns[column.name] for column in layout.EVENTS.columns), strict=True)
@@ -201,7 +201,7 @@ def events(columns: Columns) -> tuple[Event, ...]:
 
 
 def segments(columns: Columns) -> tuple[Segment, ...]:
-    """Rows of ``/segments``."""
+    """Return the rows of ``/segments``."""
     return tuple(
         Segment(
             label=decode(label),
@@ -225,7 +225,7 @@ def _numbers(text: str) -> dict[str, Number]:
 
 
 def overloads(columns: Columns) -> tuple[Overload, ...]:
-    """Rows of ``/overloads``."""
+    """Return the rows of ``/overloads``."""
     return tuple(
         Overload(decode(channel), int(first), int(last))
         for channel, first, last in zip(
@@ -235,7 +235,7 @@ def overloads(columns: Columns) -> tuple[Overload, ...]:
 
 
 def gaps(columns: Columns) -> tuple[Gap, ...]:
-    """Rows of ``/gaps``."""
+    """Return the rows of ``/gaps``."""
     return tuple(
         Gap(int(first), int(last))
         for first, last in zip(*(columns[column.name] for column in layout.GAPS.columns), strict=True)

@@ -32,7 +32,7 @@ from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallo
 from ._seal import SealKey, seal_key
 
 COUNT_TOLERANCE = 0.01
-"""Largest distance of volts from a whole count, in counts; rounding of float64 is 1e-8 at 24 bits."""
+"""Largest allowed distance of a voltage from a whole count [counts]; float64 rounds to 1e-8 at 24 bits."""
 
 
 class CountScale:
@@ -45,10 +45,10 @@ class CountScale:
         self._has_converter_step = np.array([channel.volts_per_count is not None for channel in channels])
 
     def counts(self, volts: Samples) -> Counts:
-        """Convert a block to counts, shape (channels, samples); exact if the converter's step is known.
+        """Return a block's counts, shape (channels, samples); exact if the converter's step is known.
 
-        Raises RecordingError when the volts are not multiples of the step, or do not fit into an int32 (NaN
-        included).
+        Raises RecordingError when a voltage is not a multiple of the known step, does not fit into an int32,
+        or is NaN.
         """
         scaled = (np.asarray(volts, dtype=np.float64) - self._zero_v) / self._step_v
         rounded = np.rint(scaled)
@@ -76,11 +76,11 @@ class CountScale:
 
 
 RESERVED = 8
-"""Number of file descriptors for the recording, its copy, the folder and disk checks, then the journal."""
+"""Number of reserved descriptors: recording, its copy, folder and disk checks, then the journal."""
 
 
 class DescriptorReserve:
-    """File descriptors that are kept open, and released so that the recording can be finished."""
+    """File descriptors kept open during the run and released at its end, to finish the recording."""
 
     def __init__(self) -> None:
         self._held: list[int] = []
@@ -108,10 +108,10 @@ ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILE
 
 
 def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWriter":
-    """Start a recording: create ``NAME.h5.part`` with all known data.
+    """Create ``NAME.h5.part`` with all data known before the run, and return its writer.
 
-    Raises RecordingError when the name is not ``NAME.h5``, the file, its ``.part`` or ``.tmp`` exists, or
-    the disk has no room for the planned samples.
+    Raises RecordingError if the name is not ``NAME.h5``, if the file, its ``.part`` or its ``.tmp`` exists,
+    or if the disk has no room for the planned samples.
     """
     path = Path(path)
     if path.suffix != layout.SUFFIX:
@@ -136,8 +136,8 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
 class RecordingWriter:
     """Writer of a recording, for use by one thread; a second thread writes to the disk.
 
-    Leaving the ``with`` block finishes a recording that is not finished yet: as complete, as
-    stopped (keyboard) or as failed (any other exception).
+    Leaving the ``with`` block finishes the recording, unless it is finished already. Its state is then
+    complete, stopped (after KeyboardInterrupt) or failed (after any other exception).
     """
 
     def __init__(
@@ -180,7 +180,7 @@ class RecordingWriter:
         counts, full recording), or the disk has failed. Committed samples are kept.
         """
         self._check(block)
-        # A converter's own counts are recorded as they are.
+        # Counts that come from the converter are recorded unchanged.
         counts = (
             self._scale.counts(block.volts) if block.counts is None else np.ascontiguousarray(block.counts)
         )
@@ -208,11 +208,11 @@ class RecordingWriter:
         self._committer.put(self._journal.event(kind, text, place))
 
     def begin_segment(self, label: str, **numbers: Number) -> None:
-        """Start a named range at the next sample, with a label and numbers for the analysis."""
+        """Start a segment at the next sample, with a label and numbers for the analysis."""
         self._committer.put(self._journal.begin_segment(label, numbers, self.samples))
 
     def end_segment(self) -> None:
-        """End the open segment with the last sample."""
+        """End the open segment at the last recorded sample."""
         self._committer.put(self._journal.end_segment(self.samples - 1))
 
     def finish(self, state: RecordingState, reason: str = "") -> Path:
@@ -241,7 +241,7 @@ class RecordingWriter:
             checksums = {role: digest.hexdigest() for role, digest in self._digests.items()}
             finalise(part, self._key, checksums if failure is None else None)
         finally:
-            # The sync of the ending has already reported errors that closing could raise.
+            # Disk errors were already reported by the sync in `_write_ending`.
             with suppress(OSError):
                 self._disk.close()
         discard(part)
@@ -299,7 +299,7 @@ class RecordingWriter:
         """Reserve disk space ahead if the recording has no planned end, or is much longer than planned."""
         rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
         ahead = round(RESERVE_AHEAD_S * rate_hz)
-        # Half the margin: a recording that keeps to its planned length reserves no further space.
+        # With half the margin, a recording of the planned length needs no further reservation.
         lead = ahead // 2 if planned is None else round(MARGIN_S / 2 * rate_hz)
         if end + lead <= self._reserved or self._reserved == self._places.capacity:
             return
@@ -310,7 +310,7 @@ class RecordingWriter:
         self._reserved = target
 
     def _fill_gap(self, first: int, stop: int) -> None:
-        """Mark lost samples, in small pieces."""
+        """Write the missing count for lost samples, in small pieces, and add the gap to its table."""
         missing = np.full(GAP_PIECE_SAMPLES, layout.MISSING_COUNT, dtype=layout.COUNT_DTYPE)
         for begin in range(first, stop, GAP_PIECE_SAMPLES):
             counts = np.broadcast_to(
