@@ -1,4 +1,4 @@
-"""``python -m vibench.acquisition.engine``: an engine's process. Its first line of output is its address."""
+"""``python -m vibench.acquisition.engine``: an engine's process. It first prints its address in one line."""
 
 import argparse
 import os
@@ -15,13 +15,13 @@ from ._server import LOOPBACK, address_line, serving
 from ._status import Supervision
 
 PARENT_INTERVAL_S = 0.2
-"""How often an engine that was left alone checks whether it has finished [s]."""
+"""Interval at which an engine without its parent checks whether its work has ended [s]."""
 FORGOTTEN_S = 60.0
-"""How long an unattended engine without a job waits for a request before it ends [s]."""
+"""An idle unattended engine ends after this time without a request [s]."""
 
 
 def main() -> None:
-    """Serve until a request, a signal, or the end of the parent process."""
+    """Serve requests until a request, a signal or the end of the parent process ends the engine."""
     options = _options()
     engine = Engine(options.attendance)
     jobs = JobQueue(engine)
@@ -59,7 +59,7 @@ def _heed_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
-    """End an idle engine whose parent program has gone: it may hold a bench."""
+    """End an idle engine that nobody uses, since it may keep a bench from other programs."""
 
     def look() -> None:
         pause = Event()
@@ -71,7 +71,7 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
 
 
 def _follow_parent(handler: RequestHandler) -> None:
-    """Wait until the parent has closed the input and no work remains, then shut the engine down."""
+    """Wait until the parent has closed this input and no work remains, then shut the engine down."""
     # Not through sys.stdin: a buffer on which a thread waits cannot be closed at the end of the process.
     while os.read(sys.stdin.fileno(), 4096):
         pass

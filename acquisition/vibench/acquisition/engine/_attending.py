@@ -1,7 +1,7 @@
 """``python -m vibench.acquisition.engine._attending``: the process of an `Attendant`, which imports little.
 
-Its input is a line with the engine's address, then one byte for each sign of life of the parent program. It
-ends with that program.
+Its standard input is a line with the engine's address, then one byte each time the parent program shows that
+it is responsive. The process ends with that program.
 """
 
 import json
@@ -16,15 +16,15 @@ from time import monotonic
 from ._wire import ANSWERS, Message, receive, send
 
 BEAT_S = 0.04
-"""Interval of the program's heartbeats to the engine [s]."""
+"""Interval between heartbeats to the engine [s]."""
 STOPPED = ("T", "t", "Z", "X")
 """States of a Linux process that is stopped or dead."""
 LEAST_OWN = 0.25
-"""Share of the time without a sign of life that always counts, even if the system ran other programs."""
+"""Fraction of the time without an input byte that always counts, even if other programs were running."""
 
 
 class _Program:
-    """The parent program, as far as this process can see it (more with ``/proc``)."""
+    """State of the parent program as seen from this process; ``/proc`` gives more details."""
 
     def __init__(self) -> None:
         self._folder = Path(f"/proc/{os.getppid()}")
@@ -33,11 +33,11 @@ class _Program:
         Thread(target=self._follow, name="follow program", daemon=True).start()
 
     def still_s(self) -> float:
-        """Return how long the program has given no sign of life, without its waits for a processor [s].
+        """Return how long the program has sent no byte [s], excluding its waits for a processor.
 
-        While it can run (state R), only its working time counts: Linux reports a wait only after its end.
+        While it can run (state R), only its processor time counts: Linux reports a wait only after its end.
         """
-        lived_s = self._lived_s  # read before the clock: the next sign of life may come in between
+        lived_s = self._lived_s  # read before the clock: the next byte may come in between
         now_s, worked_s = monotonic(), self._worked_s
         seen_s, lived_then_s, worked_then_s = self._seen_s
         self._seen_s = (now_s, lived_s, worked_s)

@@ -1,4 +1,4 @@
-"""Finding the engines of this user, sending requests to them, and the process that attends one."""
+"""Functions and classes that find engines of this user, send them requests, and attend an engine."""
 
 import json
 import os
@@ -47,7 +47,7 @@ class EngineAddress(FrozenModel):
 
 
 REFUSAL_S = 0.2
-"""How long to wait for a refused connection; on this computer it comes at once [s]."""
+"""Time limit of a connection attempt [s]; on the same computer a refusal comes at once."""
 
 
 class Announcement(Program):
@@ -58,7 +58,7 @@ class Announcement(Program):
 
 @contextmanager
 def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
-    """Let `announced_engines` find this engine inside the context; ``press`` carries out stops from files.
+    """Let `announced_engines` find this engine within the context; ``press`` is called for stops from files.
 
     Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """
@@ -68,9 +68,9 @@ def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str]
 
 
 def announced_engines() -> tuple[Announcement, ...]:
-    """Return every engine of this computer whose process is alive, oldest first, whether it answers or not.
+    """Return all engines of this computer whose process runs, oldest first, even if they do not answer.
 
-    One that refuses connections is left out; `programs_without_engine` returns it if its process lives.
+    An engine that refuses connections is left out; `programs_without_engine` returns it if its process runs.
     """
     found = []
     for announcement in announced_programs(Announcement):
@@ -82,15 +82,15 @@ def announced_engines() -> tuple[Announcement, ...]:
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Return scripts and checks that drive a bench themselves, and engines that refuse; oldest first."""
+    """Return scripts and checks that drive a bench without an engine, and engines that refuse connections."""
     engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
 
 def the_engine(pid: int | None) -> Announcement:
-    """Return the engine with this process number, or the only one.
+    """Return the engine with the process number ``pid``; None: the only engine.
 
-    Raises EngineError when there is none, or more than one and ``pid`` is None.
+    Raises EngineError when there is no such engine, or several engines and ``pid`` is None.
     """
     chosen = [each for each in announced_engines() if pid in (None, each.pid)]
     if chosen:
@@ -110,7 +110,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     """Return the programs that a stop addresses: engines, and programs that drive a bench themselves.
 
     Programs in other containers of this computer are included, since they read the same state folder.
-    Raises EngineError when there is none. ``pid`` selects one; None: all of this computer.
+    Raises EngineError when there is none. ``pid`` selects one program; None: all of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained)
@@ -118,7 +118,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
 
 def out_of_reach() -> str:
-    """Return a sentence on the programs of other computers that share the state folder, or nothing."""
+    """Return a sentence on programs of other computers that use the same state folder; empty without them."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return (
@@ -127,7 +127,7 @@ def out_of_reach() -> str:
 
 
 def require_ended(engine: Announcement) -> None:
-    """Refuse to continue after an engine that was killed: nobody has confirmed that its output is off.
+    """Refuse to continue after an engine was killed: its output is not confirmed to be off.
 
     Raises EngineGone when the announced ``engine`` was killed, with the advice to switch the amplifier off.
     """
@@ -169,7 +169,7 @@ class Hello(FrozenModel):
 
 
 def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PATIENCE_S) -> socket.socket:
-    """Connect to a running engine with its token; ``patience_s`` [s] limits the wait for each answer."""
+    """Return a connection to a running engine; ``patience_s`` [s] limits the wait for each answer."""
     hello = Hello(token=address.token, role=role)
     try:
         connection = socket.create_connection((address.host, address.port), patience_s)
@@ -192,7 +192,7 @@ def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PA
 def exchange(
     connection: socket.socket, request: Message, work_s: float = 0.0
 ) -> tuple[dict[str, Any], bytes]:
-    """Send a request and wait for its answer: the parsed text, and the bytes after it.
+    """Send a request and return its answer: the parsed JSON text, and the bytes after it.
 
     ``work_s`` [s] is added to the longest wait for an answer on this connection.
 
@@ -236,7 +236,7 @@ def _silent(patience_s: float) -> EngineSilent:
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:
-    """Return the engine's error as the same class, or as an EngineError if that is unknown."""
+    """Return the engine's error as an instance of its class; EngineError if that class is unknown."""
     known = getattr(errors, kind, None)
     if isinstance(known, type) and issubclass(known, AcquisitionError):
         return known(sentence)
@@ -249,8 +249,8 @@ Answer = TypeVar("Answer")
 class EngineClient(EngineVerbs, ClosedOnLeaving):
     """A connection to an engine.
 
-    Every request over an attending connection shows the engine that somebody is there: an attended run
-    continues only with at least two requests a second. Each method raises `EngineGone` when the engine's
+    Every request over an attending connection shows that a viewer is present: an attended run
+    continues only with at least two requests per second. Each method raises `EngineGone` when the engine's
     process has ended, and the engine's own `AcquisitionError` when it refuses.
     """
 
@@ -302,18 +302,18 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
 
 
 BEAT_EVERY_S = 0.02
-"""Shortest interval between signs of life [s]."""
+"""Shortest interval between two bytes that `Attendant.live` sends [s]."""
 AGAIN_S = 1.0
-"""An attendant that ended before its program is replaced at most once in this time [s]."""
+"""Shortest interval between restarts of an attendant process that ended too early [s]."""
 
 
 class Attendant:
-    """Keeps an engine attended by a small separate process, which sleeps most of the time.
+    """Small separate process that sends heartbeats to an engine, and sleeps most of the time.
 
-    On a busy computer a thread of a window can wait a second or more for Python's lock; a process that
-    mostly sleeps gets a processor at once (decision 0068). It ends with the parent program, is silent while
-    the system has stopped that program (Linux), and reports with each beat for how long `live` has not been
-    called.
+    On a busy computer, a thread of a window can wait a second or more for Python's lock, but a process that
+    mostly sleeps gets a processor at once (decision 0068). The process ends with the parent program. It sends
+    nothing while the system has stopped that program (Linux). Each heartbeat reports how long `live` has not
+    been called.
     """
 
     def __init__(self, address: EngineAddress) -> None:
@@ -329,7 +329,7 @@ class Attendant:
         return self._process.pid
 
     def live(self) -> None:
-        """Note a sign of life of the program; takes microseconds and never waits."""
+        """Report that the program is responsive; takes microseconds and never waits."""
         now_s = monotonic()
         if now_s - self._beat_s < BEAT_EVERY_S:
             return

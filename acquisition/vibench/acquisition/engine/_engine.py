@@ -37,7 +37,7 @@ from ._verbs import CampaignRequest
 
 
 def bench_facts(bench: Bench, role: Role | None = None) -> BenchFacts:
-    """Return the description of an open bench for viewers; in a scan with the vibrometer's ``role``."""
+    """Return the description of an open bench for viewers; ``role`` is the vibrometer's role in a scan."""
     return BenchFacts(
         rig_name=bench.rig.name,
         is_simulated=bench.rig.virtual is not None,
@@ -56,7 +56,7 @@ def bench_facts(bench: Bench, role: Role | None = None) -> BenchFacts:
 
 
 class Engine:
-    """A bench and the jobs on it; one thread calls the methods and alone uses the instruments.
+    """A bench and its jobs. One thread calls the methods; only this thread uses the instruments.
 
     Other threads read `published` and use `switch`. A method publishes an error and then raises it. Call
     `close` at the end: the bench is then silent and closed.
@@ -66,7 +66,7 @@ class Engine:
         self.supervision = supervision
         self.published = PublishedState(supervision)
         self.switch = StopSwitch()
-        """Holds or ends the running campaign; a new one for every campaign."""
+        """Switch that pauses or ends the running campaign; every campaign has a new switch."""
         self._reconnecting: ReconnectingBench | None = None
         self._twin = TwinProcess()
 
@@ -84,7 +84,7 @@ class Engine:
 
     @property
     def stop_sentence(self) -> str:
-        """Sentence on who stopped the run, and whether the output is off; empty without a stop."""
+        """Sentence: why the run was stopped, and whether the output is off; empty without a stop."""
         request = self.switch.request
         if request is None or request.cause is Cause.FAULT:
             return ""
@@ -139,7 +139,7 @@ class Engine:
         messengers: tuple[Messenger, ...] = (),
         move_beam: CommandMessenger | None = None,
     ) -> tuple[PointResult, ...]:
-        """Make the recordings of a campaign; see `run_campaign`, which calls the functions given here."""
+        """Run a campaign and return its results; `run_campaign` calls the functions given here."""
         assert self._reconnecting is not None
         facts_at = cache(partial(bench_facts, self.bench))
         roles = {name: each.point and each.point.role for name, each in request.campaign.recordings()}
@@ -204,7 +204,7 @@ class Engine:
         self.published.twin(TwinStatus() if self._twin.is_on else None)
 
     def look_after_twin(self) -> None:
-        """Report when the live twin has ended by itself: changes of the specimen are then not noticed."""
+        """Warn if the live twin has ended by itself, because changes of the specimen are then not noticed."""
         if (words := self._twin.last_words()) is not None:
             self.published.twin(None)
             self.published.messages.warn(
@@ -260,22 +260,22 @@ ENDING_CAUSES = frozenset({Cause.TERMINATED, Cause.KEYBOARD, Cause.PARENT_GONE})
 
 
 class JobQueue:
-    """A queue of jobs for an engine: filled from any thread, emptied by the one that calls `run`."""
+    """Queue of jobs for an engine; any thread may add jobs, and the thread that calls `run` does them."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
         self._jobs: SimpleQueue[Job | None] = SimpleQueue()
 
     def put(self, job: Job) -> None:
-        """Add a job behind all earlier ones; from any thread."""
+        """Add a job after all earlier jobs; any thread may call this."""
         self._jobs.put(job)
 
     def leave(self) -> None:
-        """End after all earlier jobs; from any thread, and from a signal handler."""
+        """Let `run` end after all earlier jobs; any thread or signal handler may call this."""
         self._jobs.put(None)
 
     def run(self) -> None:
-        """Do jobs until `leave`; always close the bench at the end."""
+        """Do jobs until `leave` is called; always close the bench at the end."""
         try:
             while (job := self._jobs.get()) is not None:
                 self._do(job)

@@ -1,4 +1,4 @@
-"""State of an engine as viewers see it: the engine's thread writes it, any other reads it without waiting."""
+"""State of an engine for its viewers. The engine's thread writes it; all others read it without waiting."""
 
 import shutil
 import threading
@@ -38,7 +38,7 @@ HELD_S = 10.0
 
 @dataclass(frozen=True, eq=False)
 class SampleSlice:
-    """Samples as a viewer gets them."""
+    """Consecutive samples for a viewer."""
 
     run_id: int
     first_sample: int
@@ -54,16 +54,16 @@ class SampleBuffer:
         self._lock = threading.Lock()
         self._blocks: deque[tuple[int, NDArray[np.float32]]] = deque()
         self.run_id = 0
-        """Number of the run that the samples belong to."""
+        """Number of the run to which the samples belong."""
         self._channels = 0
         self._rate_hz = 1.0
         self.samples = 0
         """Samples per channel of the run so far."""
         self.gaps = 0
-        """Places at which samples are missing."""
+        """Number of places at which samples are missing."""
 
     def begin(self, channels: int, sample_rate_hz: float) -> None:
-        """Start a new run, without the samples of the last one."""
+        """Start a new run, and drop the samples of the last run."""
         with self._lock:
             self._blocks.clear()
             self.run_id += 1
@@ -120,7 +120,7 @@ class Messages:
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
     def alarm(self, what: str, done: str, next_step: str) -> None:
-        """Report that something was stopped against the operator's intention."""
+        """Report that the engine stopped something that the operator had not stopped."""
         self._add(MessageKind.FAULT, what, done, next_step, "")
 
     def fault(self, error: BaseException) -> None:
@@ -161,7 +161,7 @@ _STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.R
 
 
 class PublishedState:
-    """The newest status. Each value is replaced as a whole, so that no reader sees half of it."""
+    """Newest status of an engine, always replaced as a whole, so that no reader sees half a change."""
 
     def __init__(self, supervision: Supervision) -> None:
         self.sample_buffer = SampleBuffer()
@@ -202,13 +202,13 @@ class PublishedState:
         )
 
     def enter(self, state: EngineState) -> None:
-        """Change the state; leaving a run or an armed plan clears it."""
+        """Change the state; a state without a run or an armed plan clears both."""
         keeps_plan = state is EngineState.ARMED or state in _STATES.values() or state is EngineState.RUNNING
         forgotten = {} if keeps_plan else {"armed": None, "run": None, "levels": ()}
         self._put(state=state, **forgotten)
 
     def bench(self, bench: BenchFacts | None) -> None:
-        """Set the open bench; a new one has not been checked."""
+        """Set the open bench, and clear the report of the bench check and the rows."""
         self._put(bench=bench, check=None, checked_utc="")
         self._put_rows(())
 
@@ -263,7 +263,7 @@ class PublishedState:
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Set the result of a recording; kept ones count with their planned time."""
+        """Set the result of a recording; a recording kept from before counts with its planned time."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:

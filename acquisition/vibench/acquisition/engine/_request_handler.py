@@ -38,13 +38,13 @@ from ._wire import EngineError
 Answer = TypeVar("Answer")
 
 ARMED_S = 60.0
-"""An armed engine disarms itself after this long [s]."""
+"""An armed engine disarms itself after this time [s]."""
 
 
 def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision) -> ArmedPlan:
-    """Check a campaign against bench and folder; nothing is played and nothing written.
+    """Check a campaign for this bench and folder, and return its plan; nothing is played or written.
 
-    Raises AcquisitionError with every reason why it cannot be carried out.
+    Raises AcquisitionError with every reason why the campaign cannot be run.
     """
     if request.check is CheckRule.FRESH:
         require_on_record(bench)
@@ -57,7 +57,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
     planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
-    # Limits on waveform points and ramps may be used up without harm; only loads can damage.
+    # Reaching a limit on waveform points or ramps is harmless; only loads can cause damage.
     loads = [named for named in checks if named[1].load is not None]
     tightest, closest = max(loads or checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
@@ -93,7 +93,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 
 
 def confirm_from(sheet: KnobSheet | None) -> Confirm:
-    """Return the confirmation that accepts the settings on a sheet, and no others."""
+    """Return a function that confirms the settings on a sheet, and refuses all others."""
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
         seen = () if sheet is None else sheet.knobs
@@ -109,19 +109,19 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
 
 
 STALL_S = 0.2
-"""A check of the viewers that is later than this shows that this process was stalled [s]."""
+"""A longer interval between two checks of the viewers shows that this process was stalled [s]."""
 LATE_FACTOR = 4.0
-"""Factor on the lateness of this process, which is added to the patience: viewers share its computer."""
+"""The patience grows by this factor times the delay of this process, since viewers share its computer."""
 TAKEN_OVER_S = 2.0
-"""An engine without parent is taken over by a viewer whose last request is more recent than this [s]."""
+"""A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995
-"""Part of the worst lateness that remains at the next check; half of it is gone after seven seconds."""
+"""Factor on the largest delay at each check; after seven seconds, half of that delay remains."""
 
 
 class RequestHandler:
     """Handles the requests to an engine.
 
-    It answers from the published state, puts a job into the engine's queue, or presses its switch.
+    It answers from the published state, puts a job into the engine's queue, or sets its stop switch.
     `carry_out` takes requests: it raises `EngineError` with one sentence when the engine's state does not
     permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
     """
@@ -162,11 +162,11 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note a viewer that checks, arms or starts, before any attendant sends beats."""
+        """Note that a viewer is present; also called for a check, arming or a start, without a heartbeat."""
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
-        """Note for how long the window has stood still; the server has noted the viewer's presence."""
+        """Note for how long the window has been blocked; the server notes the viewer's presence."""
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
@@ -207,8 +207,8 @@ class RequestHandler:
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
 
-        Checking the limits of a long campaign takes seconds. A stop in this time has nothing to disarm, so
-        the number of stops is compared before arming.
+        Checking the limits of a long campaign takes seconds. A stop during this time finds nothing to
+        disarm, so the number of stops is compared before arming.
         """
         stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
@@ -239,11 +239,11 @@ class RequestHandler:
         self._jobs.put(lambda: self._engine.measure(request))
 
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Hold or end the run, and disarm an armed campaign."""
+        """Pause or end the run, and disarm an armed campaign."""
         self._stop(StopRequest(Cause.OPERATOR, level, reason))
 
     def resume(self) -> None:
-        """End a hold."""
+        """Continue a paused run."""
         self._engine.switch.resume()
 
     def mark(self, text: str) -> None:
@@ -265,7 +265,7 @@ class RequestHandler:
         return rig
 
     def carried_request(self) -> CampaignRequest:
-        """Return the campaign that was started last, with its options."""
+        """Return the last started campaign, with its options."""
         if self._carried is None:
             raise EngineError("nothing was started by a request to this engine; arm and start a campaign")
         return self._carried
@@ -286,7 +286,7 @@ class RequestHandler:
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
-        """Act on deadlines: disarm a campaign that nobody starts, abort a run that nobody attends."""
+        """Apply the time limits: disarm a campaign that nobody starts, abort a run that nobody attends."""
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
@@ -309,14 +309,14 @@ class RequestHandler:
 
     @property
     def continues_unattended(self) -> bool:
-        """Whether a run is going on that was started as unattended."""
+        """Whether an unattended run is in progress."""
         return self._attendance is Supervision.UNATTENDED and self._engine.published.state in DRIVING
 
     @property
     def outlives_its_parent(self) -> bool:
         """Whether work remains after the parent program has ended.
 
-        The work is a campaign that was left alone; after it, the engine stays while somebody attends it.
+        The work is an unattended campaign; after it, the engine continues while a viewer attends it.
         """
         if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
@@ -328,7 +328,7 @@ class RequestHandler:
         return monotonic() - self._last_request_s < TAKEN_OVER_S
 
     def is_forgotten(self, after_s: float) -> bool:
-        """Whether no request came for this long, and no campaign ran whose results somebody may want."""
+        """Whether the engine is idle, has started no recording, and got no request for ``after_s`` [s]."""
         status = self.status()
         is_idle = status.state in (EngineState.CLOSED, EngineState.READY)
         return (
@@ -361,7 +361,7 @@ class RequestHandler:
     def _stop(self, request: StopRequest) -> None:
         self._stops += 1
         switch = None
-        while switch is not self._engine.switch:  # a start in between brings its own switch
+        while switch is not self._engine.switch:  # a start meanwhile creates a new switch
             switch = self._engine.switch
             switch.ask(request)
             if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:

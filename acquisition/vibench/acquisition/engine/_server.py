@@ -1,7 +1,7 @@
 """The engine's server: on loopback, with a token, and a thread for each connection.
 
 `serving` makes an engine visible to other programs, with a watchdog that enforces deadlines while the
-engine's own thread is at work.
+engine's own thread is busy.
 """
 
 import errno
@@ -31,7 +31,7 @@ from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireE
 # Admission: connections without the token are limited in number, time and size.
 # One thread reads them all and buffers at most `WAITING_MOST` x 1 kB. If there are more connections, or the
 # process cannot open more files, the connection that has waited longest is closed. A client with the token
-# sends it at once, so it gets in among thousands without one.
+# sends it at once, so it is admitted even among thousands of clients without a token.
 
 WAITING_MOST = 64
 GREETING_S = 2.0
@@ -55,7 +55,7 @@ class Admission:
     def __init__(
         self, listening: socket.socket, token: str, admitted: Admitted, make_room: Callable[[], None]
     ) -> None:
-        """``make_room``: closes an admitted connection, when there is no other way."""
+        """Accept connections; ``make_room`` closes an admitted connection when no file can be opened."""
         self._listening = listening
         self._token = token.encode()
         self._admitted = admitted
@@ -80,7 +80,7 @@ class Admission:
 
     def _run(self) -> None:
         while True:
-            # A reserved descriptor, for a connection when the process may open no more.
+            # Reserve a file descriptor for a connection when the process may open no further files.
             if self._reserve is None:
                 with suppress(OSError):
                     self._reserve = os.open(os.devnull, os.O_RDONLY)
@@ -105,7 +105,7 @@ class Admission:
         oldest = next(iter(self._waiting.values()), None)
         if oldest is not None and len(self._waiting) >= WAITING_MOST:
             if monotonic() - oldest.since_s < YOUNG_S:
-                sleep(YOUNG_S / 10)  # their messages may be on the way: they are read first
+                sleep(YOUNG_S / 10)  # messages of the waiting clients may be on the way, and are read first
                 return
             self._turn_away(next(iter(self._waiting)))
         try:
@@ -121,7 +121,7 @@ class Admission:
         self._selector.register(connection, selectors.EVENT_READ)
 
     def _accepted(self) -> tuple[socket.socket, object]:
-        """Accept the next connection; if there is no descriptor left, close the least important one."""
+        """Accept the next connection; if no file descriptor is left, close the least important connection."""
         try:
             return self._listening.accept()
         except OSError as error:
@@ -201,9 +201,9 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""With more viewers, the one with the oldest request is disconnected: a frozen one holds 20 MB."""
+"""Most viewers; if there are more, the one with the oldest request is disconnected (a frozen one: 20 MB)."""
 REQUEST_S = 10.0
-"""How long a request may take, from its first byte to its last [s]."""
+"""Time limit for receiving a request, from its first byte to its last [s]."""
 
 
 @dataclass
@@ -250,7 +250,7 @@ class Server:
             self._leave(viewer)
 
     def _make_room(self) -> None:
-        """Disconnect the viewer with the oldest request; an attending one only if there is no other."""
+        """Disconnect the viewer with the oldest request; an attending viewer only if there is no other."""
         with self._coming_and_going:
             viewers = sorted(
                 self._viewers.values(),
@@ -275,7 +275,7 @@ class Server:
                 message = receive(viewer.connection, REQUESTS, REQUEST_S)
                 self._note(viewer)
                 send(viewer.connection, answer_to(self._handler, message))
-        except OSError:  # it has disconnected, or does not use this protocol
+        except OSError:  # the viewer has disconnected, or does not use this protocol
             pass
         finally:
             self._leave(viewer)

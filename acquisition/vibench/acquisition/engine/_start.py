@@ -1,4 +1,4 @@
-"""Starting an engine's process, and taking over or stopping one."""
+"""Functions and classes that start, take over or stop an engine's process."""
 
 import subprocess
 import sys
@@ -20,13 +20,13 @@ from ._status import SOUNDING, ConnectionRole, EngineState, Supervision
 from ._wire import EngineError, EngineGone, EngineSilent
 
 LEAVING_S = 10.0
-"""How long an engine may take to ramp down, finish its recording and end [s]."""
+"""Time limit for an engine to ramp down, finish its recording and end [s]."""
 LOOK_S = 0.02
 """Interval at which to check whether a process that is not a child has ended [s]."""
 
 
 class AdoptedEngine(ClosedOnLeaving):
-    """An engine that was left alone and is now attended: it ends with its campaign, or on request."""
+    """Running engine without its parent, now attended here; it ends with its campaign or on request."""
 
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement
@@ -36,7 +36,7 @@ class AdoptedEngine(ClosedOnLeaving):
         self.client = EngineClient.attach(announcement.address, ConnectionRole.ATTENDING)
 
     def leave(self) -> None:
-        """Stop attending; a campaign that was armed to be left alone continues."""
+        """Stop attending the engine; an unattended campaign continues."""
         self.client.close()
 
     def close(self) -> None:
@@ -48,7 +48,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def left_alone() -> Announcement | None:
-    """Return an engine that carries out a campaign and was left alone by its parent program."""
+    """Return an engine that runs a campaign although its parent program has ended; None without one."""
     for announcement in announced_engines():
         with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
             if client.status().is_left_alone:
@@ -73,7 +73,7 @@ class EngineProcess(ClosedOnLeaving):
         return self._process.poll() is None
 
     def leave(self) -> None:
-        """Stop attending an engine that was armed to be left alone; it ends after its campaign."""
+        """Stop attending the engine; if its campaign is unattended, the engine ends after the campaign."""
         self.client.close()
         self._close_pipes()
 
@@ -90,7 +90,7 @@ class EngineProcess(ClosedOnLeaving):
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        # Not before: the end of its input tells an engine that it has been left alone.
+        # Close the pipes last: when its input ends, an engine takes its parent as ended.
         self._close_pipes()
 
     def _close_pipes(self) -> None:
@@ -126,16 +126,16 @@ PATIENCE_S = 1.0
 
 
 class StopDelivery(StrEnum):
-    """How far a stop has reached a program."""
+    """Result of sending a stop to a program."""
 
     TOLD = "told"
     """An engine accepted the stop, and its output was read back as off."""
     TAKEN = "taken"
-    """The same for a program that is not an engine."""
+    """A program that is not an engine accepted the stop, and its output was read back as off."""
     UNHEEDED = "unheeded"
     """The engine accepted the stop but has not confirmed that its output is off."""
     KEPT = "kept"
-    """The engine has not accepted the stop; its process is alive, and obeys when it resumes."""
+    """The engine has not accepted the stop; its process is alive, and will obey when it runs again."""
 
 
 def stop_engine(
@@ -143,17 +143,17 @@ def stop_engine(
 ) -> StopDelivery:
     """Stop the drive of an engine or another program, and its campaign.
 
-    The stop is written to a file in the state folder. The program obeys within a twentieth of a second, or
-    when its process resumes. Returns when the program has confirmed that its output is off, or has not done
-    so in time. If no file can be written, or the program does not take it, the stop is sent over the engine's
-    connection. A hold is only sent, never written to a file: it must not begin unexpectedly.
+    The stop is written to a file in the state folder. The program obeys within 0.05 s, or when
+    its process runs again. The function returns when the program has confirmed that its output is off, or
+    after a time limit. If no file can be written, or the program does not read it, the stop is sent over the
+    engine's connection. A hold (pause) is only sent, because a hold from a file could begin too late.
 
     Parameters
     ----------
     engine
         Announcement of the program.
     level
-        How the run is stopped.
+        Kind of the stop.
     reason
         Reason stored in the recording.
 
@@ -190,7 +190,7 @@ def stop_engine(
             return StopDelivery.UNHEEDED
         case Fate.NOT_TAKEN if engine.is_alive:
             if isinstance(engine, Announcement):
-                with suppress(EngineError):  # it hangs: the stop stays in the folder
+                with suppress(EngineError):  # the engine hangs: the stop remains in the folder
                     return _tell(engine, level, reason)
             return StopDelivery.KEPT
     with suppress(OSError):

@@ -47,7 +47,7 @@ class Supervision(StrEnum):
     ATTENDED = "attended"
     """The run is aborted when no request comes for longer than `patience_s`."""
     UNATTENDED = "unattended"
-    """A campaign that is left alone: viewers may come and go."""
+    """The run continues without any viewer; viewers may connect and leave."""
 
 
 class ConnectionRole(StrEnum):
@@ -60,7 +60,7 @@ class ConnectionRole(StrEnum):
 
 
 VIEWER_PATIENCE_S = 0.5
-"""How long an attended run at a limit of the rig continues without requests [s]."""
+"""Time that an attended run at a limit of the rig continues without requests [s]."""
 LONGEST_PATIENCE_S = 10.0
 """Longest patience that can be granted [s]."""
 HUNG_FACTOR = 4.0
@@ -68,14 +68,14 @@ HUNG_FACTOR = 4.0
 
 
 def hung_patience_s(granted_s: float) -> float:
-    """Return how long a drive may continue with a blocked window; ``granted_s``: without requests [s]."""
+    """Return how long [s] a drive may continue with a blocked window; ``granted_s``: without requests."""
     return min(HUNG_FACTOR * granted_s, LONGEST_PATIENCE_S)
 
 
 def patience_s(longest_s: float, use: float) -> float:
-    """Return how long a drive may continue without requests: the closer to a limit, the shorter [s].
+    """Return how long [s] a drive may continue without requests; close to a limit, the time is shorter.
 
-    ``use`` is the share of the tightest limit; ``longest_s`` [s] is the patience far from all limits.
+    ``use`` is the used fraction of the tightest limit; ``longest_s`` [s] is the patience far from all limits.
     """
     return max(VIEWER_PATIENCE_S, min(longest_s, VIEWER_PATIENCE_S / max(use, 1e-9)))
 
@@ -90,18 +90,18 @@ class ChannelFacts(FrozenModel):
 
 
 class BenchFacts(FrozenModel):
-    """The open bench."""
+    """Description of the open bench."""
 
     rig_name: str
     is_simulated: bool
     identities: Mapping[str, str]
-    """Reply of each instrument, by its part in the bench."""
+    """Identification that each instrument replied, by its part in the bench."""
     channels: tuple[ChannelFacts, ...]
     sample_rate_hz: float
 
 
 class ArmedPlan(FrozenModel):
-    """What will happen at the start, in words for the experimenter."""
+    """Description of an armed campaign, in words for the experimenter."""
 
     campaign: str
     folder: str
@@ -112,15 +112,15 @@ class ArmedPlan(FrozenModel):
     attendance: Supervision
     """Whether the run needs a viewer."""
     patience_s: float
-    """How long the run continues without requests, if it needs a viewer [s]."""
+    """Time that the run continues without requests, if it needs a viewer [s]."""
 
 
 class RunStatus(FrozenModel):
-    """The running measurement."""
+    """Status of the running measurement."""
 
     name: str
     number: int
-    """Number of the campaign's recordings, from 1."""
+    """Number of this recording in the campaign, from 1."""
     count: int
     file: str
     run_state: RunState
@@ -133,9 +133,9 @@ class RunStatus(FrozenModel):
     amplitude_vpp: float
     frequency_hz: float | None
     plan: str = ""
-    """The signal in words: kind and highest level."""
+    """Text on the signal: kind and highest level."""
     until: UntilNote | None = None
-    """Bounds of the results so far, for a measurement with `until`."""
+    """Error bounds of the results so far, for a measurement with `until`."""
 
 
 class ChannelLevel(FrozenModel):
@@ -168,45 +168,45 @@ class EngineMessage(FrozenModel):
     """An event: what happened, what was done about it, and what to do next."""
 
     number: int
-    """Counts all messages of an engine, from 1."""
+    """Number of the message; each engine counts its messages from 1."""
     utc: str
     kind: MessageKind
     what: str
     done: str = ""
     next_step: str = ""
     code: str = ""
-    """Name of the error, for a search."""
+    """Class name of the error, for searches."""
 
 
 class TwinStatus(FrozenModel):
     """The live twin's last report: motion of m1 between its stops, numbers, and delay."""
 
     pid: int = 0
-    """Number of its process, after its first report."""
+    """Process number of the twin; 0 before its first report."""
     state: str = "starting"
     """``"starting"``, ``"waiting"``, ``"tracked"`` or ``"lost"``."""
     sentence: str = ""
     run_id: int = 0
     end_sample: int = 0
-    """One past the newest sample that it used."""
+    """Number of the sample after the newest one that the twin used."""
     step_s: float = 0.0
     """Time step of ``p_m``, which ends at the newest sample."""
     p_m: tuple[float | None, ...] = ()
-    """Relative displacement; None where the track was lost."""
+    """Relative displacement of m1 [m]; None where the twin had lost the motion."""
     forecast_m: tuple[float, ...] = ()
-    """Forecast from the newest sample on, as far as it is reliable."""
+    """Forecast of ``p_m`` from the newest sample on, as far as it is reliable [m]."""
     forecast_error_m: tuple[float, ...] = ()
-    """Bound that contained 68 % of earlier forecasts, for each time ahead."""
+    """Error bound that 68 % of earlier forecasts did not exceed, for each time ahead [m]."""
     stops_m: tuple[float, float] = (0.0, 0.0)
-    """Positions of the lower and the upper stop."""
+    """Positions of the lower and the upper stop [m]."""
     numbers: tuple[tuple[str, str], ...] = ()
-    """Numbers found in this run's collisions: name, and value with 95 % bounds."""
+    """Parameters estimated from this run's collisions: name, and value with 95 % bounds."""
     level: float | None = None
-    """Innovation of the last tenth of a second; 1 for noise alone, None when lost."""
+    """Normalised innovation over the last 0.1 s; 1 for noise alone, None when the motion is lost."""
     limit: float | None = None
     """Level above which a change of the specimen is suspected; None while the usual level is being learnt."""
     busy_share: float = 0.0
-    """Processor time of the twin's process over the time since the run began."""
+    """Processor time of the twin's process, divided by the time since the run began."""
     missed_s: float = 0.0
     """Duration of motion that the twin skipped because it was too slow [s]; the recording contains it."""
     behind_s: float = 0.0
@@ -226,33 +226,33 @@ class EngineStatus(FrozenModel):
     levels: tuple[ChannelLevel, ...] = ()
     rows: tuple[RowStatus, ...] = ()
     rows_number: int = 0
-    """Changes whenever a row does, so that thousands of rows are sent only when needed."""
+    """Number that changes with every change of a row, so that unchanged rows need not be sent again."""
     overloads: int = 0
     """Number of sample ranges beyond a channel's full scale in this run."""
     lost_blocks: int = 0
-    """Gaps in this run's samples."""
+    """Number of gaps in this run's samples."""
     disk_free_bytes: int = 0
     samples: int = 0
     """Samples per channel of this run so far."""
     run_id: int = 0
-    """Changes with every recording; data of another number are out of date."""
+    """Number of the recording in this engine; data with another number are out of date."""
     twin: TwinStatus | None = None
     """The live twin's last report; None without a twin."""
     is_left_alone: bool = False
-    """The parent program has ended, the campaign continues, and nobody attends the engine."""
+    """Whether the parent program has ended, the campaign continues, and nobody attends the engine."""
     messages: tuple[EngineMessage, ...] = ()
-    """The newest, oldest first."""
+    """Newest messages, oldest first."""
 
 
 # The live twin's process (decision 0044), started and ended by an engine, which never waits for it. It is a
 # viewer like any other (`vibench twin`): it requests samples, reports its results, and keeps no run alive.
-# When it is too slow it skips samples; the recording does not.
+# When it is too slow, it skips samples; the recording still contains them.
 
 ENDING_S = 2.0
 
 
 class TwinSwitch(StrEnum):
-    """Whether the live twin runs beside a measurement."""
+    """Whether the live twin runs during a measurement."""
 
     OFF = "off"
     ON = "on"
@@ -294,7 +294,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Return, once, why the twin ended by itself; None while it runs or is off."""
+        """Return, only once, why the twin ended by itself; None while it runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

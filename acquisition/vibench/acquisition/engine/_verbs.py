@@ -55,18 +55,18 @@ class CampaignRequest(FrozenModel):
     folder: Path
     """Folder for its recordings."""
     twin: TwinSwitch = TwinSwitch.OFF
-    """Whether the live twin runs beside it; it always does for a plan with ``on_changed_specimen =
+    """Whether the live twin runs with the campaign; it always runs for a plan with ``on_changed_specimen =
     "stop"``."""
     existing: ExistingRecordings = ExistingRecordings.REFUSE
     after_failure: AfterFailure = AfterFailure.STOP
     changed_bench: ChangedBench = ChangedBench.REFUSE
     check: CheckRule = CheckRule.FRESH
     attendance: Supervision | None = None
-    """Whether the run needs a viewer; if absent, as the engine was started."""
+    """Whether the run needs a viewer; None: as set at the start of the engine."""
     longest_patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)] = (
         VIEWER_PATIENCE_S
     )
-    """How long an attended drive far from every limit continues without requests [s]; see `patience_s`."""
+    """Time that an attended drive far from all limits continues without requests [s]; see `patience_s`."""
 
 
 P = ParamSpec("P")
@@ -94,7 +94,7 @@ class Verb(Generic[A]):
     request: type[FrozenModel]
     answer: Answer[A]
     states: tuple[EngineState, ...]
-    """Permitted states; empty: legal in every state, and never delayed."""
+    """Engine states that permit the request; empty: legal in every state, and never delayed."""
     work_s: float
     """Longest time to compute the answer [s]; 0 if it is ready at once."""
 
@@ -105,7 +105,7 @@ class Verb(Generic[A]):
 
 
 ARMING_S = 300.0
-"""Longest time for arming [s]: the limits of a hundred sweeps take seconds, on a busy computer a minute."""
+"""Longest time for arming [s]: checking 100 sweeps takes seconds, or a minute on a busy computer."""
 VERBS: dict[str, Verb[Any]] = {}
 """Every verb, by its word."""
 
@@ -113,7 +113,7 @@ VERBS: dict[str, Verb[Any]] = {}
 def verb(
     word: str, answer: Answer[A], *states: EngineState, work_s: float = 0.0
 ) -> Callable[[Callable[Concatenate[Any, P], A]], Callable[Concatenate[Any, P], A]]:
-    """Declare a verb by the signature of its method; the method then sends the request."""
+    """Return a decorator that declares a method as a verb; the method then sends the request."""
 
     def declared(call: Callable[Concatenate[Any, P], A]) -> Callable[Concatenate[Any, P], A]:
         parameters = signature(call)
@@ -191,7 +191,7 @@ class EngineVerbs:
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig; the status shows when it is open.
 
-        ``confirmations`` are the confirmed settings made by hand; a virtual rig needs none.
+        ``confirmations`` lists the manual settings that the operator confirmed; a virtual rig needs none.
         """
 
     @verb("close", DONE, EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED)
@@ -202,12 +202,12 @@ class EngineVerbs:
     def check(self, folder: AbsolutePath = Path(), *, new_reference: bool = False) -> None:
         """Check the bench with a small sine; ``folder`` is for the recordings.
 
-        ``new_reference``: do not compare with an earlier check, since the change was intended.
+        ``new_reference``: do not compare with an earlier check, because the bench was changed on purpose.
         """
 
     @verb("arm", PLAN, EngineState.READY, EngineState.ARMED, work_s=ARMING_S)
     def arm_request(self, campaign_request: AbsoluteRequest) -> ArmedPlan:
-        """Prepare a campaign, or refuse it with the reasons."""
+        """Prepare a campaign and return its plan, or refuse it with the reasons."""
         raise NotImplementedError
 
     @verb("disarm", DONE)
@@ -220,11 +220,11 @@ class EngineVerbs:
 
     @verb("stop", DONE)
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Hold or end the run, and disarm an armed campaign. Never refused."""
+        """Pause or end the run, and disarm an armed campaign. Never refused."""
 
     @verb("resume", DONE)
     def resume(self) -> None:
-        """End a hold."""
+        """Continue a paused run."""
 
     @verb("mark", DONE, *sorted(DRIVING))
     def mark(self, text: Annotated[str, Field(min_length=1, max_length=200)]) -> None:
@@ -241,7 +241,7 @@ class EngineVerbs:
 
     @verb("request", REQUESTED)
     def carried_request(self) -> CampaignRequest:
-        """Return the campaign that was started last, with its options: for a viewer that did not arm it."""
+        """Return the last started campaign with its options, for a viewer that did not arm it."""
         raise NotImplementedError
 
     @verb("twin", DONE)
@@ -254,21 +254,21 @@ class EngineVerbs:
 
     @verb("status", STATUS)
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the state of the engine, without its rows if ``known_rows`` is still their number."""
+        """Return the status of the engine, without its rows if ``known_rows`` is their current number."""
         raise NotImplementedError
 
     @verb("beat", DONE)
     def beat(self, still_s: NonNegativeFloat = 0.0) -> None:
-        """Report that the viewer is there, and for how long its window stood still (``still_s``)."""
+        """Report that the viewer is present, and for how long its window was blocked (``still_s`` [s])."""
 
     @verb("look", SAMPLES)
     def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:
-        """Return the newest samples of the run: from ``since_sample`` on, at most ``most`` a channel."""
+        """Return the newest samples of the run: from ``since_sample`` on, at most ``most`` per channel."""
         raise NotImplementedError
 
     @verb("shutdown", DONE)
     def shutdown(self) -> None:
-        """Ramp down, silence everything, end the process."""
+        """Ramp the drive down, silence all outputs, and end the process."""
 
 
 _REQUESTS: Any = reduce(or_, (row.request for row in VERBS.values()))

@@ -1,8 +1,8 @@
-"""Messages on a stream: a short binary header, a JSON text, and samples after it if there are any.
+"""Messages between engine and clients: a short binary header, a JSON text, and optional samples.
 
 Nothing executable is sent: data from another process are parsed as JSON or read as numbers, never unpickled.
-A declared length allocates no memory: only received bytes are kept, and each side limits the length of a
-message.
+The length declared in a header allocates no memory: only received bytes are kept, and each side limits the
+length of a message.
 """
 
 import json
@@ -21,16 +21,16 @@ PIECE_BYTES = 1 << 18
 
 @dataclass(frozen=True)
 class Bounds:
-    """The longest message that is accepted."""
+    """Largest size of an accepted message [bytes]."""
 
     text_bytes: int
     payload_bytes: int = 0
 
 
 HELLO = Bounds(1_000)
-"""For messages before the token was shown."""
+"""Limit for the first message of a connection, which contains the token."""
 REQUESTS = Bounds(32_000_000)
-"""A campaign of thousands of measurements; no request carries samples."""
+"""Limit for requests: a campaign may have thousands of measurements; no request contains samples."""
 ANSWERS = Bounds(32_000_000, 64_000_000)
 
 
@@ -57,7 +57,7 @@ class IncomingMessage:
 
     @property
     def missing(self) -> int:
-        """Bytes still to read; 0 when the message is complete."""
+        """Number of bytes still to read; 0 when the message is complete."""
         return self._end - len(self._came)
 
     def take(self, piece: bytes) -> None:
@@ -97,7 +97,7 @@ def send(connection: socket.socket, message: Message) -> None:
 
 
 def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = None) -> Message:
-    """Wait for one message: up to the connection's timeout, then ``within_s`` after its first byte.
+    """Return the next message; waits up to the connection's timeout, then ``within_s`` after the first byte.
 
     Raises WireError when the connection ends or the data are not a message, and TimeoutError when no message
     comes in time.
@@ -109,7 +109,7 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
             incoming.take(connection.recv(min(incoming.missing, PIECE_BYTES)))
             if within_s is not None:
                 until_s = monotonic() + within_s if until_s is None else until_s
-                # Not 0, which would mean no waiting at all.
+                # A timeout of 0 would mean no waiting at all.
                 connection.settimeout(max(until_s - monotonic(), 1e-3))
     finally:
         connection.settimeout(patience_s)
@@ -125,4 +125,4 @@ class EngineGone(EngineError, ConnectionError):
 
 
 class EngineSilent(EngineGone):
-    """The engine has not answered in time; its process may live."""
+    """The engine has not answered in time; its process may still run."""
