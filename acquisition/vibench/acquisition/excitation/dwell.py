@@ -16,9 +16,9 @@ MOST_LEAD_INS = 1000
 class Dwell(FixedSine):
     """A sine at one frequency, recorded after it has settled.
 
-    An impacting specimen may have several motions at one frequency; the earlier motion decides which one it
-    takes. ``lead_in`` leads to it along a path: tone after tone, without a break in phase, recorded as a
-    separate segment that gives no result.
+    An impacting specimen may have several motions at one frequency; which one occurs depends on the earlier
+    motion. The tones of ``lead_in`` therefore lead to the dwell, one after another with continuous phase.
+    They are recorded as a separate segment from which no result is computed.
     """
 
     family: ClassVar[Family] = Family.DWELL
@@ -26,16 +26,16 @@ class Dwell(FixedSine):
     wishes: ClassVar[tuple[str, ...]] = ("response_i", "response_ii")
     kind: Literal["dwell"] = "dwell"
     settle_s: NonNegativeFloat = 3.0
-    """Wait until the transient has died out [s]."""
+    """Waiting time for the transient to die out [s]."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
-    """Earlier tones in order of time; empty to start with the dwell."""
+    """Tones before the dwell, in the order played; if empty, the drive starts with the dwell."""
     lead_s: PositiveFloat = 0.5
-    """Time at each tone of ``lead_in`` [s]."""
+    """Duration of each tone of ``lead_in`` [s]."""
 
     def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
-        """Return a dwell at another tone, with the tone of this one at the end of its lead-in."""
+        """Return a dwell at another frequency or setting, with this dwell's tone added to its lead-in."""
         changed = {
             "lead_in": (*self.lead_in, self._tone),
             "frequency_hz": frequency_hz,
@@ -53,7 +53,7 @@ class Dwell(FixedSine):
 
     @property
     def lead_in_s(self) -> float:
-        """Time of all tones of the lead-in [s]."""
+        """Duration of the lead-in [s]."""
         return len(self.lead_in) * self.lead_s
 
     @property
@@ -63,12 +63,12 @@ class Dwell(FixedSine):
 
     @property
     def highest_amplitude_vpp(self) -> float:
-        """The highest setting of lead-in and dwell [V]."""
+        """The highest amplitude setting of lead-in and dwell [Vpp]."""
         return max(self.amplitude_vpp, *(tone.amplitude_vpp for tone in self.lead_in), 0.0)
 
     @property
     def playing_s(self) -> float:
-        """Lead-in, settling and recording [s]."""
+        """Duration of lead-in, settling and recording [s]."""
         return self.lead_in_s + self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:

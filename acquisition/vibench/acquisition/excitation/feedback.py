@@ -1,4 +1,4 @@
-"""Settings of feedback: when a motion is settled, and which level of the base is held."""
+"""Settings of feedback: criteria for settled motion, levels of the base to be held, and jumps."""
 
 from math import pi
 from typing import Annotated, Self
@@ -10,31 +10,31 @@ from ..host.toml_file import FrozenModel
 MOST_PERIODS = 100_000
 Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
-"""Displacement [m]; a value below all sensors or above every shaker's stroke has a wrong unit."""
+"""Displacement to be held [m]. The bounds only catch wrong units: no sensor or shaker reaches them."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
-"""Acceleration [m/s2]; no shaker reaches ten thousand times gravity."""
+"""Acceleration to be held [m/s2]. The bounds only catch wrong units: no shaker reaches 10 000 g."""
 
 
 class Settling(FrozenModel):
-    """When the motion of the specimen counts as settled.
+    """Criteria by which the motion of the specimen counts as settled.
 
-    The motion is measured once in each period of the recorded drive, as amplitude and phase of its first
-    four harmonics. It is settled with period k when these repeat after k drive periods, or when it does not
-    repeat and its statistics are constant.
+    Amplitude and phase of the first four harmonics are measured once per drive period. The motion is settled
+    with period k if these values repeat after k drive periods. A motion that does not repeat is settled if
+    its statistics are constant.
     """
 
     tolerance: Share = 0.01
-    """Tolerance for a repeating motion, relative to its rms value."""
+    """Largest deviation between repetitions of the motion, relative to its rms value."""
     periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
-    """Number of drive periods for which it must repeat."""
+    """Number of drive periods over which the motion must repeat."""
     longest_period: int = Field(default=8, ge=1, le=32)
-    """Longest period to search for, in drive periods."""
+    """Longest period of the motion that is searched for, in drive periods."""
     aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
     """Number of drive periods over which a motion that does not repeat must have constant statistics."""
     shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
-    """Wait at least this long at every frequency [s]."""
+    """Shortest wait at every frequency [s]."""
     longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
-    """Longest wait [s]; the motion is then recorded as not settled."""
+    """Longest wait at every frequency [s]; the motion is then recorded as not settled."""
 
     @model_validator(mode="after")
     def _waits_in_order(self) -> Self:
@@ -49,18 +49,18 @@ class Settling(FrozenModel):
 class BaseLevel(FrozenModel):
     """Level of the base's motion that feedback holds by adjusting the generator's amplitude.
 
-    Only the fundamental counts; impacts add motion at other frequencies. ``amplitude_vpp`` of the plan is
-    then the largest amplitude that may be used.
+    Only the fundamental of the base motion is held; impacts add motion at other frequencies.
+    ``amplitude_vpp`` of the plan is then the largest setting that feedback may use.
     """
 
     acceleration_m_per_s2: HeldMetresPerS2 | None = None
-    """Peak of the base's fundamental [m/s2]; or give ``displacement_m``."""
+    """Peak acceleration of the fundamental [m/s2]; give either this or ``displacement_m``."""
     displacement_m: HeldMetres | None = None
-    """Peak of the base's fundamental [m], the same at every frequency; or give ``acceleration_m_per_s2``."""
+    """Peak displacement of the fundamental at every frequency [m]; or give ``acceleration_m_per_s2``."""
     tolerance: Share = 0.025
-    """Allowed relative deviation of the measured level."""
+    """Allowed relative deviation of the measured level from the level to be held."""
     most_change: float = Field(default=1.25, gt=1, le=4)
-    """Largest factor of one change of the setting."""
+    """Largest factor by which the setting changes at once."""
 
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
@@ -81,7 +81,7 @@ class BaseLevel(FrozenModel):
         return f"{self.acceleration_m_per_s2:g} m/s²"
 
     def acceleration_at(self, frequency_hz: float) -> float:
-        """Acceleration amplitude to be held [m/s2]."""
+        """Return the peak acceleration to be held at ``frequency_hz`` [m/s2]."""
         if self.displacement_m is not None:
             return self.displacement_m * (2 * pi * frequency_hz) ** 2
         assert self.acceleration_m_per_s2 is not None, "the validator asks for one of them"
@@ -89,11 +89,11 @@ class BaseLevel(FrozenModel):
 
 
 class JumpSearch(FrozenModel):
-    """When a change between two steps is a jump, and how closely it is located."""
+    """Criteria by which a change between two steps counts as a jump, and the accuracy of its location."""
 
     factor: float = Field(default=1.5, gt=1, le=100)
-    """A change of Response II (fundamental of m0 over the base's) by more than this is a jump."""
+    """A change of Response II (fundamental of m0 over that of the base) by a larger factor is a jump."""
     resolution_hz: PositiveFloat = 0.25
-    """Largest distance between the two frequencies around a located jump [Hz]."""
+    """Largest allowed distance between the two frequencies that enclose a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)
-    """Largest number of searches in one pass, including steep changes that are no jumps."""
+    """Largest number of searches in one pass, including those at steep changes that are no jumps."""

@@ -1,4 +1,4 @@
-"""One sine, with the base held at a level."""
+"""A sine at one frequency during which feedback holds the base motion at a level."""
 
 from collections.abc import Iterator
 from typing import ClassVar, Literal
@@ -12,7 +12,7 @@ from .steps import Segment, Step, Tone
 
 
 class HeldDwell(FixedSine, AbstractFeedback):
-    """A dwell whose base motion is measured and held, before and during the recording."""
+    """A dwell whose base motion is held at a level by feedback, before and during the recording."""
 
     family: ClassVar[Family] = Family.DWELL
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
@@ -20,27 +20,27 @@ class HeldDwell(FixedSine, AbstractFeedback):
     base_level: BaseLevel
     """Level of the base to be held."""
     settling: Settling = Settling()
-    """Settling before the recording."""
+    """Criteria for settled motion before the recording."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     update_s: PositiveFloat = 1.0
-    """How often the level is measured, and corrected if needed, during the recording [s]."""
+    """Interval at which the level is measured, and corrected if needed, during the recording [s]."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The level of the base to be held, as the only entry."""
+        """One entry: the level of the base to be held."""
         return (self.base_level,)
 
     @property
     def playing_s(self) -> float:
-        """The longest wait and the recording [s]."""
+        """Duration of the longest wait and of the recording [s]."""
         return self.settling.longest_wait_s + self.duration_s
 
     @property
     def segment(self) -> Segment:
-        """The segment of the recorded part."""
+        """Segment of the recording after settling."""
         return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step, without its wait, at the largest setting."""
+        """Yield one step: the recording at the largest setting, without the wait before it."""
         yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)

@@ -1,4 +1,4 @@
-"""Noise with a given spectrum of the base: equalised from the measured response, average by average."""
+"""Noise with a given acceleration spectrum at the base; the drive is equalised after every average."""
 
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -17,7 +17,7 @@ Decibels = Annotated[float, Field(gt=0, le=40)]
 
 
 class SpectrumPoint(FrozenModel):
-    """One corner of a spectrum; between corners it is a straight line over the logarithms of both."""
+    """One corner of a spectrum, which is a straight line in log-log axes between corners."""
 
     frequency_hz: FrequencyHz
     density: Annotated[float, Field(ge=1e-30, le=1e10)]
@@ -28,7 +28,7 @@ Spectrum = Annotated[tuple[SpectrumPoint, ...], Field(min_length=1, max_length=1
 
 
 def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Samples:
-    """Return the densities of a spectrum; constant beyond its first and last corner."""
+    """Return the densities of ``spectrum`` at ``frequency_hz``; constant beyond the first and last corner."""
     corners_hz, densities = zip(*((each.frequency_hz, each.density) for each in spectrum), strict=True)
     return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(corners_hz), np.log(densities))))
 
@@ -36,29 +36,29 @@ def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Sample
 class HeldNoise(PeriodicNoise, AbstractFeedback):
     """Noise with a given acceleration spectrum at the base, white or shaped.
 
-    Every realisation has its own phases, like those of `WhiteNoise`, and a drive computed from the gains
-    measured before. The first ``equalisations`` of them, at levels that rise from ``start_db``, give no
-    results. ``amplitude_vpp`` is the largest setting that may be used; limits of the bench are checked
-    beforehand for flat noise at that setting.
+    Every realisation has new phases, as in `WhiteNoise`, and a drive computed from the gains measured so far.
+    The first ``equalisations`` realisations, at levels that rise from ``start_db``, give no results.
+    ``amplitude_vpp`` is the largest setting that may be used. Limits of the bench are checked beforehand,
+    for flat noise at that setting.
     """
 
     family: ClassVar[Family] = Family.NOISE
     kind: Literal["held_noise"] = "held_noise"
     spectrum: Spectrum
-    """Density of the base's acceleration [(m/s2)2/Hz], corner by corner."""
+    """Power spectral density of the base acceleration at its corners [(m/s2)2/Hz]."""
     tolerance_db: Decibels = 3.0
-    """Allowed deviation of the measured density."""
+    """Allowed deviation of the measured density from ``spectrum`` [dB]."""
     abort_db: Decibels = 6.0
-    """Deviation above the spectrum that ends the run."""
+    """Excess of the measured density over ``spectrum`` that ends the run [dB]."""
     response_limits: tuple[SpectrumPoint, ...] = ()
-    """Largest density of the velocity of m0 [(m/s)2/Hz]: the base is lowered (notched) where it would be
-    exceeded; corner by corner; absent: no limit."""
+    """Largest power spectral density of m0's velocity, at its corners [(m/s)2/Hz]. The base spectrum is
+    lowered (notched) where m0 would exceed it; if empty, there is no limit."""
     resolution_hz: PositiveFloat = 4.0
     """Bandwidth over which densities and gains are averaged [Hz]."""
     equalisations: int = Field(default=4, ge=1, le=100)
-    """Realisations for equalisation, before the first that gives results."""
+    """Number of realisations that only equalise the drive, before the first realisation with results."""
     start_db: float = Field(default=-12.0, ge=-60, le=0)
-    """Level of the first equalisation, relative to the spectrum."""
+    """Level of the first equalisation relative to ``spectrum`` [dB]."""
 
     @model_validator(mode="after")
     def _corners_rise(self) -> Self:
@@ -79,12 +79,12 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def density(self) -> Samples:
-        """The spectrum at each of the lines [(m/s2)2/Hz]."""
+        """Density of the spectrum at each line [(m/s2)2/Hz]."""
         return density_at(self.spectrum, self.lines * self.repetition_hz)
 
     @property
     def rms_m_per_s2(self) -> float:
-        """Rms acceleration of the spectrum over the lines of the band."""
+        """Rms base acceleration of all lines of the band [m/s2]."""
         return float(np.sqrt(np.sum(self.density) * self.repetition_hz))
 
     @property
@@ -94,15 +94,15 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def level_text(self) -> str:
-        """The level, and the largest setting."""
+        """Description of the rms level held and the largest setting, for display."""
         return f"base held at {self.rms_m_per_s2:.3g} m/s² rms, at most {self.amplitude_vpp:g} Vpp"
 
     @property
     def stretches(self) -> int:
-        """One for every realisation, including those that equalise."""
+        """Number of realisations, including those for equalisation."""
         return self.equalisations + self.realisations
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording of all realisations, including those that equalise [s]."""
+        """Duration of settling and recording of all realisations, including those for equalisation [s]."""
         return self.stretches * (self.settle_s + self.periods / self.repetition_hz)

@@ -1,4 +1,4 @@
-"""Sines one after the other with a constant response: response-controlled stepped sines."""
+"""Response-controlled stepped sine: feedback holds the response of m0 at every frequency."""
 
 from typing import Literal
 
@@ -15,27 +15,27 @@ from .stepped_sine import FrequencySteps
 class HeldResponse(FrequencySteps, AbstractFeedback):
     """A stepped sine whose setting is corrected until m0 has a given amplitude, at every frequency.
 
-    One level of the base may have several responses, but a response has one level of the base. So curves of
-    constant response are single-valued, and a set of them gives those of constant level, including unstable
-    parts (Karaagacli and Ozguven, Vibration 3 (2020) 19). Motions can be held that are stable under constant
-    voltage, or that grow more slowly than feedback acts.
+    A level of the base may allow several responses, but each response needs only one level of the base.
+    Curves at constant response are therefore single-valued; from a set of them follow the curves at constant
+    level, including unstable parts (Karaagacli and Ozguven, Vibration 3 (2020) 19). Feedback can hold motions
+    that are stable at constant voltage, and unstable ones that diverge more slowly than feedback acts.
     """
 
     kind: Literal["held_response"] = "held_response"
     response_m: HeldMetres
-    """Amplitude of m0's fundamental to be held [m]."""
+    """Amplitude of the fundamental of m0's motion, to be held [m]."""
     response_of: PhaseReference = PhaseReference.RELATIVE
-    """Motion of m0: relative to the base, or absolute."""
+    """Motion of m0 that is held: relative to the base, or absolute."""
     tolerance: Share = 0.01
-    """Relative tolerance that two measurements in a row must meet."""
+    """Allowed relative deviation from ``response_m``; two measurements in a row must meet it."""
     most_change: float = Field(default=1.25, gt=1, le=4)
-    """Largest factor of one change of the setting."""
+    """Largest factor by which the setting changes at once."""
     start_share: Share = 0.02
-    """Setting at the start of the first frequency, over ``amplitude_vpp``."""
+    """First setting at the first frequency, as a fraction of ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
-    """Longest wait [s]; the step is then recorded and flagged."""
+    """Longest wait at a frequency [s]; the step is then recorded with a flag."""
     glide_step_hz: PositiveFloat = 0.5
-    """Largest frequency step of the tone between two frequencies of the list [Hz]."""
+    """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
@@ -44,13 +44,13 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
 
     @property
     def level_text(self) -> str:
-        """The response, and the largest setting."""
+        """Description of the held response and the largest setting, for display."""
         words = f"{self.response_of.value} motion of m0 held at {1e6 * self.response_m:g} µm"
         return f"{words}, at most {self.amplitude_vpp:g} Vpp"
 
     @property
     def playing_s(self) -> float:
-        """All steps with the longest waits [s]."""
+        """Duration of all steps, with the longest waits [s]."""
         passes = sum(1 for _ in self.passes())
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
         steps_s = len(self.rising_hz) * (self.longest_wait_s + self.record_s)

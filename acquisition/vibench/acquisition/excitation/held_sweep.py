@@ -1,4 +1,4 @@
-"""A sine sweep with the measured motion of the base held at a level."""
+"""A sine sweep during which feedback holds the base motion at a level."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -12,28 +12,28 @@ from .steps import Segment, Step, Tone
 
 
 class HeldSweep(MovingSine, AbstractFeedback):
-    """A sweep whose setting is corrected after every step from the motion of the base.
+    """A sweep whose amplitude setting is corrected after every step from the measured base motion.
 
-    A sweep does not wait: if the gain of the base changes within a few steps, the level is off for that
-    time, and the recording notes it.
+    A sweep does not wait. If the gain from the setting to the base motion changes within a few steps, the
+    level is wrong during these steps, and the recording notes it.
     """
 
     kind: Literal["held_sweep"] = "held_sweep"
     base_level: BaseLevel
     """Level of the base to be held."""
     average_s: PositiveFloat = 0.5
-    """Averaging time for random errors and for the check of the level; a trend is followed faster [s]."""
+    """Averaging time against random errors and for the check of the level [s]; trends are followed faster."""
     settling: Settling = Settling()
-    """Settling before the sweep."""
+    """Criteria for settled motion before the sweep."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The level of the base to be held, as the only entry."""
+        """One entry: the level of the base to be held."""
         return (self.base_level,)
 
     @property
     def playing_s(self) -> float:
-        """The longest wait at the start, and the sweep [s]."""
+        """Duration of the longest wait at the start and of the sweep [s]."""
         return self.settling.longest_wait_s + self.duration_s
 
     @property
@@ -42,7 +42,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
         return self.segment_with(f"measured {self.base_level.quantity}")
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step for every ``step_s``, all of one segment, at the largest setting."""
+        """Yield one step for every ``step_s``, all in the same segment and at the largest setting."""
         segment = self.segment
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz), 0.0, duration_s, segment)

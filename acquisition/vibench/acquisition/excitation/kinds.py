@@ -41,11 +41,11 @@ _Ours: TypeAlias = (
     | HeldResponse
 )
 _LACKING: dict[str, str] = {}
-"""Kinds of installed packages that cannot be loaded, each with the reason."""
+"""Kinds from installed packages that could not be loaded: the reason for each, by name of the kind."""
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:
-    """Load the kinds that installed packages add; a broken package does not affect the others."""
+    """Yield the plan classes that installed packages add; note those that fail to load in `_LACKING`."""
     taken = {word for plan in get_args(_Ours) for word in _words(plan)}
     for name in plug_in_names(PlugInKind.EXCITATION):
         try:
@@ -68,7 +68,7 @@ def _words(plan: type[AbstractExcitation]) -> tuple[str, ...]:
 
 
 def _require_installed(given: Any) -> Any:
-    """Refuse a kind whose package is missing or broken, with a sentence that names it."""
+    """Return ``given`` unchanged; raise ValueError if the package of its kind is missing or broken."""
     word = given.get("kind") if isinstance(given, dict) else None
     if isinstance(word, str) and word not in EXCITATION_KINDS:
         reason = _LACKING.get(word) or missing_package(word)
@@ -91,18 +91,18 @@ _GROUPS = {Family.STEPPED: "steps"}
 
 @dataclass(frozen=True)
 class ExcitationKind:
-    """Names and texts of a kind of excitation."""
+    """Names and descriptions of one kind of excitation, derived from its plan class."""
 
     plan: type[AbstractExcitation]
 
     @property
     def word(self) -> str:
-        """The value of ``kind`` in a file."""
+        """Value of ``kind`` that selects this kind in a file."""
         return str(self.plan.model_fields["kind"].default)
 
     @property
     def label(self) -> str:
-        """Name for people."""
+        """Name for display: ``word`` with spaces instead of underscores."""
         return self.word.replace("_", " ")
 
     @property
@@ -112,30 +112,30 @@ class ExcitationKind:
 
     @property
     def group(self) -> str:
-        """Heading in a list of kinds."""
+        """Heading under which a list shows this kind."""
         return "feedback" if self.is_feedback else _GROUPS.get(self.plan.family, self.plan.family.value)
 
     @property
     def title(self) -> str:
-        """The label with a capital letter, for the start of a sentence or a figure's title."""
+        """Label with a capital letter, for the start of a sentence or the title of a figure."""
         return self.label.capitalize()
 
     @property
     def is_feedback(self) -> bool:
-        """Whether its next step depends on what was measured."""
+        """Whether the next step depends on measured values."""
         return issubclass(self.plan, AbstractFeedback)
 
 
 EXCITATION_KINDS: Mapping[str, ExcitationKind] = {
     kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))
 }
-"""One entry for each plan of the union; the union lists our plans so that types can be checked."""
+"""All kinds by name, one for each plan class in the union `Excitation`."""
 _PRESENT_WORDS = {word: kind.word for kind in EXCITATION_KINDS.values() for word in _words(kind.plan)}
 
 
 def present_word(word: str) -> str:
-    """Return the present name of a kind of excitation for ``word``, a name of this or an earlier version; an
-    unknown name is returned unchanged.
+    """Return the present name of the kind that this or an earlier version called ``word``.
+    An unknown name is returned unchanged.
     """
     return _PRESENT_WORDS.get(word, word)
 
@@ -143,18 +143,18 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Return the row of every kind: its own if it has one, else its family's (decision 0062).
+    """Return a row for every kind: from ``of_kind`` if present, otherwise from its family (decision 0062).
 
     Raises KeyError when a row is given for an unknown kind.
 
     Parameters
     ----------
     of_family
-        Row of each family of excitations.
+        Row for each family of excitations.
     of_kind
-        Rows of single kinds, by name.
+        Rows for individual kinds, by name.
     of_packages
-        Entry points by which installed packages give rows of the kinds that they add.
+        Group of entry points through which installed packages supply rows for the kinds that they add.
     """
     rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
     for word, row in of_kind.items():
@@ -163,7 +163,7 @@ def rows_by_kind(
 
 
 class _RowsOfPackages(Mapping[str, Row]):
-    """Rows by kind; those of packages are loaded on first use, because they may import higher layers."""
+    """Rows by kind. Rows from packages are loaded on first use, because they may import higher layers."""
 
     def __init__(self, rows: Mapping[str, Row], group: PlugInKind) -> None:
         self._rows, self._group = rows, group
@@ -180,5 +180,5 @@ class _RowsOfPackages(Mapping[str, Row]):
 
 
 def excitation_text(excitation: Excitation) -> str:
-    """Return the signal and its level in words."""
+    """Return a description of the signal and its level, for display."""
     return f"{EXCITATION_KINDS[excitation.kind].label}, {excitation.level_text}"

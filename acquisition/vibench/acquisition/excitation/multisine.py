@@ -1,4 +1,4 @@
-"""Multisines in a generator's memory: lines, hold, phases, crest factor."""
+"""Multisines in a generator's memory: lines, zero-order hold, phases, crest factor."""
 
 from functools import lru_cache
 
@@ -9,23 +9,23 @@ from ..errors import ConfigurationError
 from .steps import Samples
 
 USUAL_POINTS = 8192
-"""Number of points of one period if the plan does not name it."""
+"""Default number of points in one period."""
 FEWEST_POINTS, MOST_POINTS = 64, 65_536
-"""Limits of a plan; the generator's description gives those of its memory."""
+"""Bounds on the number of points in a plan; the generator's memory may set narrower ones."""
 CANDIDATES = 20
-"""Sets of random phases that are tried; the one with the lowest crest factor is played. Twenty lower the
-crest factor of a thousand lines from about 3.8 to about 3.3, and more hardly lower it further.
+"""Number of sets of random phases that are tried; the set with the lowest crest factor is played. 20 sets
+lower the crest factor of 1000 lines from about 3.8 to about 3.3; more sets hardly lower it further.
 """
 NEAREST_IMAGE_RATIO = 2.0
-"""The first image of a held waveform must be above this multiple of the band's upper edge: otherwise an
-analogue low-pass could not separate them.
+"""Lowest allowed frequency of a held waveform's first image, over the upper edge of the band.
+A nearer image could not be removed by an analogue low-pass filter.
 """
 
 Lines = NDArray[np.int64]
 
 
 def band_lines(start_hz: float, stop_hz: float, repetition_hz: float) -> Lines:
-    """Harmonics of ``repetition_hz`` from ``start_hz`` to ``stop_hz``, edges included.
+    """Return the harmonics of ``repetition_hz`` from ``start_hz`` to ``stop_hz``, including the edges.
 
     A harmonic within 1e-9 of an edge belongs to the band: 0.1 Hz times 200 is not exactly 20 Hz.
     """
@@ -36,14 +36,14 @@ def band_lines(start_hz: float, stop_hz: float, repetition_hz: float) -> Lines:
 
 
 def hold_droop(lines: NDArray[np.integer], points: int) -> Samples:
-    """Gain of the zero-order hold at harmonic ``k`` of ``points`` held values: sin(pi k/N) / (pi k/N)."""
+    """Return the gain of a hold of N = ``points`` values at harmonics k: sin(pi k/N) / (pi k/N)."""
     return np.sinc(np.asarray(lines, dtype=np.float64) / points)
 
 
 def held_lines(values: Samples, spans: int) -> NDArray[np.complex128]:
-    """Complex amplitudes (peak) of the held waveform at harmonics 0 to ``spans`` * N/2 - 1.
+    """Return complex peak amplitudes of the held waveform at harmonics 0 to ``spans`` * N/2 - 1.
 
-    The held waveform is the sampled one repeated in frequency and multiplied with the hold:
+    The spectrum of the sampled ``values`` repeats in frequency and is multiplied by that of the hold:
     c_m = X_(m mod N) / N * sinc(m/N) * exp(-i pi m/N); one-sided amplitudes are 2 c_m, c_0 for the mean.
     """
     points = len(values)
@@ -58,11 +58,11 @@ def held_lines(values: Samples, spans: int) -> NDArray[np.complex128]:
 def flat_periods(
     lines: Lines, realisations: int, seed: int, points: int = USUAL_POINTS
 ) -> tuple[Samples, ...]:
-    """Return one period for every realisation: flat lines with random phases, all of one rms value.
+    """Return one period for every realisation: lines of equal amplitude with random phases.
 
-    Every line is divided by the droop of the hold, so that the played spectrum is flat. Of ``CANDIDATES``
-    sets of phases the one with the lowest crest factor is used. The realisation with the highest peak
-    reaches 1; the others stay below, because a nonlinear specimen needs the same level in each.
+    Every line is divided by the droop of the hold, so that the played spectrum is flat. Each realisation uses
+    the best of ``CANDIDATES`` sets of phases, by crest factor. All have the same rms value, because a
+    nonlinear specimen needs the same level in each; only the one with the highest peak reaches 1.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def flat_periods(
     return _flat_periods(tuple(lines.tolist()), realisations, seed, points)
 
 
-# Limits, preview and run need the waveforms of a plan one after another; all its levels have the same.
+# Limits, preview and run need the same waveforms one after another, and all levels of a plan share them.
 @lru_cache(maxsize=1)
 def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: int) -> tuple[Samples, ...]:
     excited = np.array(lines, dtype=np.int64)
@@ -85,8 +85,8 @@ def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: 
 
 
 def shaped_period(lines: Lines, peaks: Samples, points: int, seed: int, realisation: int) -> Samples:
-    """Return one period whose held lines have given amplitudes (peak), with the phases of lowest crest
-    factor.
+    """Return one period whose lines, after the hold, have the peak amplitudes ``peaks``.
+    Its phases are the set with the lowest crest factor of those tried.
 
     Returns
     -------
@@ -111,9 +111,9 @@ def _period(lines: Lines, seed: int, key: tuple[int, ...], points: int, peaks: S
 
 
 def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None:
-    """Refuse a band whose first image is too near; images below half the playback rate cannot be filtered.
+    """Refuse a band whose first image lies below `NEAREST_IMAGE_RATIO` times its upper edge ``stop_hz``.
 
-    Raises ConfigurationError, which says what would be allowed.
+    Raises ConfigurationError, with the lowest allowed ``repetition_hz``.
     """
     image_hz = points * repetition_hz - stop_hz
     if image_hz < NEAREST_IMAGE_RATIO * stop_hz:

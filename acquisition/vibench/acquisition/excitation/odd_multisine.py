@@ -1,5 +1,5 @@
-"""A multisine that separates nonlinearities: odd lines only, with some of them left out as detection
-lines.
+"""A multisine that separates even from odd nonlinearity.
+It excites odd lines only, and leaves some of them out as detection lines.
 """
 
 from typing import Annotated, Literal, Self
@@ -11,25 +11,25 @@ from .multisine import Lines
 from .periodic_noise import MOST_REALISATIONS, PeriodicNoise
 
 GROUP = 4
-"""Of every four odd lines one, chosen at random, is a detection line."""
+"""Number of adjacent odd lines of which one, chosen at random, is a detection line."""
 DETECTION_KEY = 0x0DD
-"""Keeps the choice of detection lines independent of the phases, which use the same seed."""
+"""Key of the random numbers that choose detection lines; it separates them from those of the phases."""
 
 
 class OddMultisine(PeriodicNoise):
     """An odd random-phase multisine with random detection lines.
 
-    Even nonlinearity responds on even lines, odd nonlinearity on the odd detection lines; both are empty in
-    the drive (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    Even nonlinearities respond on even lines, odd nonlinearities on the odd detection lines. The drive has no
+    power on either (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["odd_multisine"] = "odd_multisine"
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
-    """Waveforms with different phases, all on the same lines."""
+    """Number of waveforms; all have the same lines, each with other phases."""
     excited_lines: tuple[PositiveInt, ...] = ()
-    """Harmonics of ``repetition_hz`` that are played; if empty, they are drawn from the seed."""
+    """Harmonics of ``repetition_hz`` that are excited; if empty, they are chosen at random from the seed."""
     detection_lines: tuple[PositiveInt, ...] = ()
-    """Odd harmonics left out; if empty, all odd lines of the band that are not played."""
+    """Odd harmonics left out; if empty, all odd lines of the band that are not excited."""
 
     @model_validator(mode="after")
     def _lines_fit_the_band(self) -> Self:
@@ -48,7 +48,7 @@ class OddMultisine(PeriodicNoise):
                 "detection_lines must be the odd lines of the band that are not excited; "
                 "leave them out to have them filled in"
             )
-        # The drawn lines are part of the plan, so that other programs can read them from its file.
+        # Store the chosen lines in the plan, so that other programs can read them from its file.
         object.__setattr__(self, "excited_lines", tuple(sorted(excited)))
         object.__setattr__(self, "detection_lines", silent)
         return self
@@ -61,7 +61,7 @@ class OddMultisine(PeriodicNoise):
 
     @property
     def lines(self) -> Lines:
-        """The odd harmonics that are played."""
+        """The odd harmonics that are excited."""
         return np.array(self.excited_lines, dtype=np.int64)
 
     def _drawn(self) -> set[int]:

@@ -1,4 +1,4 @@
-"""Periodic noise from the generator's memory: flat lines in a band, new phases for every average."""
+"""Periodic noise from the generator's memory: equal lines in a band, new phases for every average."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -42,7 +42,7 @@ class BandNoise(AbstractExcitation):
         return self
 
     def level_at(self, frequency_hz: float) -> RmsSetting:
-        """Return the setting of the whole band."""
+        """Return how the level is specified: by the amplitude setting, for the whole band at once."""
         del frequency_hz
         return RmsSetting()
 
@@ -53,25 +53,25 @@ class BandNoise(AbstractExcitation):
 
 
 MOST_REALISATIONS = 1000
-"""Largest number in one measurement: all waveforms are computed together, to share one rms value."""
+"""Largest number of realisations in one measurement; all waveforms are computed together to share an rms."""
 
 
 class PeriodicNoise(BandNoise):
-    """Whole periods of flat lines with random phases, one waveform for every realisation."""
+    """Whole periods of lines of equal amplitude with random phases; one waveform per realisation."""
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.REALISATION,)
     repetition_hz: PositiveFloat = 1.0
-    """Periods per second, and the distance of the harmonics [Hz]."""
+    """Repetition rate of the waveform, equal to the spacing of its lines [Hz]."""
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 10
-    """Waveforms with different phases, all on the same lines."""
+    """Number of waveforms; all have the same lines, each with other phases."""
     periods: PositiveInt = 2
-    """Periods recorded of each realisation; two or more show the noise of the sensors."""
+    """Number of periods recorded per realisation; two or more allow an estimate of the sensor noise."""
     points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS
-    """Points of one period in the generator's memory; checked against its size beforehand."""
+    """Number of points of one period in the generator's memory; its size is checked before the run."""
     settle_s: NonNegativeFloat = 3.0
-    """Wait after each change of waveform until the transient has died out [s]."""
+    """Waiting time after each change of waveform, for the transient to die out [s]."""
     seed: int = Field(default=1, ge=0)
-    """The same seed gives the same waveforms, on any machine."""
+    """Seed of the random phases; the same seed gives the same waveforms on any machine."""
 
     @property
     @abstractmethod
@@ -91,17 +91,17 @@ class PeriodicNoise(BandNoise):
 
     @property
     def period_points(self) -> int:
-        """Points of one period."""
+        """Number of points of one period."""
         return self.points
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording of all realisations [s]."""
+        """Duration of settling and recording of all realisations [s]."""
         return self.realisations * (self.settle_s + self.periods / self.repetition_hz)
 
     @property
     def stretches(self) -> int:
-        """One for every realisation."""
+        """Number of realisations."""
         return self.realisations
 
     def steps(self) -> Iterator[Step]:
@@ -125,6 +125,6 @@ class PeriodicNoise(BandNoise):
             )
 
     def shown_steps(self) -> Iterator[Step]:
-        """Show one period of the first realisation."""
+        """Yield one step: one period of the first realisation."""
         first = next(self.steps())
         yield Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)

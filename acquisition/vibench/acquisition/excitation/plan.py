@@ -1,6 +1,4 @@
-"""Base classes of all excitations: a frozen plan with an amplitude setting that lists the generator's
-steps.
-"""
+"""Base classes of all excitations: frozen plans that list the steps the generator plays."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
@@ -34,29 +32,29 @@ from .steps import (
 
 @dataclass(frozen=True, eq=False)
 class SignalPreview:
-    """The voltage according to the generator's panel, as samples and as numbers."""
+    """Preview of a signal, in volts as set on the generator's panel: samples, spectrum and key figures."""
 
     time_s: Samples
-    """Shape (samples,) [s]."""
+    """Times of the samples, shape (samples,) [s]."""
     volts: Samples
-    """Shape (samples,) [V]."""
+    """Voltages, shape (samples,) [V]."""
     frequency_hz: Samples
-    """Shape (samples // 2 + 1,) [Hz]."""
+    """Frequencies of the spectrum, shape (samples // 2 + 1,) [Hz]."""
     spectrum_v: Samples
-    """Amplitude of the sine at each frequency, peak [V]; shape of ``frequency_hz``."""
+    """Peak amplitude of the sine at each frequency of ``frequency_hz``, same shape [V]."""
     rms_v: float
     peak_v: float
     duration_s: float
-    """Duration of the whole excitation, including settling, without ramps [s]."""
+    """Duration of the whole excitation, including settling but not ramps [s]."""
 
     @property
     def crest_factor(self) -> float:
-        """Peak over rms."""
+        """Peak value divided by rms value."""
         return self.peak_v / self.rms_v
 
 
 def _sample(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
-    """Sample steps one after the other; a tone continues the phase of the one before it."""
+    """Return the samples of consecutive steps; a tone continues the phase of the preceding step."""
     pieces: list[Samples] = []
     elapsed_s = 0.0
     first = 0
@@ -78,8 +76,8 @@ def _values(play: Play, since_s: Samples, first: int, sample_rate_hz: float, cyc
         case Tone(frequency_hz, level):
             return np.asarray(level * np.sin(2 * np.pi * (frequency_hz * since_s + cycles)))
         case Waveform(values, repetition_hz):
-            # A sample on the edge between two held values belongs to the later one: the small shift prevents
-            # rounding to the earlier one.
+            # A sample on the edge between two held values takes the later value. The small shift keeps
+            # rounding errors from selecting the earlier value.
             edge = 1e-9
             position = np.floor(since_s * repetition_hz * len(values) + edge).astype(np.int64)
             return np.asarray(values[position % len(values)])
@@ -98,152 +96,150 @@ def _cycles_of(play: Play) -> float:
 
 
 AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
-"""The generator's description gives its limits; a value above the upper bound is a wrong unit."""
+"""Amplitude setting [Vpp]. The bound only catches wrong units; the generator's own limits are narrower."""
 HIGHEST_FREQUENCY_HZ = 1e5
-"""Higher than any shaker can follow [Hz]."""
+"""Upper bound on every frequency, above the range of any shaker [Hz]."""
 FrequencyHz = Annotated[float, Field(gt=0, le=HIGHEST_FREQUENCY_HZ)]
 
 
 class Family(StrEnum):
-    """Families of kinds with the same analysis and pictures."""
+    """Families of kinds of excitation; all kinds of a family share their analysis and figures."""
 
     NOISE = "noise"
-    """A whole band at once."""
+    """The whole band is excited at once."""
     SWEEP = "sweep"
-    """A sine that moves through a band."""
+    """A sine whose frequency moves through a band."""
     DWELL = "dwell"
     """A sine of constant frequency."""
     STEPPED = "stepped"
-    """Sines one after the other, each recorded separately."""
+    """A sequence of sines, each recorded separately."""
 
 
 class LeadIn(FrozenModel):
-    """A tone before a dwell."""
+    """A tone played before a dwell, to bring the specimen to a particular motion."""
 
     frequency_hz: FrequencyHz
     amplitude_vpp: AmplitudeVpp
 
 
 def around(frequency_hz: float) -> tuple[float, float]:
-    """Return the band for a single sine: an octave to either side [Hz]."""
+    """Return the band assigned to a single sine: from an octave below to an octave above it [Hz]."""
     return 0.5 * frequency_hz, 2 * frequency_hz
 
 
 class AbstractExcitation(FrozenModel, ABC):
-    """What the generator plays, from the first waveform to the last, at one amplitude setting."""
+    """Plan of the signal that the generator plays in one measurement, at one amplitude setting."""
 
     family: ClassVar[Family]
     result_labels: ClassVar[tuple[SegmentLabel, ...]]
-    """Segments of the recording that give results."""
+    """Labels of the segments of the recording from which results are computed."""
     wishes: ClassVar[tuple[str, ...]] = ()
-    """Results that a recording can wait for, see `vibench.acquisition.plan.Until`."""
+    """Results whose uncertainty can end the recording, see `vibench.acquisition.plan.Until`."""
 
     amplitude_vpp: AmplitudeVpp
-    """Setting of the generator, peak to peak [V], as its panel shows it."""
+    """Amplitude setting as shown on the generator's panel, peak to peak [V]."""
 
     @abstractmethod
     def steps(self) -> Iterator[Step]:
-        """Yield the steps of the generator, in the order of time."""
+        """Yield the steps that the generator plays, in chronological order."""
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield the steps that limits are checked with: the steps themselves, unless feedback may be
-        louder.
+        """Yield the steps with which limits are checked.
+        These are the planned steps, or larger signals that feedback may play.
         """
         return self.steps()
 
     @property
     def highest_amplitude_vpp(self) -> float:
-        """The highest setting, including lead-ins, peak to peak [V]."""
+        """Highest amplitude setting, including lead-ins, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property
     def period_points(self) -> int | None:
-        """Points of a waveform in the generator's memory; None without a waveform."""
+        """Number of points of the waveform in the generator's memory; None if no waveform is used."""
         return None
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """The lowest setting, without ramps, peak to peak [V]."""
+        """Lowest amplitude setting, not counting ramps, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property
     def level_text(self) -> str:
-        """Level of the drive or of the base, in words."""
+        """Description of the level of the drive or of the base, for display."""
         return f"{self.amplitude_vpp:g} Vpp"
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return what determines the motion of the base at a frequency of the band: the setting."""
+        """Return how the level at a frequency of the band is specified: here, by the amplitude setting."""
         del frequency_hz
         return RelativeSetting(1.0)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Yield frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
+        """Yield each frequency [Hz] and the peak base acceleration [m/s2] that feedback holds there."""
         return iter(())
 
     def require_holdable(self, rig: Rig) -> None:
-        """Refuse motions that feedback on a rig could not hold; plans without feedback accept every rig.
+        """Check that feedback can hold the planned motions on ``rig``; plans without feedback pass.
 
-        Raises ConfigurationError or LimitExceeded. Nothing was played.
+        Raises ConfigurationError or LimitExceeded, before anything is played.
         """
 
     @property
     @abstractmethod
     def band_hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency; for a single one an octave to either side [Hz]."""
+        """Lowest and highest frequency; for a single sine, an octave below and above it [Hz]."""
 
     @property
     def approach(self) -> Approach:
-        """Start of the motion at each frequency: from the neighbour for moving frequencies, otherwise from
-        rest.
-        """
+        """Start at each frequency: from the neighbour if the frequency moves, otherwise from rest."""
         return Approach.REST
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at one frequency, if the drive continues without a pause [s]; otherwise None."""
+        """Time at each frequency of a drive that moves on without a pause [s]; otherwise None."""
         return None
 
     @property
     def own_sweep_s(self) -> float | None:
-        """Time of a sweep that the generator makes by itself [s]; otherwise None."""
+        """Duration of a sweep that the generator performs by itself [s]; None without such a sweep."""
         return None
 
     @property
     def lead_in_s(self) -> float:
-        """Time of the lead-in along a branch [s]."""
+        """Duration of the lead-in [s]; 0 without a lead-in."""
         return 0.0
 
     def turned(self, direction: Direction) -> Self | None:
-        """Return the same excitation in this direction; None if its kind does not have it."""
+        """Return the same excitation in ``direction``; None if its kind does not offer that direction."""
         del direction
         return None
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
-        """Return the same after a lead-in, and its own tone for the next; None if its kind has no lead-in."""
+        """Return this excitation with the lead-in ``way``, and its own tone; None without lead-ins."""
         del way, lead_s
         return None
 
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Time of all steps, including settling, without ramps [s]; with feedback the longest possible."""
+        """Duration of all steps, including settling but not ramps [s]; with feedback the maximum."""
 
     @property
     def stretches(self) -> int:
-        """How often the drive starts from silence: once for sines, once for every waveform of noise."""
+        """Number of times the drive starts from silence: once for sines, once per waveform for noise."""
         return 1
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The highest intended frequency, which the converter must be able to follow [Hz]."""
+        """Highest frequency of the plan, which the converter must be able to sample [Hz]."""
         return self.band_hz[1]
 
     def shown_steps(self) -> Iterator[Step]:
-        """Yield the steps for a preview: all of them, or a part that represents the signal."""
+        """Yield the steps shown in a preview: all steps, or a representative part."""
         return self.steps()
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """Compute the signal, before anything moves.
+        """Compute the signal without playing it.
 
         Raises ConfigurationError when ``sample_rate_hz`` is too low to show the highest frequency.
         """
@@ -277,41 +273,41 @@ class FixedSine(AbstractExcitation):
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """An octave to either side [Hz]."""
+        """From an octave below the sine to an octave above it [Hz]."""
         return around(self.frequency_hz)
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The frequency itself [Hz]."""
+        """Frequency of the sine [Hz]."""
         return self.frequency_hz
 
 
 class AbstractFeedback(AbstractExcitation):
-    """An excitation whose next step depends on measured values; `vibench.acquisition.control` carries it out.
+    """An excitation whose next step depends on measured values; run by `vibench.acquisition.control`.
 
-    Its ``steps`` are the expected ones, without waits: for previews and for lists of the segments.
-    ``amplitude_vpp`` is the largest setting that it may use.
+    ``steps`` lists the expected steps without waits, for previews and for lists of the segments.
+    ``amplitude_vpp`` is the largest setting that feedback may use.
     """
 
     @property
     @abstractmethod
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Levels of the base to be held, in the order played; none to play ``amplitude_vpp`` unchanged."""
+        """Levels of the base to be held, in the order played; if empty, ``amplitude_vpp`` stays constant."""
 
     @property
     def level_text(self) -> str:
-        """The levels, and the largest setting."""
+        """Description of the levels held and the largest setting, for display."""
         most = super().level_text
         words = [level.text for level in self.held_levels]
         return f"base held at {', '.join(words)}, at most {most}" if words else most
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return the highest level that is held; without one, the setting."""
+        """Return the highest level that is held; if no level is held, the amplitude setting."""
         accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
         return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Yield the highest level for every expected sine."""
+        """Yield the frequency [Hz] and highest held acceleration [m/s2] of every expected sine."""
         for step in self.steps():
             match step.play:
                 case Tone(frequency_hz):

@@ -1,4 +1,4 @@
-"""A sine that finds the phase resonance of a mode and follows it, level after level."""
+"""A sine that finds the phase resonance of a mode and follows it from level to level."""
 
 from collections.abc import Iterator, Sequence
 from typing import ClassVar, Literal, Self
@@ -13,73 +13,72 @@ from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest change of the setting at once: levels are close, and a loop of 150 periods has no time to spare."""
+"""Largest factor by which the setting changes at once; large, because a loop lasts only 150 periods."""
 
 
 class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
 
-    At the resonance the phase of m0, relative to the base or absolute, is a quarter of a period behind the
-    base. The first level is searched in settled motion; then a phase-locked loop, which acts every ten
-    periods, follows the resonance from level to level. If it loses the resonance, the search begins again.
-    Other modes shift the phase a little; the flanks give the natural frequency and the damping without them,
-    as long as the motion is linear.
+    At resonance the motion of m0, relative or absolute, lags the base by a quarter of a period. The first
+    level is searched in settled motion. Then a phase-locked loop, which acts every ten periods, follows the
+    resonance from level to level; if it loses the resonance, the search is repeated. Other modes shift the
+    phase a little. While the motion is linear, measurements on both flanks give the natural frequency and
+    the damping without this shift.
 
-    With ``harmonic = 3`` or 2 a superharmonic resonance is tracked: the drive is at a third or half of the
-    mode's frequency, and that harmonic of m0 lags this many times the phase of the base by a quarter of its
-    own period (Volvert and Kerschen, J. Sound Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and
-    Kerschen, arXiv 2401.01151). The phase of the second one counts from the cosine of twice the base's, like
-    the phase of a square. It lags where the spring between the masses is stiffer at positive p and the
-    mode's p moves with m0 (the paper's first and third), and leads by as much (``phase_deg = 90``) where one
-    of both is opposite.
+    ``harmonic`` n = 2 or 3 tracks a superharmonic resonance: the drive is at 1/n of the mode's frequency.
+    Harmonic n of m0 then lags n times the phase of the base by 90 degrees (Volvert and Kerschen, J. Sound
+    Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and Kerschen, arXiv 2401.01151). For n = 2 the
+    phase is measured from a cosine at twice the drive frequency, as in the square of a sine. This harmonic
+    lags if the spring between the masses is stiffer at positive p and p moves in phase with m0 in the mode
+    (modes 1 and 3 of the paper). If one of the two is reversed, it leads by 90 degrees (``phase_deg = 90``).
 
-    With ``subharmonic = 2`` or 3 m0 repeats every this many drive periods: this many times its phase lags
-    the base by a quarter of a period; for 2 the phase counts like that of a square. Super- and subharmonics
-    give no natural frequency and damping.
+    ``subharmonic`` n = 2 or 3 tracks a motion of m0 that repeats every n drive periods: n times its phase
+    lags the base by 90 degrees; for n = 2 the phase is again measured as for a square. Super- and
+    subharmonic resonances give no natural frequency and no damping.
     """
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.RESONANCE,)
     kind: Literal["resonance_tracking"] = "resonance_tracking"
     start_hz: FrequencyHz
-    """Start of the search; closer to this mode than to any other [Hz]."""
+    """Frequency at which the search starts; nearer to this mode than to any other [Hz]."""
     low_hz: FrequencyHz
-    """Lowest frequency [Hz]."""
+    """Lowest frequency of the search [Hz]."""
     high_hz: FrequencyHz
-    """Highest frequency [Hz]."""
+    """Highest frequency of the search [Hz]."""
     phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
-    """Phase of m0 over the base at the resonance, both as displacements [degrees]."""
+    """Phase of m0 relative to the base that defines resonance, from displacements [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
-    """Motion of m0: relative to the base, or absolute."""
+    """Motion of m0 whose phase is used: relative to the base, or absolute."""
     harmonic: Literal[1, 2, 3] = 1
-    """Harmonic of m0 whose phase counts; above 1 the absolute phase, relative to this many times the
-    base's."""
+    """Harmonic n of m0 whose phase is used. For n > 1 it is the phase of the absolute motion minus n times
+    the phase of the base."""
     subharmonic: Literal[1, 2, 3] = 1
-    """Drive periods in a period of m0; its absolute phase counts this many times. The motion must exist at
-    ``start_hz``."""
+    """Number n of drive periods in one period of m0. For n > 1, n times the phase of the absolute motion is
+    used, and the motion must exist at ``start_hz``."""
     phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
-    """Allowed deviation of the phase [degrees]."""
+    """Allowed deviation of the phase from ``phase_deg`` [degrees]."""
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
     """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
     sensor_gain: Share = 0.01
-    """Standard uncertainty of the ratio of their sensitivities; it affects the phase of the relative
-    motion."""
+    """Relative standard uncertainty of the ratio of the two sensors' sensitivities. It affects the phase of
+    the relative motion."""
     accelerations_m_per_s2: tuple[HeldMetresPerS2, ...] = Field(min_length=1, max_length=100)
-    """Levels of the base's fundamental, peak, in the order played [m/s2]."""
+    """Peak accelerations of the fundamental of the base motion, in the order played [m/s2]."""
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
     """Allowed relative deviation of the measured level."""
     settling: Settling = Settling()
     """Criteria for settled motion."""
     widest_step_hz: PositiveFloat = 1.0
-    """Longest step of the search; shorter than the distance to the next antiresonance [Hz]."""
+    """Largest frequency step of the search; smaller than the distance to the next antiresonance [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)
     """Largest number of frequencies tried for one level."""
     most_periods: int = Field(default=150, ge=30, le=MOST_PERIODS)
     """Largest number of drive periods of the phase-locked loop for one level."""
     flank_pairs: int = Field(default=3, ge=0, le=10)
-    """Pairs of frequencies measured on both flanks, for the mode's natural frequency and damping."""
+    """Pairs of frequencies, one on each flank, to measure the mode's natural frequency and damping."""
     record_s: PositiveFloat = 1.0
-    """Time recorded on each resonance [s]."""
+    """Time recorded at each resonance [s]."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:
@@ -105,9 +104,9 @@ class ResonanceTracking(AbstractFeedback):
         return self.harmonic == self.subharmonic == 1
 
     def motion(self, harmonics: Sequence[complex]) -> complex:
-        """Return the motion whose phase counts, from harmonics of m0 over the base, the first one first.
+        """Return the complex motion whose phase is compared with ``phase_deg``.
 
-        The first one is that of m0's own period, which has several drive periods for a subharmonic.
+        ``harmonics`` of m0 over the base start with the fundamental of m0's period, longer for a subharmonic.
         """
         if self.is_fundamental:
             return self.phase_of.motion(harmonics[0])
@@ -118,12 +117,12 @@ class ResonanceTracking(AbstractFeedback):
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """The range of the search [Hz]."""
+        """Lowest and highest frequency of the search [Hz]."""
         return self.low_hz, self.high_hz
 
     @property
     def playing_s(self) -> float:
-        """All levels with the longest searches [s]."""
+        """Duration of all levels, with the longest searches [s]."""
         tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s
         return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
 
@@ -136,7 +135,7 @@ class ResonanceTracking(AbstractFeedback):
         )
 
     def segment(self, number: int, frequency_hz: float) -> Segment:
-        """Return the segment of the recording on the resonance of a level."""
+        """Return the segment recorded at the resonance of level ``number``."""
         return Segment(
             SegmentLabel.RESONANCE,
             {
@@ -147,12 +146,12 @@ class ResonanceTracking(AbstractFeedback):
         )
 
     def steps(self) -> Iterator[Step]:
-        """One step for each level, at the start of the search, at the largest setting."""
+        """Yield one step per level, at the first frequency of the search and the largest setting."""
         for number in range(len(self.accelerations_m_per_s2)):
             yield Step(Tone(self.start_hz), 0.0, self.record_s, self.segment(number, self.start_hz))
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield the largest setting over the range, in steps of a hertz or less."""
+        """Yield steps of 1 Hz or less over the range of the search, at the largest setting."""
         count = int(self.high_hz - self.low_hz) + 2
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)

@@ -1,4 +1,4 @@
-"""Sines one after the other, each recorded when its motion has settled."""
+"""A stepped sine that measures when the motion has settled before it records each step."""
 
 from typing import ClassVar, Literal
 
@@ -10,38 +10,38 @@ from .plan import AbstractFeedback
 from .stepped_sine import FrequencySteps
 
 GLIDE_TONE_S = 0.1
-"""Time at each tone between two frequencies of the list [s]."""
+"""Duration of each intermediate tone between two frequencies of the list [s]."""
 
 
 class SettledSine(FrequencySteps, AbstractFeedback):
     """A stepped sine that waits for settled motion, stays on its branch and locates jumps.
 
-    The phase continues from one frequency to the next. The recording contains the result of each step:
-    period, waiting time, level of the base, and origin of the branch.
+    The phase is continuous from one frequency to the next. The recording contains the result of each step:
+    period, waiting time, level of the base, and how the branch was reached.
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
     most_steps: ClassVar[int] = 600
-    """Four events a step, and as many for searches, fit into a recording's table."""
+    """Largest number of steps: four events per step and four for searches fit into a recording's table."""
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None
-    """Level of the base to be held; if absent, ``amplitude_vpp`` is played unchanged."""
+    """Level of the base to be held; if absent, ``amplitude_vpp`` stays constant."""
     jumps: JumpSearch | None = None
-    """Locate jumps between steps; if absent, jumps are passed without a search."""
+    """Criteria to locate jumps between steps; if absent, jumps are not searched for."""
     glide_step_hz: PositiveFloat = 0.5
-    """Largest frequency step of the tone between two frequencies of the list [Hz]."""
+    """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
     search_s: float = Field(default=120.0, gt=0, le=7200)
-    """Longest time spent on one jump; the interval found by then is kept [s]."""
+    """Longest search for one jump [s]; the frequency interval reached by then is kept."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The level of the base to be held, as the only entry; empty if the setting is constant."""
+        """One entry, the level of the base to be held; empty if the setting is constant."""
         return () if self.base_level is None else (self.base_level,)
 
     @property
     def playing_s(self) -> float:
-        """All steps with the longest waits, and all searches [s]."""
+        """Duration of all steps with the longest waits, and of all searches [s]."""
         passes = sum(1 for _ in self.passes())
         steps_s = len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)

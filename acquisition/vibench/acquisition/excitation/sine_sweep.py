@@ -14,10 +14,10 @@ from .steps import Approach, Direction, RelativeSetting, Segment, Step, Tone
 
 
 class Hold(StrEnum):
-    """Motion of the base that is about constant along a sweep, on a shaker that drives a mass.
+    """Quantity of the base motion whose amplitude stays about constant along a sweep, without feedback.
 
-    Above its suspension resonance a shaker turns voltage into acceleration. The motion is only as constant
-    as this assumption; the recording contains the real motion of the base.
+    Above its suspension resonance, a shaker that drives a mass turns voltage into acceleration. The motion is
+    only as constant as this assumption is accurate; the recording contains the real motion of the base.
     """
 
     ACCELERATION = "acceleration"
@@ -25,21 +25,21 @@ class Hold(StrEnum):
     VELOCITY = "velocity"
     """The setting grows in proportion to frequency."""
     DISPLACEMENT = "displacement"
-    """The setting grows with the square of frequency: constant displacement, as in the paper's model."""
+    """The setting grows with the square of the frequency, as for the model in the paper."""
 
     @property
     def power(self) -> int:
-        """Power of the frequency that the amplitude setting follows."""
+        """Exponent n of the amplitude setting, which is proportional to (frequency)^n."""
         return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
 
 
 class SweptBy(StrEnum):
-    """Source of the frequency changes."""
+    """Device that changes the frequency during a sweep."""
 
     COMPUTER = "computer"
-    """In steps by the computer, on any generator."""
+    """The computer changes it in steps; possible with any generator."""
     GENERATOR = "generator"
-    """The generator's own sweep, without steps, if it has one; a trigger starts it."""
+    """The generator changes it without steps, if it has a sweep function; a trigger starts the sweep."""
 
 
 MOST_SWEEP_STEPS = 1_000_000
@@ -49,8 +49,8 @@ MOST_SWEEP_STEPS = 1_000_000
 class MovingSine(AbstractExcitation):
     """A sine sweep, up or down, in steps by the computer.
 
-    Each step plays the mean frequency of the ideal sweep over its time, so that the phase at the end of
-    every step is that of the ideal sweep. The recorded drive shows what the generator really played.
+    Each step plays the ideal sweep's mean frequency over that step. The phase at the end of every step
+    therefore equals the phase of the ideal sweep. The recorded drive shows what the generator really played.
     """
 
     family: ClassVar[Family] = Family.SWEEP
@@ -62,7 +62,7 @@ class MovingSine(AbstractExcitation):
     duration_s: PositiveFloat
     """Time from start to stop [s]."""
     spacing: Spacing = Spacing.LINEAR
-    """Frequency over time."""
+    """Course of the frequency over time."""
     step_s: PositiveFloat = 0.1
     """Time at one frequency [s]; the last step may be shorter."""
 
@@ -88,21 +88,21 @@ class MovingSine(AbstractExcitation):
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """The two ends, the lower one first [Hz]."""
+        """Lowest and highest frequency of the sweep [Hz]."""
         return min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)
 
     @property
     def glide_step_s(self) -> float | None:
-        """The step of the sweep [s]."""
+        """Time at one frequency [s]."""
         return self.step_s
 
     @property
     def approach(self) -> Approach:
-        """From the side on which the sweep starts."""
+        """Direction from which the motion reaches each frequency: that of the sweep."""
         return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN
 
     def turned(self, direction: Direction) -> Self | None:
-        """Return the sweep upwards or downwards; None for directions with two passes."""
+        """Return the sweep upwards or downwards; None if ``direction`` has two passes."""
         low_hz, high_hz = self.band_hz
         match direction:
             case Direction.UP:
@@ -113,7 +113,7 @@ class MovingSine(AbstractExcitation):
                 return None
 
     def cycles(self, time_s: float) -> float:
-        """Cycles of the ideal sweep since its start, in closed form."""
+        """Return the number of cycles of the ideal sweep from its start to ``time_s``, in closed form."""
         return self.course.cycles(time_s)
 
     @property
@@ -122,9 +122,9 @@ class MovingSine(AbstractExcitation):
         return Sweep(self.start_hz, self.stop_hz, self.duration_s, self.spacing)
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:
-        """Yield mean frequency [Hz] and duration [s] of each step, in the order of time."""
-        # 1e-9 prevents an additional tiny step if the duration is a whole number of steps except for
-        # rounding.
+        """Yield mean frequency [Hz] and duration [s] of each step, in chronological order."""
+        # The factor 1 - 1e-9 prevents an extra tiny step if rounding errors make the number of steps slightly
+        # larger than a whole number.
         count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
         for number in range(count):
             begin_s = number * self.step_s
@@ -132,21 +132,21 @@ class MovingSine(AbstractExcitation):
             yield (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s), end_s - begin_s
 
     def segment_with(self, held: str) -> Segment:
-        """Return the segment of the sweep, with the quantity held along it."""
+        """Return the segment of the sweep; ``held`` names the quantity that is kept constant."""
         numbers = self.model_dump(include={"start_hz", "stop_hz", "duration_s", "step_s"})
         return Segment(SegmentLabel.SWEEP, {**numbers, "spacing": self.spacing.value, "hold": held})
 
 
 class SineSweep(MovingSine):
-    """A sine sweep at an amplitude setting that follows a power of the frequency."""
+    """A sine sweep whose amplitude setting is constant or follows a power of the frequency."""
 
     kind: Literal["sine_sweep"] = "sine_sweep"
     hold: Hold = Hold.ACCELERATION
-    """Constant quantity; ``amplitude_vpp`` is then the setting at the highest frequency."""
+    """Quantity that stays about constant; ``amplitude_vpp`` is the setting at the highest frequency."""
     settle_s: NonNegativeFloat = 3.0
-    """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
+    """Waiting time near ``start_hz`` before the sweep, for the transient to die out [s]."""
     swept_by: SweptBy = SweptBy.COMPUTER
-    """Source of the frequency changes; ``step_s`` applies to the computer."""
+    """Device that changes the frequency; ``step_s`` is used only by the computer."""
 
     @model_validator(mode="after")
     def _generator_holds_its_setting(self) -> Self:
@@ -159,41 +159,41 @@ class SineSweep(MovingSine):
 
     @property
     def own_sweep_s(self) -> float | None:
-        """Time of the generator's own sweep [s]; None if the computer steps."""
+        """Duration of the generator's own sweep [s]; None if the computer changes the frequency."""
         return self.duration_s if self.swept_by is SweptBy.GENERATOR else None
 
     @property
     def glide_step_s(self) -> float | None:
-        """The step of the sweep [s]; None for the generator's own sweep."""
+        """Time at one frequency [s]; None for the generator's own sweep."""
         return self.step_s if self.swept_by is SweptBy.COMPUTER else None
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """The setting at the lowest frequency [V]."""
+        """Amplitude setting at the lowest frequency [Vpp]."""
         return self.amplitude_vpp * self.level(self.band_hz[0])
 
     def level(self, frequency_hz: float) -> float:
-        """Amplitude at a frequency as a fraction of ``amplitude_vpp``."""
+        """Return the amplitude setting at ``frequency_hz``, as a fraction of ``amplitude_vpp``."""
         return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
 
     def level_at(self, frequency_hz: float) -> RelativeSetting:
-        """Return the setting at a frequency."""
+        """Return the relative amplitude setting at ``frequency_hz``."""
         return RelativeSetting(self.level(frequency_hz))
 
     @property
     def playing_s(self) -> float:
-        """Settling and sweep [s]."""
+        """Duration of settling and sweep [s]."""
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """Return one step for every ``step_s``, all of one segment; or the whole sweep as one."""
+        """Return one step per ``step_s``, all in one segment; the generator's own sweep is a single step."""
         if self.swept_by is SweptBy.GENERATOR:
             segment = self.segment_with(self.hold.value)
             return iter((Step(self.course, self.settle_s, self.duration_s, segment),))
         return self.loudest_steps()
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield one step for every ``step_s``, also for the generator's own sweep."""
+        """Yield one step per ``step_s``, even for the generator's own sweep."""
         segment = self.segment_with(self.hold.value)
         settle_s = self.settle_s
         for mean_hz, duration_s in self.mean_steps():

@@ -1,4 +1,4 @@
-"""One frequency, level after level, up and down: where impacts begin, and where they end."""
+"""A sine of one frequency in steps of level, up and down, to find where impacts begin and end."""
 
 from collections.abc import Iterator
 from math import floor
@@ -13,23 +13,23 @@ from .steps import Direction, Segment, Step, Tone
 
 
 class SteppedLevel(FixedSine):
-    """A sine whose level goes up and down in steps; each is played until it has settled, then recorded.
+    """A sine whose level rises and falls in steps; each step is recorded after it has settled.
 
-    The phase continues from one level to the next, so that the specimen stays on its branch: it jumps up at
-    one level and falls back at another, and between them both motions are possible. ``amplitude_vpp`` is the
-    highest level.
+    The phase is continuous from one level to the next, so that the specimen stays on its branch. It jumps up
+    at one level and falls back at a lower one; between these levels both motions are possible.
+    ``amplitude_vpp`` is the highest level.
     """
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["stepped_level"] = "stepped_level"
     lowest_vpp: AmplitudeVpp
-    """The lowest level, if whole steps down from ``amplitude_vpp`` reach it [V]."""
+    """Lower bound of the levels, reached only by whole steps down from ``amplitude_vpp`` [Vpp]."""
     step_vpp: PositiveFloat
-    """Difference of neighbouring levels; small, because each change also disturbs the motion [V]."""
+    """Difference of neighbouring levels [Vpp]; keep it small, because each change disturbs the motion."""
     direction: Direction = Direction.UP_THEN_DOWN
     settle_s: NonNegativeFloat = 3.0
-    """Wait at every level until the transient has died out [s]."""
+    """Waiting time at every level, for the transient to die out [s]."""
     record_s: PositiveFloat = 1.0
     """Time recorded at every level [s]."""
 
@@ -50,31 +50,31 @@ class SteppedLevel(FixedSine):
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """The lowest level [V]."""
+        """Lowest level [Vpp]."""
         return self.rising_vpp[0]
 
     @property
     def rising_vpp(self) -> tuple[float, ...]:
-        """All levels, rising, up to ``amplitude_vpp`` [V]."""
+        """All levels in ascending order, up to ``amplitude_vpp`` [Vpp]."""
         return tuple(
             round(self.amplitude_vpp - number * self.step_vpp, 9) for number in reversed(range(self._count()))
         )
 
     def turned(self, direction: Direction) -> Self:
-        """Return the same levels in a direction."""
+        """Return a plan with the same levels in another ``direction``."""
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording of all levels [s]."""
+        """Duration of settling and recording of all levels [s]."""
         return self._steps() * (self.settle_s + self.record_s)
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield each pass through the levels: its direction, and its levels in the order played [V]."""
+        """Yield each pass: its direction, and its levels in the order played [Vpp]."""
         return self.direction.ways(self.rising_vpp)
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step for every level, in the order of time."""
+        """Yield one step for every level, in the order played."""
         for direction, levels_vpp in self.passes():
             for level_vpp in levels_vpp:
                 numbers: dict[str, int | float | str] = {
@@ -86,10 +86,10 @@ class SteppedLevel(FixedSine):
                 yield Step(tone, self.settle_s, self.record_s, Segment(SegmentLabel.STEP, numbers))
 
     def _steps(self) -> int:
-        # Count without building the list: a mistyped step could give millions of levels.
+        # Count without building the list: a typing error in the step could give millions of levels.
         ways = sum(1 for _ in self.direction.ways(()))
         return ways * self._count()
 
     def _count(self) -> int:
-        # 1e-9: a lowest level that the steps reach except for rounding is included.
+        # 1e-9 includes a lowest level that the steps miss only by rounding.
         return floor((self.amplitude_vpp - self.lowest_vpp) / self.step_vpp + 1e-9) + 1

@@ -1,4 +1,4 @@
-"""Sines one after the other, each settled before it is recorded."""
+"""A stepped sine: a list of frequencies, each recorded after a fixed settling time."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -13,15 +13,15 @@ from .plan import AbstractExcitation, Family, FrequencyHz, around
 from .steps import Approach, Direction, Segment, Step, Tone
 
 MOST_STEPS = 4000
-"""Largest number of segments in one recording's table, without ramps and check."""
+"""Largest number of steps in one recording; its table of segments also lists ramps and check."""
 
 
 class FrequencyGrid(FrozenModel):
-    """Frequencies at equal distances."""
+    """Equally spaced frequencies."""
 
     start_hz: FrequencyHz
     stop_hz: FrequencyHz
-    """The last frequency, if whole steps reach it [Hz]."""
+    """Upper bound of the frequencies, included if whole steps reach it [Hz]."""
     step_hz: PositiveFloat
 
     @model_validator(mode="after")
@@ -33,7 +33,7 @@ class FrequencyGrid(FrozenModel):
             )
         steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
         if steps > 2 * MOST_STEPS:
-            # Check before building the list: a mistyped step could give millions of values.
+            # Check before building the list: a typing error in the step could give millions of values.
             raise ValueError(
                 f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: widen step_hz or "
                 "split the measurement"
@@ -42,22 +42,22 @@ class FrequencyGrid(FrozenModel):
 
     @property
     def values_hz(self) -> tuple[float, ...]:
-        """The frequencies, rising [Hz]."""
-        # 1e-9: a stop that the steps reach except for rounding is included.
+        """Frequencies in ascending order [Hz]."""
+        # 1e-9 includes a stop frequency that the steps miss only by rounding.
         count = floor((self.stop_hz - self.start_hz) / self.step_hz + 1e-9) + 1
         return tuple(self.start_hz + number * self.step_hz for number in range(count))
 
 
 class FrequencySteps(AbstractExcitation):
-    """A list of frequencies and its order; each is recorded as a separate segment."""
+    """A list of frequencies, its order and the time recorded at each; every step is a separate segment."""
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     most_steps: ClassVar[int] = MOST_STEPS
     frequencies_hz: tuple[FrequencyHz, ...] = ()
-    """Ascending frequencies [Hz]; or give ``grid``."""
+    """Frequencies in ascending order [Hz]; give either this or ``grid``."""
     grid: FrequencyGrid | None = None
-    """Frequencies at equal distances; or give ``frequencies_hz``."""
+    """Equally spaced frequencies; give either this or ``frequencies_hz``."""
     direction: Direction = Direction.UP
     record_s: PositiveFloat = 1.0
     """Time recorded at every frequency [s]."""
@@ -82,23 +82,23 @@ class FrequencySteps(AbstractExcitation):
 
     @property
     def rising_hz(self) -> tuple[float, ...]:
-        """All frequencies, rising [Hz]."""
+        """All frequencies in ascending order [Hz]."""
         return self.frequencies_hz if self.grid is None else self.grid.values_hz
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """The first and the last of the list, or an octave to either side of a single one [Hz]."""
+        """Lowest and highest frequency; for a single one, an octave below and above it [Hz]."""
         low_hz, *_, high_hz = (*self.rising_hz, self.rising_hz[-1])
         return (low_hz, high_hz) if low_hz < high_hz else around(high_hz)
 
     @property
     def approach(self) -> Approach:
-        """From the first direction of the list."""
+        """Direction of the first pass through the list."""
         first, _ = next(self.passes())
         return Approach.UP if first == Direction.UP.value else Approach.DOWN
 
     def turned(self, direction: Direction) -> Self:
-        """Return the same list in a direction."""
+        """Return a plan with the same frequencies in another ``direction``."""
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     @property
@@ -107,20 +107,20 @@ class FrequencySteps(AbstractExcitation):
         return self.rising_hz[-1]
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield each pass through the list: its direction, and its frequencies in the order played [Hz]."""
+        """Yield each pass: its direction, and its frequencies in the order played [Hz]."""
         return self.direction.ways(self.rising_hz)
 
     @property
     def planned_wait_s(self) -> float:
-        """Wait before each recording that the plan fixes; zero where feedback ends the wait [s]."""
+        """Planned wait before the recording of each step [s]; 0 if feedback decides when the wait ends."""
         return 0.0
 
     def segment(self, frequency_hz: float, direction: str) -> Segment:
-        """Return the segment of a step; the direction separates those of a turning point."""
+        """Return the segment of a step; ``direction`` tells apart the two steps at a turning point."""
         return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step for every frequency, in the order of time, with the wait that the plan fixes."""
+        """Yield one step for every frequency, in the order played, with the planned wait."""
         for direction, frequencies_hz in self.passes():
             for each_hz in frequencies_hz:
                 segment = self.segment(each_hz, direction)
@@ -130,18 +130,18 @@ class FrequencySteps(AbstractExcitation):
 class SteppedSine(FrequencySteps):
     """A list of frequencies; each is played until it has settled, then recorded as a separate segment.
 
-    The phase continues from one frequency to the next and the amplitude is constant, so that the specimen
-    stays on its branch.
+    The phase is continuous from one frequency to the next and the amplitude is constant. The specimen
+    therefore stays on its branch.
     """
 
     wishes: ClassVar[tuple[str, ...]] = ("response_i", "response_ii")
     kind: Literal["stepped_sine"] = "stepped_sine"
     settle_s: NonNegativeFloat = 3.0
-    """Wait at every frequency until the transient has died out [s]."""
+    """Waiting time at every frequency, for the transient to die out [s]."""
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording of all steps [s]."""
+        """Duration of settling and recording of all steps [s]."""
         passes = sum(1 for _ in self.passes())
         return passes * len(self.rising_hz) * (self.settle_s + self.record_s)
 

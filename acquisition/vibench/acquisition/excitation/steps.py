@@ -1,4 +1,4 @@
-"""The generator's steps, as an excitation lists them and a run plays them."""
+"""Steps of the generator: an excitation lists them, and a run plays them."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,21 +20,21 @@ class Tone:
 
     frequency_hz: float
     level: float = 1.0
-    """Fraction of the amplitude setting: above 0, and at most 1 except for a lead-in."""
+    """Fraction of the amplitude setting: above 0, and at most 1 except in a lead-in."""
 
 
 @dataclass(frozen=True)
 class LoopTone(Tone):
-    """A sine that a real-time controller plays, with the law that holds the motion."""
+    """A sine played by a real-time controller, whose control law holds the motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """One period, repeated, as in a generator's memory: each value lasts until the next."""
+    """One period, repeated, as in a generator's memory; each value is held until the next."""
 
     values: Samples
-    """From -1 to 1; the full range is the amplitude setting. The largest magnitude may be below 1:
-    realisations of one noise share their rms value, and only the one with the highest peak reaches 1."""
+    """Values from -1 to 1; the full range is the amplitude setting. The largest magnitude may be below 1:
+    realisations of a noise have the same rms value, and only the one with the highest peak reaches 1."""
     repetition_hz: float
 
 
@@ -43,18 +43,18 @@ class SampleSource(Protocol):
 
     @property
     def band_start_hz(self) -> float:
-        """Lower edge of its flat spectrum [Hz]."""
+        """Lower edge of the flat spectrum [Hz]."""
 
     @property
     def band_stop_hz(self) -> float:
-        """Upper edge of its flat spectrum [Hz]."""
+        """Upper edge of the flat spectrum [Hz]."""
 
     @property
     def crest_factor(self) -> float:
-        """Peak over rms."""
+        """Peak value divided by rms value."""
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
-        """Make samples ``first`` to ``first + count - 1``, -1 to 1; the same at every call."""
+        """Return samples ``first`` to ``first + count - 1``, from -1 to 1; identical at every call."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ Play: TypeAlias = Tone | Waveform | Stream | Sweep
 
 
 def full_level(play: Play | None) -> float:
-    """Return the fraction of the amplitude setting that a signal has after its ramp."""
+    """Return the level of a signal after its ramp, as a fraction of the amplitude setting."""
     return play.level if isinstance(play, Tone) else 1.0
 
 
@@ -83,9 +83,9 @@ class Segment:
 
 @dataclass(frozen=True)
 class Step:
-    """Play one signal: wait until it has settled, then record.
+    """One signal to play: first settle, then record.
 
-    Steps that follow each other with an equal segment and no settling are recorded as one segment.
+    Consecutive steps with equal segments and no settling time are recorded as one segment.
     """
 
     play: Play
@@ -95,12 +95,12 @@ class Step:
 
     @property
     def duration_s(self) -> float:
-        """Settling and recording together [s]."""
+        """Time for settling and recording together [s]."""
         return self.settle_s + self.record_s
 
 
 class Direction(StrEnum):
-    """Order of the steps: an impacting specimen may respond differently on the way back."""
+    """Order of the steps. An impacting specimen may respond differently to rising and falling values."""
 
     UP = "up"
     DOWN = "down"
@@ -108,8 +108,8 @@ class Direction(StrEnum):
     DOWN_THEN_UP = "down_then_up"
 
     def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield each pass through rising values: ``"up"`` or ``"down"``, and the values in the order
-        played.
+        """Yield each pass: ``"up"`` or ``"down"``, and the values in the order played.
+        ``rising`` lists the values in ascending order.
         """
         up = (Direction.UP.value, rising)
         down = (Direction.DOWN.value, rising[::-1])
@@ -125,29 +125,29 @@ class Direction(StrEnum):
 
 
 class Approach(StrEnum):
-    """Start of the motion at each frequency, which decides between several motions."""
+    """Start of the motion at each frequency; where several motions exist, it selects one."""
 
     REST = "from rest"
     UP = "led upwards"
-    """From the final state and phase of the next lower frequency."""
+    """The motion continues from the final state and phase at the next lower frequency."""
     DOWN = "led downwards"
 
 
 @dataclass(frozen=True)
 class HeldAcceleration:
-    """Feedback holds the base's fundamental, with any setting up to the largest."""
+    """Feedback holds the fundamental of the base motion, with any setting up to the largest allowed."""
 
     amplitude_m_per_s2: float
-    """Peak."""
+    """Peak acceleration of the fundamental [m/s2]."""
     basis: ClassVar[str] = "the level that feedback holds"
 
 
 @dataclass(frozen=True)
 class RelativeSetting:
-    """A sine at a setting; the shaker determines the motion of the base."""
+    """A sine at a fixed amplitude setting; the base motion results from the shaker's response."""
 
     share: float
-    """Share of the plan's ``amplitude_vpp``."""
+    """Fraction of the plan's ``amplitude_vpp``."""
     basis: ClassVar[str] = "the rig's linear model"
 
 

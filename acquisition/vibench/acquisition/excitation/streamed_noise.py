@@ -13,16 +13,16 @@ from .periodic_noise import BandNoise
 from .steps import Samples, Segment, Step, Stream
 
 CREST_FACTOR = 4.5
-"""Half the amplitude setting over the rms value. A Gaussian value exceeds 4.5 standard deviations about
-seven times in a million; these few are clipped, with no visible effect on the spectrum.
+"""Ratio of half the amplitude setting (the peak) to the rms value. About seven Gaussian values in a million
+exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Random numbers drawn with one key: few, to start at any sample cheaply, but enough to be fast."""
+"""Number of random values per key: few, so that any sample is a cheap start, but enough to be fast."""
 TRANSITION_WIDTH = 0.5
-"""Width of the filter's edges over the band's lower edge; the -6 dB points are the band's edges."""
+"""Transition width of the filter, over the band's lower edge; the band's edges are its -6 dB points."""
 HAMMING_WIDTH = 3.3
-"""Taps times transition width over sample rate of a Hamming-windowed filter (Oppenheim and Schafer,
-Discrete-Time Signal Processing, 3rd ed., table 7.2).
+"""Number of taps times transition width divided by sample rate, for a Hamming-windowed filter (Oppenheim and
+Schafer, Discrete-Time Signal Processing, 3rd ed., table 7.2).
 """
 PREVIEW_S = 10.0
 """Length of a preview of long noise [s]."""
@@ -38,16 +38,16 @@ class GaussianBand:
 
     @property
     def crest_factor(self) -> float:
-        """Peak over rms."""
+        """Peak value divided by rms value."""
         return CREST_FACTOR
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
-        """Return samples ``first`` to ``first + count - 1``, -1 to 1; the same in any order of calls."""
-        from scipy.signal import oaconvolve  # noqa: PLC0415 - half a second, which `vibench stop` need not wait
+        """Return samples ``first`` to ``first + count - 1``, from -1 to 1, independent of earlier calls."""
+        from scipy.signal import oaconvolve  # noqa: PLC0415 - takes 0.5 s; `vibench stop` must not wait
 
         taps = _taps(self.band_start_hz, self.band_stop_hz, sample_rate_hz)
-        # White noise starts before the first sample by the length of the filter, so that the signal is
-        # stationary from its first sample on.
+        # The white noise starts one filter length before the first sample, so that the signal is stationary
+        # from its first sample on.
         white = self._white(first, count + len(taps) - 1)
         shaped = np.asarray(oaconvolve(white, taps, mode="valid"))
         return np.clip(shaped / CREST_FACTOR, -1.0, 1.0)
@@ -70,37 +70,37 @@ def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> S
     from scipy.signal import firwin  # noqa: PLC0415 - as above
 
     taps = firwin(2 * half + 1, band, pass_zero=False, fs=sample_rate_hz, window="hamming")
-    # The filter multiplies variance 1 by the sum of squares of the taps: normalise this to 1.
+    # The filter multiplies the variance by the sum of the squared taps: normalise this sum to 1.
     return np.asarray(taps / np.sqrt(np.sum(taps**2)))
 
 
 class StreamedNoise(BandNoise):
     """Band-limited Gaussian noise of any length, on an analogue output.
 
-    The rms value is the amplitude setting over twice the crest factor of 4.5. Edges are -6 dB points.
+    The rms value is half the amplitude setting over the crest factor of 4.5. Edges are -6 dB points.
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.NOISE,)
     kind: Literal["streamed_noise"] = "streamed_noise"
     settle_s: NonNegativeFloat = 3.0
-    """Wait until the transient has died out [s]."""
+    """Waiting time for the transient to die out [s]."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     seed: int = Field(default=1, ge=0)
-    """The same seed gives the same noise, on any machine with the same numpy."""
+    """Seed; the same seed gives the same noise on any machine with the same version of numpy."""
 
     @property
     def source(self) -> GaussianBand:
-        """The signal."""
+        """The noise signal that the plan describes."""
         return GaussianBand(self.band_start_hz, self.band_stop_hz, self.seed)
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording [s]."""
+        """Duration of settling and recording [s]."""
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """Yield the one step."""
+        """Yield the only step: the whole noise."""
         band = {"band_start_hz": self.band_start_hz, "band_stop_hz": self.band_stop_hz}
         yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment(SegmentLabel.NOISE, band))
 

@@ -1,4 +1,4 @@
-"""Band-limited white noise from the generator's memory: a random-phase multisine, new for every average."""
+"""Band-limited white noise from the generator's memory: a new random-phase multisine for every average."""
 
 from typing import Literal
 
@@ -9,15 +9,15 @@ from .periodic_noise import PeriodicNoise
 
 
 class WhiteNoise(PeriodicNoise):
-    """White noise between two frequencies, as whole periods of flat lines with random phases.
+    """White noise between two frequencies: whole periods of lines of equal amplitude with random phases.
 
-    A periodic signal needs no window and has no leakage, but averaging its periods reduces only the sensors'
-    noise. Every realisation therefore has different phases: the average over realisations corresponds to
-    noise (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    A periodic signal needs no window and has no leakage, but averaging over its periods reduces only the
+    sensor noise. Every realisation therefore has new phases; averaging over realisations has the effect of
+    averaging noise (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["white_noise", "multisine_noise"] = "white_noise"
-    """``multisine_noise`` is the name of version 0.1; it is read as ``white_noise``."""
+    """``multisine_noise``, the name in version 0.1, is read as ``white_noise``."""
 
     @field_validator("kind")
     @classmethod
