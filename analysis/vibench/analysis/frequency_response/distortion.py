@@ -27,7 +27,7 @@ class Distortion(Labelled):
     noise_share: float
     """Relative standard deviation of one realisation by channel noise or chaos, from its periods."""
     distortion_share: float | None
-    """Relative scatter of realisations beyond that noise; None for a single realisation."""
+    """Relative scatter of realisations beyond `noise_share`; None for a single realisation."""
     odd_m_per_s: float | None
     """Rms response on undriven odd lines, without noise; None if there are none."""
     even_m_per_s: float | None
@@ -61,7 +61,7 @@ _SURELY = 5.0
 
 
 def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
-    """Return whether realisations scatter more than their periods; None with only one of either.
+    """Return whether realisations scatter more than their periods; None for one realisation or period.
 
     For a linear specimen, the mean logarithm of the variance ratio follows Fisher's F.
     """
@@ -79,7 +79,7 @@ def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
 
 
 def is_even_line(lines: DetectionLines) -> Flags:
-    """Return which lines are even; on these, only even distortion appears."""
+    """Return flags of the even lines, where only even distortion appears."""
     return np.asarray(lines.order % 2 == 0)
 
 

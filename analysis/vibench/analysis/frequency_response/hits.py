@@ -1,4 +1,4 @@
-"""Hits of a hammer: the frequency response over them, under an exponential window of known damping."""
+"""Frequency response to hammer hits, with an exponential window of known decay."""
 
 from dataclasses import dataclass, replace
 
@@ -15,21 +15,21 @@ from .transmissibility import frequency_response_of
 
 _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
-"""Usual length of the pieces whose energies are compared [s], and their least number."""
+"""Usual length [s] and least number of the pieces of the drive whose energies are compared."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""A drive of hits has this share of its energy in this share of the time; Gaussian noise has 0.06."""
+"""Time share of the strongest pieces, and their least energy share for hits; Gaussian noise has 0.06."""
 _TRIGGER = 0.1
-"""Least peak of a hit relative to the hardest one."""
+"""Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0
-"""Start of a segment before the trigger, in periods of the highest frequency."""
+"""Time from the start of a segment to the trigger, in periods of the highest frequency."""
 _REMAINDER = 1e-3
-"""Size of the windowed response at the end of a segment relative to its largest part."""
+"""Largest rms of the windowed response in the last part of a segment, relative to the strongest part."""
 _PARTS = 20
-"""Parts of a segment whose levels show the decay."""
+"""Number of equal parts of a segment whose rms values show the decay."""
 _NOTHING = 1e-300
 EXPONENTIAL = "exponential"
 _ASSUMED_SD = 0.01
-"""Scatter relative to a line and to the largest one, which only weights the lines of a single hit."""
+"""Assumed scatter relative to the line and to the largest line; only weights the lines of a single hit."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Hits:
     """Segments of a record that each begin with a hit."""
 
     starts: tuple[int, ...]
-    """First samples."""
+    """First sample of each segment."""
     segment_samples: int
     left_out: int
     """Number of hits whose segment is cut short by the next hit or by the end."""
@@ -46,10 +46,10 @@ class Hits:
 def find_hits(
     channels: Channels, stretch: Stretch, band_hz: tuple[float, float], segment_s: float | None
 ) -> Hits | None:
-    """Find the hits in the drive; None if the drive does not consist of hits.
+    """Return the segments of the hits in the drive; None if the drive does not consist of hits.
 
-    Pulses within a period of the lowest frequency count as one hit. Without a given length, segments have the
-    length that leaves most recorded time of two hits or more.
+    Pulses within a period of the lowest frequency count as one hit. By default, the segment length is chosen
+    to keep the most recorded time from at least two hits.
 
     Raises NotEnoughData when no hit has a segment of the given length.
 
@@ -98,7 +98,7 @@ def _energies(drive: Reals, piece: int) -> Reals:
 
 
 def _longest(clear: Reals) -> int:
-    """Return the segment length that leaves most recorded time beyond the first hit, else the longest."""
+    """Return the segment length that maximises (segments - 1) * length; the longest if this is always 0."""
     kept_s = [(np.count_nonzero(clear >= each) - 1) * each for each in clear]
     return int(clear[int(np.argmax(kept_s))] if max(kept_s) > 0 else np.max(clear))
 
@@ -107,8 +107,8 @@ def _longest(clear: Reals) -> int:
 class HitSpectra:
     """Spectra of the hits under an exponential window, from which responses are estimated.
 
-    The window turns H(i w) into H(i w + decay), since it multiplies cause and effect alike. Its decay is the
-    least that takes the response to a thousandth by the end of a segment; none with ``Window.BOXCAR``.
+    The window multiplies all channels by exp(-decay t), which turns H(i w) into H(i w + decay). Its decay is
+    the least that reduces the response to a thousandth at the end of a segment; 0 with ``Window.BOXCAR``.
     """
 
     settings: FrequencyResponseSettings
@@ -122,7 +122,7 @@ class HitSpectra:
         return len(self.spectra)
 
     def response(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
-        """Estimate response over base; the bounds of a single hit are infinite, since it has no scatter."""
+        """Estimate response over base; the bounds are infinite for a single hit, whose scatter is unknown."""
         products = np.einsum("kif,kjf->ijf", np.conj(self.spectra), self.spectra) / self.count
         averages = SpectralAverages(
             products, self.count, self.left_out, max(self.count, 2.0), self.settings.segment_samples,
@@ -149,20 +149,20 @@ class HitSpectra:
 def hit_spectra(
     data: Reals, hits: Hits, settings: FrequencyResponseSettings, high_hz: float, *, fades: bool
 ) -> HitSpectra:
-    """Transform the segments of hits.
+    """Return the spectra of the segments that begin with hits.
 
     Parameters
     ----------
     data
         Drive, base and response of each usable hit, shape (hits, 3, samples).
     hits
-        Their places.
+        Positions of the hits in the record.
     settings
         Settings of the response; window and decay are filled in.
     high_hz
         Highest frequency to keep.
     fades
-        Whether to apply an exponential window where the response lasts to the end of a segment.
+        Whether to apply an exponential window if the response has not decayed by the end of a segment.
     """
     rate, size = settings.sample_rate_hz, hits.segment_samples
     data = data - np.median(data, axis=2, keepdims=True)
@@ -180,7 +180,7 @@ def hit_spectra(
 
 def weighted_alike(response: FrequencyResponse) -> FrequencyResponse:
     """Return the response to a single hit with an assumed scatter, for a fit without bounds."""
-    # The same noise on all lines of a velocity, and the same relative error.
+    # Assume equal noise on all lines of the velocity, and in addition an equal relative error.
     size = response.magnitude / response.frequency_hz
     assumed = _ASSUMED_SD * np.hypot(1.0, np.max(size) / np.maximum(size, _NOTHING))
     return replace(
@@ -189,7 +189,7 @@ def weighted_alike(response: FrequencyResponse) -> FrequencyResponse:
 
 
 def without_bounds(found: Resonance) -> Resonance:
-    """Return a resonance of unknown uncertainty."""
+    """Return the resonance with infinite standard deviations."""
     return replace(
         found, sd_frequency_hz=np.inf, sd_damping_ratio=np.inf, sd_peak_magnitude=np.inf,
         reduced_chi_square=np.nan, overlap=1.0,

@@ -17,14 +17,14 @@ SMALLEST_RELATIVE_SD = 1e-6
 """Least relative standard deviation, so that weights stay finite for noise-free simulations."""
 LARGEST_DAMPING = 0.5
 RESOLVED_LINES = 4.0
-"""Least half-power bandwidth in noise bandwidths to be resolved."""
+"""Least half-power bandwidth of a resolved mode, in noise bandwidths of a line."""
 WELL_FITTED = 1.2
 """Reduced chi-square below which a higher degree of the background would only add uncertainty."""
 
 
 @dataclass(frozen=True)
 class Resonance:
-    """One resonance, from a fit of all modes of a band or of this mode on a smooth background."""
+    """One resonance, fitted together with all modes of a band or alone on a smooth background."""
 
     DOCUMENT: ClassVar = (
         "frequency_hz sd_frequency_hz damping_ratio sd_damping_ratio peak_frequency_hz peak_magnitude "
@@ -43,17 +43,17 @@ class Resonance:
     reduced_chi_square: float
     """Reduced chi-square of the lines about the mode; standard deviations are widened if it is above 1."""
     chi_square_limit: float
-    """Value that one correct fit in a thousand exceeds."""
+    """Reduced chi-square that one correct fit in a thousand exceeds."""
     lines_used: int
     is_resolved: bool
     """Whether the resolution is fine enough for this bandwidth."""
     overlap: float
-    """Factor by which an overlapping mode increases the uncertainty of damping; 1 without one."""
+    """Factor by which an overlapping mode increases the uncertainty of damping; 1 without overlap."""
 
     @property
     def is_explained(self) -> bool:
         """Whether the fitted modes describe the lines about this one, within their scatter."""
-        # Not a number for a single hit, whose lines have no known scatter.
+        # NaN for a single hit, whose lines have no known scatter.
         return not self.reduced_chi_square > max(self.chi_square_limit, WELL_FITTED)
 
     @property
@@ -81,13 +81,13 @@ class Resonance:
 
 # The window of averaged segments smears modes and correlates the errors of neighbouring lines.
 #
-# Segments of w(t) r(t), w(t) x(t) and w(t) y(t) with y = h * x, and G the density of r and x, average to
-# the quotient of the convolutions of |W|^2 with G H and with G. Its error is R* V / (R* X), with the
-# residual V = Y - H X of a segment: sensor noise n windowed by w, and cut-off ringing, dH/df times x
-# windowed by w' / (2 pi i).
+# Segments are w(t) r(t), w(t) x(t) and w(t) y(t) with y = h * x; r and x have the cross density G. The
+# averaged estimate is |W|^2 convolved with G H, divided by |W|^2 convolved with G. Its error is
+# R* V / (R* X). The residual V = Y - H X of a segment is sensor noise n windowed by w, plus cut-off ringing:
+# dH/df times x windowed by w' / (2 pi i).
 
 _PROXY_SAMPLES = 1024
-"""Window length for computing correlations, which do not depend on it."""
+"""Window length for computing correlations; it does not change the result."""
 _FAR_LINES = 12
 """Distance in lines beyond which errors under cosine windows are uncorrelated."""
 _NEAR = 0.05
@@ -103,19 +103,19 @@ class Leakage:
     segment_s: float
     window: Window
     noise: Reals
-    """Correlation of errors by sensor noise k lines apart, shape (far lines,)."""
+    """Correlation of the sensor-noise errors of lines k apart, shape (far lines,)."""
     ringing: Reals
-    """Covariance of errors by cut-off ringing, per |dH/df|^2 and relative variance [Hz^2]."""
+    """Covariance of the errors of lines k apart by cut-off ringing, per |dH/df|^2 [Hz^2]."""
 
     def smeared_pole(self, frequency_hz: Reals, pole: complex, slope_per_hz: Reals | Complexes) -> Complexes:
-        """Return the averaged estimate of 1 / (i w - s), s = `pole` [rad/s].
+        """Return the estimate of 1 / (i w - s) including leakage, with s = `pole` [rad/s].
 
-        With the autocorrelation r of the window over its segment T, T I(z), z = (s - i w) T and
-        I(z) = integral of r(t) exp(z t) over 0 to 1, where the base's density is level; its relative slope
-        g [1/Hz] adds g i / (2 pi) (-1 - z I).
+        Where the base's density is flat, this is T I(z), with the segment length T and z = (s - i w) T. I(z)
+        is the integral of r(t) exp(z t) from t = 0 to 1; r is the autocorrelation of the window. A relative
+        slope g of the density [1/Hz] adds g i / (2 pi) (-1 - z I).
         """
         scaled = (pole - 2j * np.pi * frequency_hz) * self.segment_s
-        # Lines and window terms are whole periods per segment apart, so exp(scaled) is the same for all.
+        # Lines and window terms differ by whole periods per segment, so exp(scaled) is the same for all.
         rest = complex(np.expm1(pole * self.segment_s))
         integral = np.zeros_like(scaled)
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):
@@ -126,21 +126,21 @@ class Leakage:
         )
 
     def rung(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Return the standard deviation of either part of a line's error from cut-off ringing, along dH/df.
+        """Return the standard deviation by cut-off ringing of a line's real or imaginary part, along dH/df.
 
         Parameters
         ----------
         line
-            Numbers of the lines, rising.
+            Line numbers in ascending order.
         value, spread
-            Transmission there, and the standard deviation of its real or imaginary part, an upper bound.
+            Transmission at these lines, and standard deviation of its real or imaginary part, an upper limit.
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
         most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)
         return np.asarray(ringing * np.divide(most, size, out=np.ones_like(size), where=size > most))
 
     def covariance(self, line: Integers, rung: Complexes, spread: Reals) -> Complexes:
-        """Return the covariance of either part of the errors, lower bands, shape (far lines, lines)."""
+        """Return the covariance of the errors' real (or imaginary) part, lower bands (far lines, lines)."""
         noise = np.sqrt(spread**2 - np.abs(rung) ** 2)
         alike = self.ringing / (self.ringing[0] or 1.0)
         bands = np.zeros((_FAR_LINES, line.size), dtype=np.complex128)
@@ -155,23 +155,23 @@ class Leakage:
 
 
 def leakage_of(found: FrequencyResponse) -> Leakage | None:
-    """Return the leakage of a transmission; None for whole periods and for hits that decay."""
+    """Return the leakage of a transmission; None for whole periods and for hits."""
     if found.resolution_hz == 0.0 or found.settings.decay_per_s is not None:
         return None
     how = found.settings
     window, segment_s = Window(how.window), how.segment_samples / how.sample_rate_hz
     noise, ringing = _line_correlations(window, how.overlap, found.segments_used)
-    # Each part has half of the complex variance, averaged; w' is per second, the slope per hertz.
+    # Real and imaginary part each have half the variance of the mean; w' is per second, the slope per hertz.
     scale = 1 / (8 * np.pi**2 * found.n_eff * segment_s**2)
     return Leakage(segment_s, window, noise, scale * ringing)
 
 
 @lru_cache(maxsize=16)
 def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[Reals, Reals]:
-    """Sum the correlations of errors k lines apart over segments j hops apart.
+    """Return the correlations of errors k lines apart by sensor noise and by ringing.
 
-    Sum over j of (1 - |j| / K) conj(c_j(k)) d_j(k): c_j(k), of the reference, transforms w(n) w(n + j D);
-    d_j(k) is the same for noise, and that of w' for ringing.
+    Both are sums over j of (1 - |j| / K) conj(c_j(k)) d_j(k), for K segments with hop D. c_j transforms
+    w(n) w(n + j D). For noise, d_j = c_j; for ringing, d_j has w' instead of w.
     """
     values = taper(window, _PROXY_SAMPLES)
     weights = cosine_weights(window)
@@ -193,9 +193,9 @@ def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[R
 
 @lru_cache(maxsize=8)
 def _autocorrelation(window: Window) -> tuple[Reals, Reals, Complexes]:
-    """Return r(t) = sum over b of exp(2 pi i b t) (f_b (1 - t) + g_b): b, f_b and g_b.
+    """Return b, f_b and g_b of the autocorrelation, sum over b of exp(2 pi i b t) (f_b (1 - t) + g_b).
 
-    Of w = sum of c_b exp(2 pi i b t), f_b = c_b^2 and g_b = c_b sum over a != b of c_a / (pi i (a - b)).
+    For w = sum of c_b exp(2 pi i b t): f_b = c_b^2, g_b = c_b sum over a != b of c_a / (pi i (a - b)).
     """
     half = np.array(cosine_weights(window))
     half[1:] /= 2
@@ -209,7 +209,7 @@ def _autocorrelation(window: Window) -> tuple[Reals, Reals, Complexes]:
 
 
 def _exponentials(exponent: Complexes, rest: complex) -> tuple[Complexes, Complexes]:
-    """Integrate exp(q t) and (1 - t) exp(q t) over 0 to 1, from q and `rest` = exp(q) - 1."""
+    """Return the integrals of exp(q t) and (1 - t) exp(q t) from 0 to 1; `rest` is exp(q) - 1."""
     near = np.abs(exponent) < _NEAR
     q = np.where(near, 1.0, exponent)
     once, small = rest / q, np.where(near, exponent, 0.0)
@@ -226,12 +226,12 @@ _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
 """Maximum steps of a fit."""
 _STEADY_AVERAGES = 49.0
-"""Averages to which a scatter smoothed over neighbouring lines is equivalent."""
+"""Equivalent number of averages of a scatter smoothed over neighbouring lines."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
 """Distance in half-power bandwidths below which the bounds of two modes allow for a third between them."""
 _EDGE = 1e-3
-"""Relative distance to a bound at which a fit counts as having found no minimum."""
+"""Distance to a bound, relative to the reach, below which a fit has found no minimum."""
 
 
 class Lines:
@@ -255,7 +255,7 @@ class Lines:
         self._off_hz = -0.5j / np.pi * (band.settings.decay_per_s or 0.0)
         slope = band.drive_slope_per_hz
         self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
-        # A scatter that is smoothed over lines counts as one from more averages.
+        # A scatter smoothed over lines is as reliable as one from more averages.
         self._averages = band.n_eff if band.steady_relative_sd is None else max(band.n_eff, _STEADY_AVERAGES)
         self._root: Complexes | None = None
         self.ringing_share = np.zeros(self.value.size)
@@ -269,7 +269,7 @@ class Lines:
 
     @property
     def narrowest_hz(self) -> float:
-        """Least half-power bandwidth [Hz] to determine damping with a boxcar, whose leakage spreads far."""
+        """Least half-power bandwidth for known damping with a boxcar [Hz]; 0 for other windows."""
         leakage = self._leakage
         return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
 
@@ -311,9 +311,9 @@ class Lines:
 
 
 def mode_shapes(frequency_hz: Reals | Complexes, poles: Reals) -> Complexes:
-    """Return two shapes with real factors for each mode, shape (lines, 2 modes), scaled to order one.
+    """Return two functions per mode for a fit with real factors, shape (lines, 2 modes), of order one.
 
-    2 zeta / (1 - r^2 + 2 i zeta r) and i r times it, with r = w / w0; `poles` are ln w0 / 2 pi and ln zeta.
+    These are 2 zeta / (1 - r^2 + 2 i zeta r) and i r times it, r = w / w0; `poles` has ln w0/2 pi, ln zeta.
     """
     columns = []
     for log_frequency, log_damping in poles.reshape(-1, 2):
@@ -341,7 +341,7 @@ class ModalFit:
 
 
 class _Sums:
-    """Sums of modes and a background at lines, with real factors fitted for given poles."""
+    """Linear fit of modes and a background to lines, with real factors, for given poles."""
 
     def __init__(self, lines: Lines, background: Background) -> None:
         self._lines = lines
@@ -354,23 +354,23 @@ class _Sums:
         return np.hstack((self._lines.independent(self._lines.modes(poles)), self.behind))
 
     def factors(self, poles: Reals) -> tuple[Reals, Reals, Reals]:
-        """Return the best factors, the residual, and an orthonormal basis of the shapes."""
+        """Return the least-squares factors, the residual, and an orthonormal basis of the shapes."""
         onto, size, turn = np.linalg.svd(self.basis(poles), full_matrices=False)
         kept = size > np.finfo(np.float64).eps * onto.shape[0] * size[0]
         onto, along = onto[:, kept], onto[:, kept].T @ self.target
         return turn[kept].T @ (along / size[kept]), self.target - onto @ along, onto
 
     def pole_rates(self, poles: Reals, factors: Reals) -> Reals:
-        """Return the derivatives of a sum by each pole, with fixed factors."""
+        """Return the derivatives of the fitted sum with respect to each pole, at fixed factors."""
         return self._lines.independent(_rates(self._lines.modes, poles, factors))
 
     def misfit(self, poles: Reals) -> Reals:
-        """Return the residual."""
+        """Return the residual of the best factors for these poles."""
         return self.factors(poles)[1]
 
     def misfit_rates(self, poles: Reals) -> Reals:
-        """Return the derivatives of the residual by each pole."""
-        # Factors that follow the poles leave the gradient unchanged (Kaufman 1975, BIT 15, 49-57).
+        """Return the derivatives of the residual with respect to each pole."""
+        # Factors that change with the poles leave the gradient unchanged (Kaufman 1975, BIT 15, 49-57).
         factors, _, onto = self.factors(poles)
         rates = self.pole_rates(poles, factors)
         return np.asarray(onto @ (onto.T @ rates) - rates)
@@ -379,7 +379,7 @@ class _Sums:
 def modal_fit(
     band: FrequencyResponse, lines: Lines, start: Reals, reach: Reals, background: Background
 ) -> ModalFit | None:
-    """Fit poles near a start; None if the lines do not determine them.
+    """Fit poles near starting values; None if the lines do not determine them.
 
     Variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432).
 
@@ -450,7 +450,7 @@ def modal_fit(
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
         top_hz = np.array([natural_hz])
-        # The second time only between the neighbours of the highest point.
+        # The second pass searches only between the neighbours of the highest point.
         for reach_hz in (2 * half_hz, 4 * half_hz / _FINE_POINTS):
             fine_hz = np.clip(np.linspace(top_hz[0] - reach_hz, top_hz[0] + reach_hz, _FINE_POINTS), *ends_hz)
             top_hz = fine_hz[[int(np.argmax(np.abs(curve(fine_hz, poles) @ found)))]]
@@ -493,7 +493,7 @@ def _condition(curvature: Reals) -> float:
 
 
 def _rates(shapes: Callable[[Reals], Complexes], poles: Reals, factors: Reals) -> Complexes:
-    """Return the derivatives of a sum of modes by each pole, by central differences.
+    """Return the derivatives of a sum of modes with respect to each pole, by central differences.
 
     A pole affects only the two shapes of its mode.
     """

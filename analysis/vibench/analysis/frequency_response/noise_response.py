@@ -43,9 +43,9 @@ _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Least mean difference of two estimators that counts as bias, in standard deviations."""
+"""Least median difference of two estimators that counts as bias, in standard deviations of the median."""
 _ALIKE_LINES = 4
-"""Factor of the variance of a median over lines that a window correlates, relative to an ideal mean."""
+"""Variance of a median over lines correlated by a window, relative to a mean over independent lines."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +66,9 @@ class NoiseResponse(Labelled):
     resonances: tuple[Resonance, ...]
     base_level: NoiseDriveLevel
     bias: str
-    """Remark on an estimator with bias by noise; otherwise empty."""
+    """Remark if noise biases the estimator; otherwise empty."""
     periodic: PeriodicFrequencyResponse | None
-    """Result with the sources of scatter; None for noise that does not repeat."""
+    """Result for periodic noise, with the sources of scatter; None for other noise."""
     used_s: float
     """Averaged time [s]."""
     left_out: int
@@ -101,16 +101,16 @@ def repeated_response(
 ) -> Estimated:
     """Estimate the transmission from all usable periodic noise.
 
-    Raises NotEnoughData when no realisation is left, and InvalidRequest when segments are chosen: the periods
-    are the segments.
+    Raises NotEnoughData when no realisation is usable, and InvalidRequest when the request sets segments:
+    here each period is a segment.
 
     Parameters
     ----------
     channels, noise, request
         Record, excitation and request.
     repetitions
-        Repetition of every realisation, if known from the same drive; measured by default. If given, as
-        for simulated draws, the scatter of resonances among realisations is not computed.
+        Period of every realisation, if known from the same drive; measured by default. If given, as for
+        simulated records, the scatter of resonances among realisations is not computed.
     """
     if request.cuts_segments:
         raise InvalidRequest(
@@ -190,7 +190,7 @@ class _Unusable:
     overloaded: int = 0
 
     def valid(self, data: Reals, overloaded: Flags) -> Flags:
-        """Return which samples are usable, and count the others."""
+        """Return flags of the usable samples, and count the others."""
         lost = np.isnan(data).any(axis=0)
         self.lost += int(np.count_nonzero(lost))
         self.overloaded += int(np.count_nonzero(overloaded & ~lost))
@@ -205,7 +205,7 @@ class _Unusable:
 
 
 def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _Unusable) -> Reals | None:
-    """Read a realisation with at least two whole periods and no fault; otherwise None."""
+    """Return the samples of a realisation; None if it has a fault or less than two whole periods."""
     shortfall = 1e-3
     periods = int(stretch.samples / period_samples + shortfall)
     if periods < _LEAST_PERIODS:
@@ -325,7 +325,7 @@ def _response_to_hits(
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
         found = given.response(estimator, noise_ratio).without_delay(channels.response_delay_s)
         inside = found.between(*band_hz)
-        # The response is known at i w + decay, where velocity over acceleration differs by this factor, too.
+        # The response is known at i w + decay; conversion to displacements must use this instead of i w.
         shift = 1 + (not channels.is_force) * decay_per_s / (2j * np.pi * inside.frequency_hz)
         gain = channels.response_gain(inside.frequency_hz) / shift
         return as_displacements(inside, channels).without_gain(gain)
@@ -356,10 +356,10 @@ def _response_to_hits(
 
 
 def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Sequence[Resonance]) -> str:
-    """Compare an estimate with the drive-referenced one, which has no bias by channel noise.
+    """Return a remark if an estimate is biased; channel noise does not bias the drive-referenced one.
 
-    A median difference over the band or about a resonance is bias if it exceeds three of its
-    standard deviations and half of a line's.
+    The median difference over the band or about a resonance is bias if it exceeds three of its own standard
+    deviations and half the standard deviation of a line.
     """
     sd = np.fmax(chosen.relative_sd_magnitude, referenced.relative_sd_magnitude)
     known = np.isfinite(sd) & (chosen.magnitude > 0) & (referenced.magnitude > 0) & referenced.is_significant
@@ -381,7 +381,7 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
 
 
 def as_displacements(frequency_response: FrequencyResponse, channels: Channels) -> FrequencyResponse:
-    """Convert velocity over base acceleration to displacement over displacement; keep force over it [kg]."""
+    """Convert velocity over base acceleration to a displacement ratio; keep force over acceleration [kg]."""
     if channels.is_force:
         return frequency_response
     return converted_frequency_response(
@@ -401,7 +401,7 @@ def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
 
 @dataclass(frozen=True, eq=False)
 class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
-    """A noise measurement: transmission base to m0."""
+    """Analysis of a noise measurement: the transmission from base to m0."""
 
     DOCUMENT: ClassVar = "resonances=response.resonances transmission distortion *response"
 

@@ -33,12 +33,12 @@ _CONVERGED = 1e-9
 _LARGEST_OFFSET = 200e-6
 """Largest relative clock offset, for two oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
-"""Least power of the mean period over the mean power of the periods of a repeating drive."""
+"""A drive repeats if its mean period has at least this share of the mean power of its periods."""
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """Period of a drive by the converter clock."""
+    """Period of a drive, measured with the converter clock."""
 
     period_samples: float
     """Converter samples per period; may be fractional."""
@@ -49,7 +49,7 @@ class Repetition:
 
 
 def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetition:
-    """Measure the true period of a recorded drive from the phase its lines gain per period.
+    """Measure the true period of a recorded drive from the phase advance of its lines per period.
 
     Weighted least squares of the phases of driven lines over the periods, repeated until it converges. The
     first pass uses only low lines, whose phase changes by less than a quarter turn at 200 ppm. Raises
@@ -74,7 +74,7 @@ def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetiti
 
 
 def whole_periods(samples: int, period_samples: float) -> int:
-    """Return the number of periods in a record; a last one may lack a thousandth."""
+    """Return the number of whole periods in a record; the last period may lack a thousandth."""
     return int(np.floor(samples / period_samples + _SHORTFALL))
 
 
@@ -140,17 +140,17 @@ def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
 _OVER_CHANCE = 8.0
 """Least ratio of the scatter that a drift explains to the amount expected by chance."""
 _MOST = 0.5
-"""Least share of the scatter beyond noise that a drift explains."""
+"""Least share of the scatter beyond noise that a drift must explain."""
 
 
 _SMALL = 0.03
-"""Largest deviation of a line used to find a drift; near narrow modes it is larger."""
+"""Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""Largest deviation relative to that of the median line, where this allows more than `_SMALL`."""
+"""The same limit relative to the median line; it applies if it is larger than `_SMALL`."""
 
 
 class Scatter(StrEnum):
-    """Source of the bounds of a periodic transmission."""
+    """Scatter that determines the bounds of a periodic transmission."""
 
     REALISATIONS = "realisations"
     """The full uncertainty: noise and nonlinear distortion."""
@@ -169,8 +169,8 @@ class Drift:
     frequency_share: float
     """Relative standard deviation of all frequencies among realisations."""
     common_share: float
-    """Other changes common to all lines, such as of damping or a delay: median over the lines of the relative
-    standard deviation."""
+    """Relative standard deviation of other changes common to all lines, such as damping or delay; median over
+    the lines."""
 
     @property
     def text(self) -> str:
@@ -201,7 +201,7 @@ class BestLinearApproximation:
     drift: "Drift | None"
     scatter: Scatter
     averages: int
-    """Number of independent values for the scatter: realisations, or periods of a single one."""
+    """Number of independent values for the scatter: realisations, or the periods of a single realisation."""
 
 
 def best_linear_approximation(
@@ -222,8 +222,8 @@ def best_linear_approximation(
     drive, base, response
         Spectra U, X, Y averaged over the periods of each realisation, shape (realisations, lines).
     covariance
-        Covariance of these averages of (X, Y) between periods, averaged over realisations, shape (2, 2,
-        lines).
+        Covariance of the averages of (X, Y) from the scatter of the periods, mean over realisations, shape
+        (2, 2, lines).
     periods
         Periods per realisation.
     frequency_hz
@@ -280,10 +280,10 @@ def best_linear_approximation(
 def _without_drift(
     off: Complexes, value: Complexes, frequency_hz: Reals, noise_variance: Reals, sd: Reals
 ) -> tuple[Drift | None, Complexes]:
-    """Find a drift of gain and of frequencies; return it and the residual.
+    """Return the drift between realisations, None if insignificant, and the deviations without drift.
 
-    Distortion with random phases is independent between lines, so a common part is a drift. It must explain
-    most of the scatter beyond noise, and far more than chance.
+    Distortion with random phases is independent between lines, so a common part is a drift. The drift must
+    explain most of the scatter beyond noise, and far more than chance.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def _without_drift(
         Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
     """
     count = len(off)
-    # A change of all frequencies stretches the ratio of displacements; the value has a further 1 / frequency.
+    # A common shift of frequencies stretches the displacement ratio, which is value * frequency.
     moved = value * frequency_hz
     stretch = frequency_hz * _slope(moved, frequency_hz) / moved
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
@@ -321,13 +321,13 @@ def _without_drift(
 
 
 _TOGETHER = 0.8
-"""Least share of the scatter that common courses of all lines must explain."""
+"""Least share of the scatter that changes common to all lines must explain."""
 _BEYOND_CHANCE = 1.25
-"""Least ratio of that share to its largest expected value for independent lines."""
+"""Least ratio of the explained share to the largest share expected for independent lines."""
 
 
 def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
-    """Remove the one or two courses over realisations that all lines share; return the rest and their share.
+    """Remove up to two changes common to all lines; return the rest and the median size of the changes.
 
     Singular values of independent lines have a known largest size (Marchenko and Pastur, Math. USSR-Sbornik 1
     (1967) 457).
@@ -356,14 +356,14 @@ def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
 
 
 def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
-    """Return the slope at each line, from a local quotient of two straight lines, which fits one mode."""
+    """Return the derivative at each line, from a local quotient of linear functions, which fits one mode."""
     if value.size == 1:
         return np.zeros_like(value)
     slope = np.gradient(value, frequency_hz)
     steps = np.diff(value) / np.diff(frequency_hz)
     across = (value[2:] - value[:-2]) / (frequency_hz[2:] - frequency_hz[:-2])
     product = steps[1:] * steps[:-1]
-    # Elsewhere, at smooth extrema and modes narrower than three lines, this slope would be too large.
+    # At smooth extrema and in modes narrower than three lines, this slope would be too large.
     is_mode = np.abs(product) < np.abs(across) ** 2
     slope[1:-1][is_mode] = product[is_mode] / across[is_mode]
     return np.asarray(slope)
@@ -376,7 +376,7 @@ class DetectionLines:
     OWN_UNITS: ClassVar = {"response_amplitude": "{unit}", "noise_amplitude": "{unit}"}
 
     order: Integers
-    """Multiple of the repetition frequency, shape (lines,); even for even distortion, odd for odd."""
+    """Multiple of the repetition frequency, shape (lines,); odd distortion appears at odd orders."""
     frequency_hz: Reals
     response_amplitude: Reals
     """Rms over realisations of the response's amplitude [unit of the response]."""
@@ -491,7 +491,7 @@ class PeriodicSums:
         )
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """Yield the sums without each realisation in turn; nothing for a single one."""
+        """Yield the sums without each realisation in turn; yield nothing for a single realisation."""
         for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
             yield PeriodicSums(
                 self._sample_rate_hz,
@@ -518,8 +518,8 @@ class PeriodicSums:
             Delay of the response channel behind the base channel (vibrometer decoder, filters),
             removed from the phase.
         orders
-            Driven lines as multiples of the repetition frequency. By default they are found in the drive,
-            which may include noise and images of a held waveform.
+            Driven lines as multiples of the repetition frequency. By default they are the strong lines of the
+            drive, which may include noise and images of a sample-and-hold output.
         """
         if not self._realisations:
             raise NotEnoughData("no realisation was added; give at least one")
@@ -582,7 +582,7 @@ class PeriodicSums:
 
 
 def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
-    """Return the lines of these orders, as far as the sample rate allows."""
+    """Return flags of the lines with these orders, as far as the sample rate allows."""
     marked = np.isin(np.arange(frequency_hz.size), orders)
     if not np.any(marked):
         raise InvalidRequest(

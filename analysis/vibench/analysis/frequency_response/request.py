@@ -37,7 +37,7 @@ class FrequencyResponseView:
     base: Quantity = Quantity.DISPLACEMENT
     scale: MagnitudeScale = MagnitudeScale.LOG
     is_force: bool = False
-    """Whether to show the apparent mass, force over the base's acceleration, whatever the quantities."""
+    """Whether to show the apparent mass, force over the base's acceleration, instead of the quantities."""
 
     @property
     def power(self) -> int:
@@ -101,7 +101,7 @@ class FrequencyResponseView:
 
 
 def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
-    """Read ``"velocity/acceleration"``; a single word stands for both.
+    """Return the view of a text like ``"velocity/acceleration"``; a single word stands for both.
 
     Raises InvalidRequest for anything else.
 
@@ -128,7 +128,7 @@ _SEGMENT_S = 4.0
 _LEAST_SEGMENTS = 8
 """Least number of segments by default; a short record gets shorter segments."""
 _PROXY_SAMPLES = 4096
-"""Window length for computing overlap correlations, which do not depend on it."""
+"""Window length for computing overlap correlations; it does not change the result."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class FrequencyResponseRequest:
 
     @property
     def cuts_segments(self) -> bool:
-        """Whether it has options that only averages over segments support."""
+        """Whether the request sets options that apply only to averages over segments."""
         chosen = (self.resolution_hz, self.segment_s, self.averages)
         return any(each is not None for each in chosen) or (self.window, self.overlap) != (
             FrequencyResponseRequest.window,
@@ -221,8 +221,8 @@ class FrequencyResponseRequest:
 def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
     """Return the longest segment that still leaves this many independent averages of a whole record.
 
-    K segments count as at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
-    K segments of N / (1 + (K - 1) (1 - overlap)).
+    K segments count as at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples contain K
+    segments of N / (1 + (K - 1) (1 - overlap)).
     """
     values = taper(window, _PROXY_SAMPLES)
     hop = hop_samples(_PROXY_SAMPLES, overlap)

@@ -24,7 +24,7 @@ from .results import FrequencyResponse
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within this many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
-"""Least number of lines of a fit: sixteen real values for two pole and at most ten linear parameters."""
+"""Least number of lines of a fit: 16 real values for 2 pole parameters and at most 10 linear ones."""
 _LEAST_RISE = 3.0
 """Least height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3
@@ -32,14 +32,14 @@ _MOST_MODES = 3
 _APART = (0.5, 1.5)
 """Initial spacing of poles side by side, in half widths."""
 _LEAST_GAIN = 25.0
-"""Least reduction of chi square by one more mode with four parameters; by chance it exceeds 19 once in a
-thousand cases."""
+"""Least reduction of chi square that justifies another mode (four parameters). By chance it exceeds 19 once
+in a thousand cases."""
 _REACH_DAMPING = 4.0
 """Largest change of ln(damping ratio) in a fit."""
 _USUAL_HZ = 300.0
 """Reference frequency that scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
-"""Accept an unresolved peak only if line or damping is known to 10 %; otherwise it may be a ripple."""
+"""Accept an unresolved peak only if its line or damping is known to 10 %; otherwise it may be a ripple."""
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Degrees of the background, tried in turn; near broad peaks a straight line is not enough."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
@@ -53,10 +53,10 @@ def resonances(
 
     Each significant peak is fitted, weighted by the standard deviations, with
     H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on a
-    background of its neighbours, which is a straight line or at most a cubic. The pole is
-    found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise
-    explains are left out. Then all modes are fitted together. That fit is used if it explains the whole
-    band, since no polynomial describes a neighbour exactly.
+    background of degree 1 to 3 from the neighbouring modes. The pole is found by variable projection (Golub &
+    Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise explains are left out. Then all modes
+    are fitted together. The joint fit is used if it explains the whole band, because a polynomial describes
+    neighbouring modes only approximately.
 
     Raises InvalidRequest when fewer than eight lines lie in the band.
     """
@@ -81,15 +81,15 @@ def scattered_resonances(
     """Widen the uncertainties of resonances by Tukey's jackknife over realisations.
 
     With collisions, each realisation shifts all lines about a resonance together, so a fit of independent
-    lines is overconfident (Miller 1974, Biometrika 61, 1-15). A resonance that depends on one realisation
-    is dropped.
+    lines is overconfident (Miller 1974, Biometrika 61, 1-15). A resonance is dropped if fewer than two
+    subsets show it.
 
     Parameters
     ----------
     found
         Resonances from all realisations.
     without
-        Resonances without each of the realisations in turn.
+        Resonances of each subset, which leaves out one realisation.
     """
     widened = []
     for each in found:
@@ -112,7 +112,7 @@ def scattered_resonances(
 
 
 def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
-    """Return the largest standard deviation: of the fit, by realisations, or by the choice of fit.
+    """Return the largest standard deviation: from the fit, the realisations or the choice of fit.
 
     Joint and single fits differ more than realisations do, so the jackknife compares only fits over similar
     numbers of lines.
@@ -127,7 +127,7 @@ def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, real
 
 
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
-    """Return the lines of peaks, and their half-power widths in lines."""
+    """Return the line and the half-power half width [lines] of each significant peak."""
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
     size = _smooth(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
@@ -136,7 +136,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
         width = _half_power_lines(size, int(line))
-        # Peaks as wide as the band are fitted with the same lines, so one is enough.
+        # Peaks as wide as the band would all be fitted to the same lines, so keep only the largest.
         is_wide = 2 * width >= size.size - 1 and line != np.argmax(size)
         if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line] and not is_wide:
             result.append((int(line), width))
@@ -144,7 +144,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
 
 
 def _smooth(size: Reals, spread: Reals) -> Reals:
-    """Smooth over enough lines for typical noise below 1 %; a noise-free curve stays unchanged."""
+    """Average ln(magnitude) over up to 9 lines to reduce scatter to about 2 %; small scatter is kept."""
     lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
     if lines <= 1:
         return size
@@ -153,7 +153,7 @@ def _smooth(size: Reals, spread: Reals) -> Reals:
 
 
 def _half_power_lines(size: Reals, line: int) -> int:
-    """Return the lines from the peak to the nearer -3 dB point."""
+    """Return the number of lines from the peak to the nearer -3 dB point."""
     level = size[line] - 0.5 * np.log(2)
     below = np.flatnonzero(size < level)
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
@@ -211,7 +211,7 @@ def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
 
 
 def _is_determined(found: Resonance, lines: Lines) -> bool:
-    """Return whether lines determine a mode: inside the band, damping above zero, no ripple of noise."""
+    """Return whether the lines determine a mode: in the band, damping known, and not a ripple of noise."""
     natural_hz, damping = found.frequency_hz, found.damping_ratio
     first_hz, last_hz = lines.frequency_hz[[0, -1]]
     if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:
@@ -226,7 +226,7 @@ def _is_determined(found: Resonance, lines: Lines) -> bool:
 
 
 def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...]) -> tuple[Resonance, ...]:
-    """Fit again over the fitted bandwidth, since the first width came from single noisy lines."""
+    """Fit a peak again over its fitted bandwidth, since the first width came from single noisy lines."""
     if not first:
         return ()
     (one,) = first
@@ -237,11 +237,11 @@ def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...
 
 
 def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
-    """Fit all modes of a band at once, starting from the single fits, which are kept if this fails.
+    """Fit all modes of a band together, from the single fits; return the single fits if this fails.
 
     H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
-    exact for a linear specimen with any damping. If these modes do not explain the band, the one with the
-    largest residual is split in two. With impacts no modes explain it.
+    exact for a linear specimen with any damping. If these modes do not explain the band, the mode with the
+    largest residual is split in two. With impacts, no set of modes explains the band.
     """
     if not found:
         return ()

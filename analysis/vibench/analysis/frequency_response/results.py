@@ -42,12 +42,12 @@ class FrequencyResponseSettings:
     confidence: float
     """Probability that the bounds of a line contain the true value."""
     noise_ratio: float | None = None
-    """S_nn / S_mm for hv."""
+    """For hv: noise density of the response over noise density of the drive."""
     delay_s: float = 0.0
-    """Delay of the response channel behind the drive channel, removed from the phase."""
+    """Delay of the response channel behind the drive channel [s], removed from the phase."""
     decay_per_s: float | None = None
-    """Decay of the exponential window over hits [1/s], 0 without one; None for noise. Resonances are free of
-    its damping, lines are not."""
+    """Decay of the exponential window for hits [1/s], 0 without a window; None for noise. Its damping is
+    removed from resonances, but not from lines."""
 
     @property
     def segment_s(self) -> float:
@@ -69,7 +69,7 @@ class FrequencyResponse(Labelled):
     coherence: Reals
     """Squared coherence between drive and response, 0 to 1."""
     n_eff: float
-    """Independent averages of every line."""
+    """Number of independent averages of every line."""
     relative_sd_magnitude: Reals
     """Standard deviation of ln(magnitude)."""
     sd_phase_rad: Reals
@@ -77,7 +77,7 @@ class FrequencyResponse(Labelled):
     half_width: Reals
     """Relative half width of the bounds."""
     coherence_significance: float
-    """Coherence below which independent noises stay with probability ``settings.confidence``."""
+    """Coherence that independent noises exceed with probability 1 - ``settings.confidence``."""
     resolution_hz: float
     """Noise bandwidth of a line, which smears finer features; zero for exactly periodic drive."""
     segments_used: int
@@ -86,7 +86,7 @@ class FrequencyResponse(Labelled):
     steady_relative_sd: Reals | None = None
     """`relative_sd_magnitude` smoothed over lines, for weights of a fit; None if not needed."""
     drive_slope_per_hz: Complexes | None = None
-    """Relative slope of the density that weights the transmission within a line; None if flat."""
+    """Relative slope [1/Hz] of the density that weights the transmission within a line; None if flat."""
     reference_coherence: Reals | None = None
     """For the drive-referenced estimator: the lower of the reference's coherences with the two channels."""
 
@@ -167,7 +167,7 @@ def converted_frequency_response(
     drive: tuple[Quantity, Quantity],
     response: tuple[Quantity, Quantity],
 ) -> FrequencyResponse:
-    """Express a transmission in other quantities: each pair is (recorded, wanted).
+    """Convert a transmission to other quantities; each pair is (recorded, requested).
 
     Base acceleration to m0 velocity becomes displacement over displacement by
     ``drive=(ACCELERATION, DISPLACEMENT), response=(VELOCITY, DISPLACEMENT)``. Relative bounds and coherence

@@ -23,7 +23,7 @@ class ScanShape:
 
     frequency_hz: float
     values: Complexes
-    """In the quantities of the request, shape (points,)."""
+    """Transmission in the requested quantities, shape (points,)."""
     half_width: Reals
     """Relative half width of the bounds, shape (points,)."""
 
@@ -45,7 +45,7 @@ class ScanShape:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """The noise measurements of one plan, one for each point, by node."""
+    """The noise measurements of one plan, one for each point, sorted by node number."""
 
     analyses: tuple[NoiseAnalysis, ...]
 
@@ -61,7 +61,7 @@ class Scan:
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """Number of each point; its place where an imported recording states none."""
+        """Node number of each point; its position in the scan if an imported recording has no number."""
         return tuple(each.node or place for place, each in enumerate(self.points, start=1))
 
     @property
@@ -80,7 +80,7 @@ class Scan:
 
 
 def scans_of(analyses: Sequence[NoiseAnalysis]) -> Iterator[Scan]:
-    """Yield the scans among noise measurements, which are given in the order of their start.
+    """Yield the scans among noise measurements, given in the order of their start.
 
     A later attempt at a recording replaces the earlier one. Repeated recordings are separate scans.
     """

@@ -27,10 +27,10 @@ _FAINT = 1e-12
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
     """Return the standard deviation of ln(magnitude) for weighting lines in a fit.
 
-    From two realisations, the estimate of one line can be 100 times too small, so that a few lines would
-    dominate a fit. Instead, the noise levels are taken as smooth over neighbouring lines: y - H x has the
-    variance a + b |H|^2 + c |dH|^2 from both sensors and, with the step dH between lines, leakage. The
-    levels a, b and c have maximum likelihood for chi-square distributed variances.
+    With two realisations, the estimate of one line can be 100 times too small, and a few lines would dominate
+    a fit. Instead, noise levels are assumed smooth over neighbouring lines. y - H x has the variance
+    a + b |H|^2 + c |dH|^2: a and b from the sensors, c from leakage, with the step dH between lines. The
+    levels are maximum likelihood estimates for chi-square distributed variances.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
 
 
 def _sizes(variance: Reals, shapes: Reals) -> Reals:
-    """Return the non-negative sizes of each shape in rows of variances, shape (shapes, rows).
+    """Return the non-negative factors of the shapes that fit each row of variances, shape (shapes, rows).
 
     Fevotte, Bertin and Durrieu 2009 (Neural Comput. 21, 793-830): each update increases the likelihood of
     chi-square distributed values.
@@ -85,7 +85,7 @@ def _sizes(variance: Reals, shapes: Reals) -> Reals:
 
 
 def estimator_by_name(estimator: Estimator | str) -> Estimator:
-    """Return the estimator of a name; raises InvalidRequest for unknown names."""
+    """Return the estimator with this name; raises InvalidRequest for unknown names."""
     try:
         return Estimator(estimator)
     except ValueError as unknown:
@@ -114,8 +114,8 @@ def h2(s_yy: Reals, s_xy: Complexes) -> Complexes:
 def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complexes:
     """Return the total least squares estimate for r = S_nn / S_mm, response noise over drive noise.
 
-    [S_yy - r S_xx + sqrt((S_yy - r S_xx)^2 + 4 r |S_xy|^2)] / (2 conj(S_xy)); r to infinity is h1, r = 0
-    is h2. r is in the units of the channels; without it, the result would depend on these units.
+    [S_yy - r S_xx + sqrt((S_yy - r S_xx)^2 + 4 r |S_xy|^2)] / (2 conj(S_xy)); r to infinity is h1, r = 0 is
+    h2. r is needed because the result would otherwise depend on the units of the channels.
     """
     difference = s_yy - noise_ratio * s_xx
     root = np.sqrt(difference**2 + 4 * noise_ratio * np.abs(s_xy) ** 2)
@@ -133,10 +133,10 @@ def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complex
 def least_squares(
     estimator: Estimator, s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float | None
 ) -> Complexes:
-    """Return h1, h2 or hv by name.
+    """Return the estimate h1, h2 or hv, as selected by ``estimator``.
 
     Raises InvalidRequest for the drive-referenced estimator, which needs a third channel, and for hv without
-    its ratio.
+    a noise ratio.
     """
     match estimator, noise_ratio:
         case Estimator.H1, _:
@@ -154,8 +154,8 @@ def least_squares(
 def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: float) -> Reals:
     """Return the relative standard deviation of the drive-referenced estimate.
 
-    Var(H) = S_vv S_rr / (n |S_rx|^2) with the residual v = y - H x (instrumental variables; Wellstead
-    1981, Automatica 17, 669-673), half of it in each of magnitude and phase.
+    Var(H) = S_vv S_rr / (n |S_rx|^2) with the residual v = y - H x (instrumental variables; Wellstead 1981,
+    Automatica 17, 669-673). ln(magnitude) and phase have half of it each.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ _ROWS = ("drive", "response", "reference")
 
 
 class FrequencyResponseSums:
-    """Sums for the transmission of a long record that arrives in blocks, in constant memory.
+    """Averages for the transmission of a record that arrives in blocks, in constant memory.
 
     Blocks have the rows drive, response and, for the
     drive-referenced estimator, reference.
@@ -234,7 +234,7 @@ class FrequencyResponseSums:
         return self.by(self._settings.estimator, self._settings.noise_ratio)
 
     def by(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
-        """Return another estimate from the same averages; errors as in `transmissibility`."""
+        """Return the transmission by another estimator; raises the same errors as `transmissibility`."""
         settings = replace(self._settings, estimator=estimator, noise_ratio=noise_ratio)
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
@@ -274,7 +274,7 @@ def transmissibility(
     sample_rate_hz
         Samples per second [Hz].
     segment_samples
-        Samples per segment; a resonance needs a segment several times longer than its ring time.
+        Samples per segment; a resonance needs a segment several times longer than its decay time.
     window, overlap
         The window, and the overlap of segments as a fraction (scipy's ``noverlap`` is
         ``int(overlap * segment_samples)``).
@@ -285,7 +285,7 @@ def transmissibility(
     noise_ratio
         Noise density of y over that of x [(unit of y / unit of x)^2].
     valid
-        Validity of the samples; segments with invalid samples are left out and counted.
+        Flags of valid samples; segments with invalid samples are left out and counted.
     confidence
         Probability that the bounds of a line contain the true value.
 
@@ -380,11 +380,11 @@ def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexe
 
 
 def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSettings) -> Complexes:
-    """Return the relative change between lines of the density P that weights the estimate, (H P) / P.
+    """Return the relative change per line of the density P that weights H within a line.
 
-    The estimator weights lines by the drive and by its instrument: the reference, x for h1, y for h2, and
-    r x + H* y for hv with the noise ratio r. It is compared with the reference, or with x without one; both
-    are assumed flat.
+    P is the cross density of the drive x and the instrument: the reference, x for h1, y for h2, and
+    r x + H* y for hv with the noise ratio r. P is taken relative to the density of the reference, or of x if
+    there is no reference; both are assumed flat.
     """
     s_xx, s_yx = products[_DRIVE, _DRIVE], products[_RESPONSE, _DRIVE]
     level = products[-1, -1].real if len(products) > _REFERENCE else s_xx.real
