@@ -1,4 +1,4 @@
-"""Simulated draws of a recording: rig and specimen under its voltage, from slightly different starts."""
+"""Simulated draws of a recording: random runs of rig and specimen under its recorded voltage."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -42,7 +42,7 @@ _BLOCKS = 200
 _BAND = (0.2, 0.4)
 """Band relative to the sample rate that shows channel noise, without modes."""
 _ALIKE = 6.0
-"""Standard deviations of a block's power within which blocks have the same level."""
+"""Blocks whose power is within this many standard deviations of the lowest are equally quiet."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
 
 
 def _quiet(rms: list[float], length: int) -> float:
-    """Return the mean level of the quiet blocks; the quietest one alone is some per cent too low."""
+    """Return the rms noise over the quiet blocks; the quietest block alone is some per cent too low."""
     if not rms:
         return 0.0
     power = np.square(rms)
@@ -80,7 +80,7 @@ def _quiet(rms: list[float], length: int) -> float:
 
 
 def _white(samples: Reals) -> float:
-    """Return the rms of white noise from the density far above all motion; infinite across a hole."""
+    """Return the rms of the white noise, from the band above all modes; infinite if samples were lost."""
     if np.isnan(samples).any():
         return np.inf
     power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
@@ -90,11 +90,11 @@ def _white(samples: Reals) -> float:
 
 
 _HEARD_HZ = (100.0, 2000.0)
-"""Band in which noise of the drive shows in the base; above it, a table has further resonances."""
+"""Band in which drive noise is visible in the base motion; a table has further resonances above it [Hz]."""
 _MEDIAN_SD = 1.44
-"""Relative standard deviation of the median of N exponential values, times the root of N."""
+"""Relative standard deviation of the median of N exponential values, times sqrt(N)."""
 _HANN_LINES = 1.5
-"""Lines of a Hann-windowed spectrum per independent line."""
+"""Lines of a Hann-windowed spectrum per statistically independent line."""
 UNKNOWN_NOISE = (
     "The noise of the amplifier is unknown, because neither its voltage nor the silence of a bench check was "
     "recorded; limits of a weak motion may be too narrow"
@@ -103,7 +103,7 @@ UNKNOWN_NOISE = (
 
 @dataclass(frozen=True)
 class UnseenNoise:
-    """White noise that moves the table and is missing in the drive's channel, referred to that channel."""
+    """White noise that moves the table but is absent from the recorded voltage; referred to that voltage."""
 
     power: float = 0.0
     """Variance per sample [V²]."""
@@ -111,18 +111,18 @@ class UnseenNoise:
     """Standard deviation of this power [V²]."""
 
     def drawn(self, rng: np.random.Generator) -> float:
-        """Return a possible rms per sample [V]."""
+        """Return a random rms per sample, within the uncertainty [V]."""
         return float(np.sqrt(max(0.0, self.power + self.sd * rng.standard_normal()))) if self.sd else 0.0
 
 
 def unseen_noise(
     channels: RecordedChannels, rig: DrivenRig, noise: ChannelNoise
 ) -> tuple[UnseenNoise, ChannelNoise] | None:
-    """Return the noise of an amplifier whose output is not recorded; None if no silence shows it.
+    """Return the noise of an amplifier whose output is not recorded; None without enough silence.
 
     In silence, the motion under the recorded voltage is subtracted from the recorded base motion. The rest is
     noise of amplifier, converter and sensor. The median over lines ignores hum. The second result is the
-    channels' noise without that of the amplifier.
+    channel noise without the amplifier's contribution.
     """
     if rig.driven is Driven.AMPLIFIER:
         return UnseenNoise(), noise
@@ -148,7 +148,7 @@ def unseen_noise(
         return max(floor, noise.rms[BASE] ** 2 - passed_high * (recorded_v2 + unseen_v2))
 
     def excess(unseen_v2: float) -> float:
-        """Return the median of power over level, minus log 2: for the true noise, this is 0."""
+        """Return the median of power / level minus log 2; it is 0 for the true noise."""
         level = passed * (unseen_v2 + own_v2) + sensor(unseen_v2)
         return float(np.median(power / level) - np.log(2.0))
 
@@ -169,28 +169,28 @@ def _base_over_voltage(rig: DrivenRig, frequency_hz: Reals) -> Complexes:
 
 
 _FRAME_SAMPLES = 1 << 15
-"""Frame length in samples, 0.5 to 1 s, to separate the drive's lines from noise."""
+"""Frame length [samples], 0.5 to 1 s; long enough to resolve the drive's lines from noise."""
 _BATCH_FRAMES = 16
 """Frames per batch, about 10 MB."""
 _LEVEL_LINES = 256
 """Number of lines whose median is the noise level; a few lines of the drive hardly change it."""
 _SURELY = 20.0
-"""Power of a line relative to the noise level, which noise exceeds once in 5e8 lines."""
+"""Ratio of a line's power to the noise level that noise alone exceeds once in 5e8 lines."""
 
 
 class PlayedVoltage:
-    """A recorded voltage without converter noise, as far as possible.
+    """A recorded voltage, freed from converter noise as far as possible.
 
-    Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each frame
-    and line a Wiener filter keeps the likely part, and the uncertain rest is drawn at random. Draws scatter
-    by the uncertainty of the voltage, and their power excludes the converter noise.
+    Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each line of
+    each frame, a Wiener filter estimates the played part; the uncertain rest is drawn at random. Draws
+    scatter by the uncertainty of the voltage, and their power excludes the converter noise.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
         self._samples, self._own_v = volts.size, converter_rms_v
         self._hop = min(_FRAME_SAMPLES, max(4, volts.size // 2)) // 2
         self._frames = 1 - (-volts.size // self._hop)
-        """Number of frames, which overlap by half; the first and the last extend half a frame outside."""
+        """Number of frames, which overlap by half; the first and last extend half a frame beyond the ends."""
         self._window = np.hanning(2 * self._hop + 1)[:-1]
         self._likely: Samples = volts
         self._roots: list[Samples] = []
@@ -198,7 +198,7 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Return the likely voltage, and in batches the square root of the kept share of each line."""
+        """Return the filtered voltage, and per batch the square root of each line's kept share."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
         # Synthesis window, with which half-overlapping frames add up to the signal.
@@ -211,7 +211,7 @@ class PlayedVoltage:
             whole = np.concatenate([recorded[first:last], recorded[first + 1 : last + 1]], axis=1)
             lines = fft.rfft(whole * self._window)
             power = np.abs(lines) ** 2
-            # The median of exponentially distributed powers is log 2 of their mean.
+            # The median of exponentially distributed powers is log 2 times their mean.
             level = np.concatenate(
                 [
                     np.broadcast_to(np.median(each, axis=1, keepdims=True) / np.log(2.0), each.shape)
@@ -232,7 +232,7 @@ class PlayedVoltage:
         """Return a random voltage compatible with the recording, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._likely
-        # Unknown parts of frames are independent, so fading by the root of the window keeps the power.
+        # The random parts of frames are independent, so the root of the window preserves their power.
         fade = np.sqrt(self._window, dtype=np.float32)
         size = np.float32(self._own_v * np.sqrt(self._hop))
         roots = iter(self._roots)
@@ -248,7 +248,7 @@ class PlayedVoltage:
         return drawn
 
     def _joined(self, frames: Callable[[int, int], Samples]) -> Samples:
-        """Add half-overlapping frames; ``frames`` returns those of a batch."""
+        """Return the sum of half-overlapping frames; ``frames`` returns the frames of one batch."""
         hop = self._hop
         result = np.zeros((self._frames + 1, hop), np.float32)
         for first in range(0, self._frames, _BATCH_FRAMES):
@@ -260,25 +260,25 @@ class PlayedVoltage:
 
 
 DRAWS = 16
-"""Number of draws of a colliding motion, which determine its 95 % band to a fifth of its width."""
+"""Number of draws of a colliding motion; they determine its 95 % band to a fifth of its width."""
 FIRST_DRAWS = 8
-"""Number of draws that is enough for clear agreement or without collisions."""
+"""Number of draws made first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
-"""Number of draws between two checks of whether there are enough."""
+"""Number of draws added before the next check of whether they are enough."""
 START_M = 5e-9
 """Standard deviation of each mass's initial position."""
 CLOCK_TOLERANCE = 50e-6
 """Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
-"""Lead-in before a stretch, its fade-in, and the faded tail after the stretch [s]."""
+"""Lead-in before a stretch, fade-in at its start, and faded tail after the stretch [s]."""
 _NOISE = 0.15
-"""Logarithmic uncertainty of a channel's noise from its quietest stretch."""
+"""Uncertainty (± natural logarithm) of a channel's noise taken from its quietest stretch."""
 _MORE = 3
 _SEED = 17
 _BLOCK = 1 << 17
 """Samples per block of added noise."""
 _MOST_BYTES = 0.35e9
-"""Memory for the running draws."""
+"""Memory for draws that run in parallel [bytes]."""
 _BYTES_PER_SAMPLE = 16
 
 
@@ -295,7 +295,7 @@ class SimulatedRun:
     specimen: Specimen
     driven: Driven
     accuracy: Accuracy
-    """Accuracy of contacts under a recorded base motion; standard under a voltage."""
+    """Accuracy of simulated contacts under a recorded base motion; always standard under a voltage."""
     base_band_hz: tuple[float, float] | None
     """Band of the driving base displacement; None under a voltage."""
     why: str = ""
@@ -307,7 +307,7 @@ class SimulatedRun:
 
     @property
     def smaller_gap_m(self) -> float:
-        """Smaller gap of both sides."""
+        """Smaller gap of the two sides [m]."""
         return min(self.specimen.gaps_m)
 
     @property
@@ -321,7 +321,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, eq=False)
 class Draw(Generic[R]):
-    """One draw, analysed like the recording."""
+    """One simulated run with random start and noise, analysed like the recording."""
 
     response: Callable[[], R]
     """Function that completes the estimate; comparisons need only the quantities."""
@@ -333,7 +333,7 @@ class Draw(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class Drawn(Generic[R]):
-    """All draws: the estimate of the first, and the compared quantities of the others."""
+    """All draws: the full estimate of the first, and the compared quantities of each."""
 
     run: SimulatedRun
     response: R
@@ -343,7 +343,7 @@ class Drawn(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class DrawSource:
-    """Source of draws, reproducible by number."""
+    """Source of draws; the same number always gives the same draw."""
 
     run: SimulatedRun
     """Facts of the simulation before the first draw."""
@@ -358,16 +358,16 @@ def voltage_source(
     fitted: FittedShaker | None = None,
     draws: int = DRAWS,
 ) -> DrawSource:
-    """Return draws of rig and specimen under the recorded voltage.
+    """Return a source of draws of rig and specimen under the recorded voltage.
 
-    Raises UnusableData when samples were lost, or nothing is known of the shaker.
+    Raises UnusableData when samples were lost or the shaker is unknown.
 
     Parameters
     ----------
     recording
         Recording; its bench configuration describes the rig.
     fitted
-        A shaker instead of the described one; each draw varies it within its uncertainty.
+        A shaker to use instead of the described one; each draw varies it within its uncertainty.
     draws
         Maximum number of draws.
     """
@@ -387,7 +387,7 @@ def voltage_source(
 def base_source(
     recording: Recording, measurement: Measurement, specimen: Specimen, accuracy: Accuracy, why: str = ""
 ) -> DrawSource:
-    """Return one draw of the specimen under the recorded base motion, for linear and coherent motion."""
+    """Return a source of one draw under the recorded base motion, for linear and coherent motion."""
     channels = under_base_motion(recording, measurement, specimen, accuracy)
     rate = recording.sample_rate_hz
     band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
@@ -398,9 +398,9 @@ def base_source(
 def drawn(
     source: DrawSource, estimate: Callable[[SimulatedChannels], Draw[R]], measured: Sequence[Quantity]
 ) -> Drawn[R]:
-    """Analyse every draw like the recording.
+    """Return all draws of a source, each analysed like the recording.
 
-    Fewer draws are made if the first ones agree clearly, and up to three times as many if few have the
+    Fewer draws are made if the first ones agree clearly. Up to three times as many are made if few show the
     ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
     """
     responses: list[R] = []
@@ -409,7 +409,7 @@ def drawn(
 
     def estimated(number: int) -> Draw[None]:
         channels = source.channels(number)
-        # One at a time: an estimate is at most half of the work, and takes twice the memory of a simulation.
+        # One at a time: an estimate is at most half of the work but takes twice the memory of a simulation.
         with estimating:
             draw = estimate(channels)
             if number == 0:
@@ -492,7 +492,7 @@ def _with_noise(samples: Samples, role: str, rms: float, rate_hz: float, rng: np
 
 @dataclass(frozen=True, eq=False)
 class StretchDraws:
-    """Draws of a stretch of a recording with given specimens, for statistics of irregular motion.
+    """Simulated draws of part of a recording with given specimens, for statistics of irregular motion.
 
     A run starts from rest half a second before the stretch, with the recorded voltage faded in.
     """
@@ -504,13 +504,13 @@ class StretchDraws:
     volts: Reals
     """Recorded voltage without the noise of its channel."""
     first: int
-    """Index in the recording of the first of ``volts``."""
+    """Index in the recording of the first sample of ``volts``."""
     kept: slice
-    """The stretch within ``volts``."""
+    """Slice of ``volts`` that contains the stretch."""
 
     @property
     def measured(self) -> Reals:
-        """Return base acceleration and m0's velocity of the recording over the samples of a draw."""
+        """Recorded base acceleration and velocity of m0 over the samples of a draw, shape (2, samples)."""
         start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
         velocity = BridgedChannel(self.recording, VELOCITY).read(start, stop)
         return np.stack([self.recording.read(BASE, start, stop), velocity])
@@ -538,9 +538,9 @@ class StretchDraws:
 def stretch_draws(
     recording: Recording, specimen: Specimen, start: int, stop: int, fitted: FittedShaker | None = None
 ) -> StretchDraws:
-    """Return draws of rig and specimens under the recorded voltage of samples ``start`` to ``stop``.
+    """Return a source of draws under the recorded voltage from sample ``start`` to ``stop``.
 
-    At the end of the recording the stretch ends slightly earlier.
+    Near the end of the recording, the stretch is shortened to leave 50 ms for the fade-out.
 
     Raises UnusableData when samples were lost, the shaker is unknown, or m0's channel is not a velocity:
     the noise of an integrated channel is not white.
@@ -559,7 +559,7 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, VELOCITY))
-    # Noise of this channel would drive the simulation, so only lines far above it are played.
+    # The channel's own noise would drive the simulation, so only lines far above it are played.
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0
     played = np.asarray(np.fft.irfft(spectrum, volts.size))

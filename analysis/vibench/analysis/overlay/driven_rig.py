@@ -19,11 +19,11 @@ from ..recordings.response import ResponseChannel
 from ..signals.arrays import Complexes, Reals
 
 AMPLIFIER = "amplifier_voltage"
-"""Role of the channel that shows the amplifier's output."""
+"""Role of the channel that records the amplifier's output."""
 
 
 class Driven(StrEnum):
-    """Drive of the simulated specimen."""
+    """What drives the simulated specimen."""
 
     AMPLIFIER = "recorded amplifier voltage"
     GENERATOR = "recorded generator voltage"
@@ -31,7 +31,7 @@ class Driven(StrEnum):
 
     @property
     def by_voltage(self) -> bool:
-        """Whether the table is simulated too, with the reaction of the specimen."""
+        """Whether the table is simulated too, loaded by the specimen."""
         return self is not Driven.BASE
 
 
@@ -44,22 +44,22 @@ class DrivenRig:
     role: str
     """Role of the voltage channel."""
     response: str
-    """Role of the channel that shows m0."""
+    """Role of the channel that measures m0."""
 
 
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
     """Return the rig under the recorded voltage.
 
-    Raises UnusableData when the recording does not name its shaker or amplifier, or does not show m0.
+    Raises UnusableData when the recording does not describe its shaker or amplifier, or does not measure m0.
 
     Parameters
     ----------
     recording
-        Recording of the amplifier's output; without it, the generator's is used.
+        Recording; its amplifier voltage is used or, if not recorded, its generator voltage.
     specimen
         Specimen on the table.
     shaker
-        Fitted parameters; by default those of the bench configuration.
+        Fitted shaker; by default the shaker of the bench configuration.
     """
     response = ResponseChannel(recording).role
     rig = _configured(recording)

@@ -1,6 +1,6 @@
-"""Compare a measurement with the draws of its twin: bands, ranks and z, corrected for multiple comparisons.
+"""Compare a measurement with simulated draws: bands, ranks and z, corrected for multiple comparisons.
 
-In chaos a measurement and its simulation are two draws of one distribution. The test is whether the
+In chaos, a measurement and its simulation are two draws from one distribution. The test is whether the
 measurement could be another draw.
 """
 
@@ -16,40 +16,40 @@ from ..signals.arrays import Flags, Integers, Reals
 from ..tables import Labelled
 
 AGREEMENT = 0.99
-"""Share of agreeing twins with all values within the limit, for any number of values."""
+"""Probability that all values of a correct simulation are within the limit, for any number of values."""
 BAND = 0.95
 MIXED = -1
-"""State of a value with a mixture of motions, which is not compared."""
+"""State of a value that mixes two kinds of motion; it is not compared."""
 FEWEST_DRAWS = 5
-"""Fewest draws of one kind of motion for a comparison."""
+"""Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the normal limit; if values are within it after half of the draws, more draws change nothing."""
+"""Share of the normal limit; if all values are within it after half of the draws, more change nothing."""
 _FEWEST_POINTS = 30
-"""Fewest values of a draw for which the largest |z| follows Gumbel's distribution."""
+"""Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """Positive values of one kind, from one estimate; arrays of shape (points,)."""
+    """Positive values of one physical quantity, from one analysis; arrays of shape (points,)."""
 
     name: str
     """Name, such as ``"Response II"`` or ``"band around 201 Hz"``."""
     frequency_hz: Reals
     value: Reals
-    """Values, NaN where there is none."""
+    """Values; NaN where missing."""
     state: Integers | None = None
     """Kind of motion (colliding or not), if there are several; only equal kinds are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleCurve(Labelled):
-    """One quantity, measured and in every draw.
+    """One quantity as measured and in every draw.
 
-    Square roots are compared, because they are nearly normal both for accurate magnitudes and for random
-    ones (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
+    Square roots are compared because they are nearly normal, both for accurate and for random magnitudes
+    (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
 
-    The limit accounts for the number of frequencies (Sidak 1967), few draws (Student's t), and long tails
-    (each draw among the others). 1 % of agreeing twins exceed it.
+    The limit of |z| accounts for the number of frequencies (Sidak 1967), few draws (Student's t), and long
+    tails (each draw compared with the others). 1 % of correct simulations exceed it.
     """
 
     DOCUMENT: ClassVar = (
@@ -82,7 +82,7 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def upper(self) -> Reals:
-        """Upper end of this band."""
+        """Upper end of the band that contains 95 % of further draws; NaN below five draws."""
         return np.asarray((self._mean + self._reach) ** 2)
 
     @cached_property
@@ -99,7 +99,7 @@ class EnsembleCurve(Labelled):
     def z(self) -> Reals:
         """Measured value as an equivalent normal deviate, shape (points,); NaN if not compared.
 
-        Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)), at equal probability.
+        As probable as Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)).
         """
         with np.errstate(invalid="ignore"):
             found = _deviates(np.sqrt(self.measured), self._mean, self._sd, self.count)
@@ -112,7 +112,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def largest_z(self) -> float:
-        """The z furthest from zero; NaN without comparisons."""
+        """The z with the largest magnitude; NaN without comparisons."""
         z = self.z[np.isfinite(self.z)]
         return float(z[np.argmax(np.abs(z))]) if z.size else np.nan
 
@@ -120,7 +120,7 @@ class EnsembleCurve(Labelled):
     def limit(self) -> float:
         """Largest |z| that is compatible with chance among the compared points.
 
-        This is the limit of normal values, or that of another draw if the draws have longer tails.
+        This is the limit for normal values, or a larger one if the draws have longer tails.
         """
         normal = z_limit(self.compared)
         own = np.abs(self._z_of_draws[:, self._is_compared])
@@ -136,7 +136,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def agrees(self) -> bool:
-        """Whether the measured values could be another draw."""
+        """Whether the measurement could be another draw."""
         return self.outside == 0
 
     @property
@@ -179,7 +179,7 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def _z_of_draws(self) -> Reals:
-        """Z score of each draw among the others, shape (draws, points); NaN for too few draws."""
+        """Value z of each draw relative to the other draws, shape (draws, points); NaN for too few draws."""
         left = self.count - 1
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -217,7 +217,7 @@ class EnsembleCurve(Labelled):
 
 
 def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
-    """Student's t of one more draw, as a normal deviate; limited at a probability of 1e-300."""
+    """Return Student's t of one more draw as a normal deviate; its probability is at least 1e-300."""
     with np.errstate(invalid="ignore", divide="ignore"):
         deviate = (roots - mean) / (sd * np.sqrt(1 + 1 / np.maximum(count, 1)))
         tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(count - 1, 1))
@@ -227,9 +227,9 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
 def largest_of_chance(largest: Reals) -> float:
     """Return the limit that the largest |z| of another draw does not exceed in 99 % of cases.
 
-    ``largest`` has the largest |z| of five or more draws. The quantile of a Gumbel distribution with their
-    mean and deviation is widened, because few draws determine these poorly: otherwise 2 % of further draws
-    exceed the limit with 16 draws, 5 % with five. The factor was fitted to simulated draws.
+    ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
+    distribution with their mean and deviation. It is widened, because few draws determine these poorly:
+    otherwise 2 % of draws exceed it with 16 draws, 5 % with five. The factor is fitted to simulation.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
@@ -237,7 +237,7 @@ def largest_of_chance(largest: Reals) -> float:
 
 
 def z_limit(values: int) -> float:
-    """Return the limit that none of this many independent normal deviates exceeds in 99 % of cases."""
+    """Return the |z| that none of ``values`` independent normal deviates exceeds in 99 % of cases."""
     return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
 
 
@@ -254,7 +254,7 @@ def ensemble_curves(
 
 
 def _alike(measured: Quantity, drawn: Quantity) -> Reals:
-    """Return a draw's values where its kind of motion is the measured one, at equal points."""
+    """Return a draw's values; NaN where its points or its kind of motion differ from the measured ones."""
     if drawn.value.shape != measured.value.shape:
         return np.full(measured.value.shape, np.nan)
     if measured.state is None or drawn.state is None:
@@ -284,10 +284,10 @@ class CurveDifference(Labelled):
     frequency_hz: Reals
     decibel: Reals
     standard_errors: Reals
-    """ln(measured / simulated) over the standard deviation of both; infinite if both are zero."""
+    """ln(measured / simulated) over the combined standard deviation; infinite if that is zero."""
 
     def where(self, kept: Flags) -> "CurveDifference":
-        """Return some of the points."""
+        """Return the difference at the points flagged by ``kept``."""
         return CurveDifference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
 
     @property
@@ -323,12 +323,12 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If all runs stop within this time, they stop at one edge, such as the end of the record."""
+"""If all runs stop within this time, the cause is common, such as the end of the record [s]."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """One run of a motion: the time from which it could end, and its end or that of the record."""
+    """One run of a motion: its earliest possible end, and its actual end or the end of the record."""
 
     what: str
     """Kind of motion: ``"collisions"`` or ``"irregular motion"``."""
@@ -353,15 +353,15 @@ class EscapeRate:
     ends: int
     measured: Ending
     exposure_s: float
-    """Time during which an end was counted, over all runs."""
+    """Total time of all runs in which an end was counted [s]."""
     events: int
-    """Number of counted ends, without the one that starts the counted time."""
+    """Number of counted ends, without the end at ``from_s``."""
     from_s: float
-    """Start of the counted time."""
+    """Time of the first end in any run, from which ends are counted [s]."""
 
     @property
     def per_s(self) -> float:
-        """Ends over exposure, the most likely rate."""
+        """Most likely rate: events divided by exposure [1/s]."""
         return self.events / self.exposure_s
 
     @property
@@ -383,7 +383,7 @@ class EscapeRate:
 
 
 def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -> EscapeRate | None:
-    """Return the rate from the measured run and its draws; None if none ended or all stop at one edge."""
+    """Return the rate from the measured run and its draws; None if no run ended or all stop together."""
     if not measured:
         return None
     mine = measured[0]

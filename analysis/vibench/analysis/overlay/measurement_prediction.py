@@ -14,12 +14,12 @@ from .overlay import prediction_grid
 from .prediction import ResponsePrediction, predict
 
 MOST_POINTS = 60
-"""Number of simulated frequencies, some seconds of work."""
+"""Maximum number of simulated frequencies; they take some seconds."""
 SIMULATED_S = 6.0
 """Duration from rest at each frequency; the transient decays to 0.1 % in half of it."""
 FOLLOWED_POINTS = 200
 FOLLOWED_S = 2.0
-"""Number of steps to follow a sweep, small enough to disturb little, and time per step [s]."""
+"""Number of frequency steps that follow a sweep (small steps disturb little), and time per step [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class MeasurementPrediction(Labelled):
     basis: str
     """Source of the base amplitude."""
     approach: Approach
-    """Start of each simulated point."""
+    """Start of each simulated point: at rest, or in the final state of the previous point."""
     specimen_name: str
     """Name of the specimen in the rig's configuration."""
 

@@ -1,4 +1,4 @@
-"""Overlay of a simulation on a measurement: draws with the same estimator, and agreement."""
+"""Overlay a simulation on a measurement: draws analysed by the same estimator, and their agreement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -61,11 +61,11 @@ class AbstractOverlay(Labelled, Generic[R]):
     ensemble: tuple[EnsembleCurve, ...]
     """Every compared quantity, measured and in all draws, with bands if there are enough draws."""
     escape: EscapeRate | None
-    """Rate at which the motion ends, if that is random."""
+    """Rate at which the motion ends, if its end is random."""
     difference: CurveDifference
     """Ratio of the measured transmission or Response II to the median of all draws."""
     prediction: ResponsePrediction
-    """Prediction under sines of the measured A0."""
+    """Predicted response to sines of the measured base amplitude A0."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
@@ -93,7 +93,7 @@ class NoiseOverlay(AbstractOverlay[NoiseResponse]):
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} resonances=response.resonances"
 
     amplitude_basis: str
-    """Source of the sines' A0."""
+    """Source of the base amplitude A0 of the predicted sines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
-    """Displacement and levels of the terminal bands, both of the first draw."""
+    """Levels of the terminal bands; like the displacement, of the first draw."""
     spectrum: EnsembleCurve
     """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
 
@@ -152,7 +152,7 @@ def _difference(
 
 
 def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
-    """Return the quantities of noise that are compared with draws."""
+    """Return the quantities of a noise measurement that are compared with draws."""
     return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
 
 
@@ -217,9 +217,9 @@ _EDGE_S = 1.0
 
 
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
-    """Return the quantities of a sweep that are compared with draws where both collide or neither does.
+    """Return the quantities of a sweep that are compared with draws.
 
-    Intervals within a second of an edge are left out, because they contain both motions.
+    Points are compared where both collide or neither does. Within a second of an edge, motions are mixed.
     """
     state = found.is_colliding.astype(np.int64)
     reach = max(1, round(_EDGE_S / response.interval_s))
@@ -260,7 +260,7 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOv
 
 
 _LEAST_BAND = 1e-3
-"""Level of a band relative to the drive's line below which it is noise of generator and amplifier."""
+"""Band level relative to the drive's line; lower levels are noise of generator and amplifier."""
 
 
 def dwell_quantities(
@@ -336,7 +336,7 @@ def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]
 
 
 class Simulation(StrEnum):
-    """Comparison of measurements with the model, and the drive of the model."""
+    """How a measurement is simulated: excitation of the model, or no simulation."""
 
     UNDER_VOLTAGE = "rig and specimen under the recorded voltage"
     """Rig and specimen under the recorded voltage, or base motion for an unknown shaker."""

@@ -29,7 +29,7 @@ PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
 """Resonances with m1 bound to m2; from the same section of the paper."""
 PREDICTION_S = 8.0
 WINDOW_S = 5.0
-"""Settling time 3 s, which reduces the slowest transient to 3e-5, and 5 s of observation as in the paper."""
+"""Total and observed time [s]: 3 s settling (slowest transient falls to 3e-5), 5 s as in the paper."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class ResponsePrediction(Labelled):
     """NaN if the simulation did not finish."""
     response_ii: Reals
     linear: Reals
-    """|x / U| without contact."""
+    """|x / U| of the linear model, without contact."""
     impacts: Integers
     """Number of impacts within the window."""
     accuracy: Accuracy
@@ -75,8 +75,8 @@ def predict(
     amplitude_m
         A0, one for all points or one each [m].
     accuracy
-        Quick by default: Response I in chaos scatters by more than any accuracy removes, and flight is
-        exact at every level.
+        Quick by default: in chaos, Response I scatters by more than any accuracy level removes, and free
+        flight is exact at every level.
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
@@ -114,9 +114,9 @@ def _follow_points(
     drives: Sequence[Harmonic],
     duration_s: float,
 ) -> Iterator[Response]:
-    """Start each point in the final state of the last one, with continuous drive phase.
+    """Simulate each point from the final state of the previous one, with continuous drive phase.
 
-    The first starts from rest and has time to settle.
+    The first point starts from rest and has time to settle.
     """
     state, turns = None, 0.0
     for drive in drives:

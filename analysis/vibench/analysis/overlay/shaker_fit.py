@@ -25,7 +25,7 @@ FEWEST_LINES = 30
 _TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
 """Start of the search: a small electrodynamic shaker."""
 _REACH = np.log(300.0)
-"""Largest deviation of each parameter from the typical one, as a natural logarithm."""
+"""Largest natural logarithm of the ratio of a parameter to its typical value."""
 _STARTS = 12
 _NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
 
@@ -71,7 +71,7 @@ def fit_shaker(
 ) -> FittedShaker:
     """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
 
-    The base's acceleration over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3),
+    The base's acceleration per voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3),
     where D(s) = k + d s + (m + M(s)) s^2 and M is the specimen's apparent mass. The search starts from
     the ``described`` shaker, else from several typical ones. Raises UnusableData when there are too few
     lines, or no shaker explains them.
@@ -131,7 +131,7 @@ def _shaker(logarithms: Reals) -> Shaker:
 
 @dataclass(frozen=True, eq=False)
 class _VoltageAndBase(RecordedChannels):
-    """Channels with the voltage as base and the base as m0, for the estimators of noise."""
+    """Channels with the voltage in place of the base, and the base in place of m0, for noise estimators."""
 
     role: str = field(kw_only=True)
 
@@ -150,7 +150,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return s times acceleration over voltage: estimators take these for a velocity and an acceleration."""
+    """Return s times base acceleration / voltage; estimators read these as velocity and acceleration."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     match analysis.excitation:

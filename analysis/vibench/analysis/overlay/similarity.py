@@ -17,7 +17,7 @@ CONFIDENCE = 0.95
 
 
 class LogarithmOf(StrEnum):
-    """Argument of the logarithm in eq. 6, which the paper does not state and the rates depend on."""
+    """Argument of the logarithm in eq. 6; the paper does not state it, but the rates depend on it."""
 
     NORMALISED = "normalised"
     """Response over drive amplitude, x / A0."""
@@ -53,7 +53,7 @@ class SimilarityCurve:
             )
 
     def at(self, frequency_hz: Reals) -> "SimilarityCurve":
-        """Interpolate the curve on logarithmic axes.
+        """Return the curve interpolated at these frequencies, on logarithmic axes.
 
         Raises InvalidRequest for frequencies outside the curve.
         """
@@ -79,7 +79,7 @@ class SimilarityCurve:
 
 @dataclass(frozen=True, eq=False)
 class Similarity(Labelled):
-    """Similarity of a model to the reference; arrays of shape (points,)."""
+    """Similarity of a model's response to the reference; arrays of shape (points,)."""
 
     frequency_hz: Reals
     difference: Reals
@@ -92,7 +92,7 @@ class Similarity(Labelled):
     high: float
     """95 % interval of the rate for other choices of frequencies in the same band."""
     block_points: int
-    """Block length of the bootstrap, because neighbouring points are correlated."""
+    """Block length of the bootstrap; blocks keep the correlation of neighbouring points."""
     left_out: int
     """Number of points without a value in either curve."""
 
@@ -112,13 +112,13 @@ def similarity(
 ) -> Similarity:
     """Compare a model's response curve with the reference's (Gong et al. 2025, eqs. 6 and 7).
 
-    Raises InvalidRequest when the frequencies differ, or a setting has no meaning; NotEnoughData when no
+    Raises InvalidRequest when the frequencies differ or the threshold is not positive; NotEnoughData when no
     point has a value in both curves.
 
     Parameters
     ----------
     reference, model
-        The piece-wise model (or a measurement) and its substitute, at the same frequencies;
+        Response of the piece-wise model (or a measurement) and of its substitute, at the same frequencies;
         `SimilarityCurve.at` interpolates.
     logarithm_of
         Unit in the logarithm, which the paper does not state. Where the reference is 1 in this unit, points

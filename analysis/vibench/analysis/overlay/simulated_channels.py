@@ -1,6 +1,6 @@
-"""Simulate the specimen under the recorded base motion, with the interface of a recording.
+"""Simulate the specimen under the recorded base motion; the result has the interface of a recording.
 
-The base displacement comes from its recorded acceleration.
+The base displacement is computed from the recorded acceleration.
 """
 
 from collections.abc import Callable
@@ -18,9 +18,9 @@ from ..signals.arrays import Complexes, Flags, Integers, Reals, Samples
 from ..signals.quantity import Quantity, converted_signal
 
 LOWEST_PART = 0.25
-"""High-pass relative to the lowest played frequency, against drift by double integration."""
+"""High-pass frequency relative to the lowest played frequency; prevents drift by double integration."""
 HIGHEST_PART = 0.33
-"""Low-pass relative to the sample rate, within the converter's pass band."""
+"""Low-pass frequency relative to the sample rate, within the converter's pass band."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class RecordedBaseMotion:
 
 
 def recorded_base_motion(recording: Recording, measurement: Measurement) -> RecordedBaseMotion:
-    """Integrate the recorded acceleration twice in the frequency domain.
+    """Return the base displacement: the recorded acceleration, integrated twice in the frequency domain.
 
     The whole recording is used, because it starts and ends in silence. Raises UnusableData when samples
     were lost.
@@ -74,7 +74,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
 
 
 def advance(samples: Reals, by_samples: float) -> Reals:
-    """Advance a signal by any number of samples, with the phase of its spectrum."""
+    """Return the signal advanced by any number of samples (also fractional), by the phase of its spectrum."""
     if by_samples == 0.0:
         return samples
     spectrum = np.fft.rfft(samples)
@@ -85,7 +85,7 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 _PIECE_S = 5.0
 """Length simulated at once, to bound memory [s]."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; the effect of a spline's ends falls to 0.27 with every sample."""
+"""Extra samples on each side of a piece; the end effect of a spline falls to 0.27 with every sample."""
 _VX = 3
 _STATE = 6
 
@@ -98,11 +98,11 @@ class SimulatedChannels:
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
-    """Times since the first sample [s], and number of contacts until then."""
+    """Times since the first sample [s], and number of contacts until each time."""
     response_delay_s: float
     """Lag of the response channel behind the base channel."""
     base_acceleration: Samples
-    """Acceleration of the simulated table, or the recorded one if that drove, shape (samples,) [m/s2]."""
+    """Acceleration of the simulated or recorded table that drove the specimen, shape (samples,) [m/s2]."""
     sensors: Callable[[Reals], Complexes]
     """Ratio of the response sensor's gain to the base sensor's, without their delays."""
 
@@ -123,7 +123,7 @@ class SimulatedChannels:
         return self.sensors(frequency_hz)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the named parts of the record."""
+        """Return the parts of the record named ``label``."""
         return self.recorded.stretches(label)
 
     def read(self, start: int, stop: int) -> Reals:
@@ -134,11 +134,11 @@ class SimulatedChannels:
         )
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Return where the recording was overloaded, so that both use the same samples."""
+        """Return where the recording was overloaded; measurement and simulation use the same samples."""
         return self.recorded.overloaded(start, stop)
 
     def bridged(self, start: int, stop: int) -> Flags:
-        """Return where the recording was bridged, so that both use the same samples."""
+        """Return where the recording was bridged; measurement and simulation use the same samples."""
         return self.recorded.bridged(start, stop)
 
     def played_impacts(self, label: str) -> tuple[float, float]:
