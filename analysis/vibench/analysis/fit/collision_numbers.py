@@ -1,6 +1,6 @@
 """Parameters from collisions: the gap of each side, m1, c1 and the contact law.
 
-They are found by tracking if possible, otherwise from statistics of chaos.
+These parameters are found by tracking a motion if possible, otherwise from statistics of chaos.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ from .statistical_numbers import statistical_numbers
 CALM, COLLIDING = 1.01, 1.05
 """Limits of Response I over Response II (1 for a sine): no collisions below, collisions above."""
 _LENGTH_S = 3.0
-"""Length of a tracked stretch [s], with four restarts."""
+"""Length of the tracked stretch [s]."""
 _MOST_RECORDINGS = 3
 _JUDGED = (
     Hidden.LOWER_GAP,
@@ -57,7 +57,7 @@ class CollisionNumbers:
     recording: str
     parameters: tuple[FoundParameter, ...]
     misfit: float
-    """Mean squared innovation of the track, or squared distance of the statistics; about 1."""
+    """Mean squared innovation of the track, or squared distance of the statistics; ideally about 1."""
 
     @property
     def determined(self) -> tuple[FoundParameter, ...]:
@@ -66,12 +66,12 @@ class CollisionNumbers:
 
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
-        """Lower and upper gap; empty unless both are determined."""
+        """Lower and upper gap; empty unless the motion determines both."""
         found = tuple(each for each in self.determined if each.what in _SIDES)
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
-        """Return the specimen with the determined gaps; if the mean gap is determined, the ratio is kept."""
+        """Return the specimen with the determined gaps; a mean gap scales both gaps and keeps their ratio."""
         mean = next((each for each in self.determined if each.what is Hidden.MEAN_GAP), None)
         if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
@@ -95,7 +95,7 @@ class CollisionNumbers:
 
     @property
     def contradicted(self) -> tuple[str, ...]:
-        """Texts on values that differ from the description by more than their bounds' width, worst first."""
+        """Parameters that differ from their description by more than their bounds' width, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
             for each in self.determined
@@ -106,16 +106,16 @@ class CollisionNumbers:
 
 
 def peakedness(dwell: DwellAnalysis) -> float:
-    """Return Response I over Response II, which is 1 for a sine; a known bias is subtracted."""
+    """Return Response I, less its known noise bias, over Response II; the ratio is 1 for a sine."""
     found = dwell.response
     lift = 0.0 if isnan(found.noise_bias_i) else found.noise_bias_i
     return (found.response_i - lift) / found.response_ii
 
 
 def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
-    """Track the colliding recordings; return the parameters of the one with the best gaps.
+    """Track colliding recordings; return the parameters of the recording with the narrowest gap bounds.
 
-    Returns the parameters and an empty text, or None and the reason.
+    The text is empty; if no recording can be tracked, None is returned with the reason.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -143,9 +143,9 @@ def numbers_from_statistics(
     linear: SpecimenFit | None,
     observer: Observer,
 ) -> tuple[CollisionNumbers | None, str]:
-    """Compare statistics of the best recording with those of simulated specimens.
+    """Return parameters from statistics of the first suitable recording, compared with simulated specimens.
 
-    Returns the parameters and an empty text, or None and the reason.
+    The text is empty; if no recording is suitable, None is returned with the reason.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
@@ -175,24 +175,24 @@ def _fit_shaker(recording: Recording, results: CampaignResults, specimen: Specim
 
 
 def _refusal(motion: HiddenMotion) -> str:
-    """Return the reason why the parameters of a motion are invalid, if there is one."""
+    """Return the reason why the gaps of a tracked motion are undetermined; empty if both are determined."""
     missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
     return missing[0].not_determined if missing else ""
 
 
 @dataclass(frozen=True)
 class _Colliding:
-    """A stretch of a recording with collisions."""
+    """Part of a recording with collisions."""
 
     name: str
     path: Path
     label: SegmentLabel
     middle: float
-    """Centre of the stretch within the longest segment of that name, 0 to 1."""
+    """Centre of the part within the longest segment with this label, 0 to 1."""
     drive_hz: float | None = None
 
     def within(self, recording: Recording) -> tuple[float, float]:
-        """Return start and end of the stretch [s]."""
+        """Return start and end of the part within the recording [s]."""
         rate = recording.sample_rate_hz
         start_s, stop_s = max(
             (
@@ -210,7 +210,7 @@ class _Colliding:
 
 
 def _colliding(results: CampaignResults) -> Iterator[_Colliding]:
-    """Yield colliding stretches: dwells first, since they are stationary, the strongest first."""
+    """Yield parts with collisions: dwells first because they are stationary, the strongest dwell first."""
     for dwell in sorted(results.dwells, key=lambda each: -each.analysis.excitation.amplitude_vpp):
         if peakedness(dwell.analysis) >= COLLIDING:
             facts, drive = dwell.analysis.facts, dwell.analysis.response.drive

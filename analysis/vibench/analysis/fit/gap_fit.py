@@ -1,4 +1,4 @@
-"""Fit of the gap to the onset of collisions, where the linear relative motion equals the gap."""
+"""Fit the gap to the onset of collisions, where the linear relative motion equals the gap."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,18 +22,18 @@ from .specimen_fit import SpecimenFit
 _RELATIVE = 3
 """Column of p in `base_transmissibility`."""
 _STEP_HZ = 0.02
-"""Frequency step for the curvature of the transmissibility: 1 % of the narrowest resonance."""
+"""Frequency step for the curvature of the transmissibility, 1 % of the narrowest resonance [Hz]."""
 _STEP = 1e-4
-"""Logarithmic step for derivatives of the relative motion by the linear parameters."""
+"""Logarithmic step for derivatives of the relative motion with respect to the linear parameters."""
 _EDGE_POINTS = 41
 _APPROACH_S = 1.0
 _LEAST_INTERVALS = 3
-"""Fewest intervals for fitting a line to A0."""
+"""Minimum number of intervals for fitting a line to A0."""
 
 
 @dataclass(frozen=True)
 class Onset:
-    """Onset of collisions in a sweep or among dwells of one frequency, and the gap from it."""
+    """Onset of collisions in a sweep, or among dwells at one frequency, and the gap that it gives."""
 
     frequency_hz: float
     gap_m: float
@@ -42,7 +42,7 @@ class Onset:
 
 
 def _narrowest(found: Sequence[Onset], linear: Specimen) -> FittedValue:
-    """Return the gap of the sharpest onset."""
+    """Return the gap of the onset with the narrowest bounds."""
     best = min(found, key=lambda each: each.high_m / each.low_m)
     return FittedValue(
         parameter=Parameter.GAP,
@@ -59,17 +59,17 @@ def fit_gap(
     linear: Specimen,
     fit: SpecimenFit | None = None,
 ) -> FittedValue:
-    """Return the gap that explains the sharpest onset of collisions.
+    """Return the gap from the onset of collisions with the narrowest bounds.
 
     Raises NotEnoughData when no sweep enters a colliding region.
 
     Parameters
     ----------
     sweeps
-        Measured sweeps. Only a region that a sweep enters has an onset, because collisions persist beyond
-        it.
+        Measured sweeps. The onset is the edge at which a sweep enters a colliding region; at the other edge,
+        collisions persist.
     linear
-        Specimen for the linear motion; its gap is only reported as nominal.
+        Specimen for the linear motion; its own gap is only the nominal value of the result.
     fit
         Fit of the linear specimen, for its covariance.
     """
@@ -83,9 +83,9 @@ def fit_gap(
 
 
 def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = None) -> Iterator[Onset]:
-    """Yield every onset of collisions in a sweep, with the gap that follows from it.
+    """Yield the gap at every onset of collisions in a sweep.
 
-    The bounds are those of the edge, widened by uncertainties of drive and linear specimen.
+    The gap bounds follow from those of the edge, widened by the uncertainty of drive and linear specimen.
     """
     reach = float(norm.ppf(0.5 + 0.5 * DEFAULT_CONFIDENCE))
     rate = sweep.response.sweep_rate_hz_per_s
@@ -108,7 +108,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
 
 @dataclass(frozen=True)
 class _Approach:
-    """A0 before an onset, as a line over frequency, because collisions disturb the base."""
+    """A0 before an onset, fitted as a line over frequency, because collisions disturb the base motion."""
 
     slope: float
     offset_m: float
@@ -119,7 +119,7 @@ class _Approach:
 
 
 def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
-    """Fit A0 to the intervals before an onset, except the last one."""
+    """Fit A0 to the intervals before an onset, without the last interval."""
     last = int(np.argmin(np.abs(measured.time_s - edge.time_s))) - 1
     first = max(0, last - round(_APPROACH_S / measured.interval_s))
     if last - first < _LEAST_INTERVALS:
@@ -134,9 +134,9 @@ def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
 
 
 def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float) -> Complexes:
-    """Return the phasor of p over the base under a linear sweep without contact, shape of ``frequency_hz``.
+    """Return the phasor of p relative to the base in a linear sweep without contact, shape as frequency_hz.
 
-    H - (i / 4 pi) (df/dt) d2H/df2: the steady response and its lag, to first order in the sweep rate.
+    H - (i / 4 pi) (df/dt) d2H/df2: steady response with its lag in a sweep, to first order in the sweep rate.
     """
 
     def at(shift_hz: float) -> Complexes:
@@ -147,7 +147,7 @@ def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float
 
 
 def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate_hz_per_s: float) -> float:
-    """Return the relative standard deviation of the relative amplitude by the linear fit."""
+    """Return the relative standard deviation of the relative motion due to the linear fit."""
     if fit is None:
         return 0.0
     slopes = []
@@ -171,7 +171,7 @@ _SAME_HZ = 0.5
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Return the gap as the geometric mean of the narrowest bracket.
+    """Return the gap of the narrowest bracket between dwells without and with collisions.
 
     Raises NotEnoughData when no frequency has dwells on both sides of the onset.
     """
@@ -185,11 +185,11 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 
 
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onset]:
-    """Yield the onset for every frequency with dwells with and without collisions.
+    """Yield the onset at every frequency that has dwells with and without collisions.
 
-    The bounds are the largest relative motion without collisions, and the smallest linear one with them.
-    Collisions disturb the base, so its linear motion in a colliding dwell is scaled from the largest dwell
-    without collisions by the generator's setting.
+    The lower bound is the largest relative motion without collisions. The upper bound is the smallest linear
+    motion with collisions. Collisions disturb the base, so this linear motion is scaled from the largest
+    dwell without collisions, in proportion to the generator amplitude.
     """
     rest = list(dwells)
     while rest:

@@ -1,4 +1,4 @@
-"""Lines of a measured transmission, and the fit of a specimen to them."""
+"""Spectral lines of a measured transmission, and the fit of a specimen to them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,40 +17,40 @@ from ..signals.window import line_correlation
 from .parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
-"""Least relative scatter of a line, because calibrations and clocks are no better."""
+"""Smallest relative scatter that is assumed for a line; calibrations and clocks are not more exact."""
 _LEAST_CLEAR = 10.0
-"""Least ratio of a magnitude to the median scatter of its neighbours, so that ln(magnitude) is normal.
+"""Smallest ratio of a magnitude to the median scatter of its neighbours, for a normal ln(magnitude).
 
-The scatter of the line itself comes from few averages. It would select lines whose scatter is small by
-chance, so that a correct model would be refused.
+The line's own scatter is estimated from few averages. It would select lines whose scatter is small by chance,
+so that a correct model would be refused.
 """
 _NEIGHBOURS = 31
 """Number of lines for the median scatter."""
 _MOST_OFF = np.log(1e4)
 """Largest logarithmic distance of a parameter from the start of the search."""
 LEAST_DAMPING_TIME_S = 1e-8
-"""Start of the damping time for a specimen described without damping."""
+"""Start value of the damping time for a specimen described without damping [s]."""
 CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
 """Reference frequency of the channels' phases."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
-"""Scale factors of all frequencies."""
+"""Factors on all frequencies for further starts of the search."""
 _STEP = 1e-6
-"""Logarithmic step of central differences: far above rounding, far below a resonance's width."""
+"""Logarithmic step of central differences; far above rounding, far below the width of a resonance."""
 
 _HOPELESS = 5.0
-"""Multiple of the limit of chi square, beyond which no weighting can make a fit valid."""
+"""Multiple of the chi square limit above which no weighting can make a fit valid."""
 _MOST_STEPS = 60
-"""Step limit: a further mode without evidence has no optimum."""
+"""Maximum number of evaluations; a further mode without evidence has no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
-"""Function of specimen, frequencies [Hz] and further parameters that returns m0 over base."""
+"""Function of specimen, frequencies [Hz] and further parameters that returns m0 / base."""
 
 
 def loaded_response(
     specimen: Specimen, frequency_hz: Reals, extra_n_per_m: tuple[Complexes | float, ...]
 ) -> Complexes:
-    """Return m0 over base of a specimen with additional loads, shape (lines,).
+    """Return the response of m0 relative to the base for a specimen with additional loads, shape (lines,).
 
     m2 is linked to m0, and m1 to m2. A link of dynamic stiffness P in series with the dynamic stiffness A
     behind it gives P A / (P + A). ``extra_n_per_m`` are additional dynamic stiffnesses at m0 and at m2.

@@ -24,16 +24,16 @@ class Parameter(StrEnum):
     M0 = "m0_kg"
     M1 = "m1_kg"
     M2 = "m2_kg"
-    """Masses, of which only one at a time can be fitted, because motion determines only their ratios."""
+    """Masses; only one can be fitted at a time, because motion determines only their ratios."""
     C0 = "c0_ns_per_m"
     C1 = "c1_ns_per_m"
     C2 = "c2_ns_per_m"
-    """Single dampers, independent of the common damping time."""
+    """Individual dampers, independent of the common damping time."""
     GAP = "gap_m"
 
 
 LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
-"""Parameters that are fitted by default to a transmission without collisions."""
+"""Parameters fitted by default to a transmission without collisions."""
 MASSES = (Parameter.M0, Parameter.M1, Parameter.M2)
 DAMPERS = (Parameter.C0, Parameter.C1, Parameter.C2)
 ALSO_FREE = MASSES + DAMPERS
@@ -78,7 +78,7 @@ class FittedValue:
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Read one parameter of a specimen; if damping times differ between links, link 0 counts."""
+    """Return one parameter of a specimen; the damping time is that of link 0 if the links differ."""
     masses, stiffnesses = specimen.masses, specimen.stiffnesses
     match parameter:
         case Parameter.DAMPING_TIME:
@@ -97,9 +97,9 @@ def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
 
 
 def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
-    """Return a specimen with changed parameters; a change of mass leaves the frequencies unchanged.
+    """Return a specimen with changed parameters; a changed mass leaves the frequencies unchanged.
 
-    Other dampers remain proportional to stiffness, and the ratio of two gaps is kept.
+    Dampers that are not given stay proportional to stiffness, and the ratio of the two gaps is kept.
     """
     old = parameter_value(specimen, Parameter.DAMPING_TIME)
     beta = values.get(Parameter.DAMPING_TIME, old)

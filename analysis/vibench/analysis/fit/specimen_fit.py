@@ -27,7 +27,7 @@ from .parameters import (
 from .suspects import Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
-"""Relative standard deviation of a converter clock, which recordings do not reveal."""
+"""Relative standard deviation of a converter clock; recordings do not reveal its error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +43,14 @@ class SpecimenFit(Labelled):
     lines: int
     """Number of lines used."""
     reduced_chi_square: float
-    """Reduced chi square, about 1 if the model explains the lines; accounts for the estimated scatter."""
+    """Reduced chi square, about 1 if the model explains the lines; includes the estimated scatter."""
     limit: float
     """Reduced chi square that one correct model in a thousand exceeds."""
     suspects: tuple[Suspect, ...]
-    """Wrong assumptions that would explain a misfit, the most likely first."""
+    """Assumptions whose change would explain a misfit, the most likely first."""
     confidence: float
     phase_rad: tuple[float, float]
-    """Phase of the channels at 100 Hz: from a high pass, proportional to 1 / f, and from a delay, to f."""
+    """Phases of the channels at 100 Hz: of a high pass (proportional to 1 / f) and of a delay (to f)."""
 
     @property
     def fits(self) -> bool:
@@ -83,9 +83,9 @@ def fit_specimen(
 ) -> SpecimenFit:
     """Fit linear parameters to magnitude and phase, weighted by the scatter of the lines.
 
-    The scatter comes from few averages, so Student's likelihood is used. A fit is refused if a correct
-    model exceeds its chi square once in a thousand times. A refused fit has no values, but a
-    ranking of assumptions that may be wrong.
+    The scatter is estimated from few averages, so Student's likelihood is used. A fit is refused if its chi
+    square exceeds the value that a correct model exceeds once in a thousand times. A refused fit has no
+    values but a ranking of assumptions that may be wrong.
 
     Raises InvalidRequest when nothing is free, or for parameters that no linear transmission determines
     (gap, more than one mass), and NotEnoughData for too few significant lines.
@@ -95,13 +95,13 @@ def fit_specimen(
     frequency_response
         Displacement over displacement, delays removed.
     nominal
-        Start of the search, and values of everything that is not free.
+        Start of the search, and values of all parameters that are not free.
     free
         Parameters to fit.
     confidence
         Confidence of the intervals.
     scale_sd
-        Relative standard deviation of vibrometer over accelerometer sensitivity by calibration; 0 if exact.
+        Relative standard deviation of the sensitivity ratio vibrometer / accelerometer; 0 if exact.
     is_nonlinear
         Whether realisations scatter beyond noise, which suggests friction; None if unknown.
     """
@@ -135,7 +135,7 @@ def fit_specimen(
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Return the covariance from the clock error, which scales frequencies, and times inversely."""
+    """Return the covariance due to the clock error; it scales frequencies, and times inversely."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

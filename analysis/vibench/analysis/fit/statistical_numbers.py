@@ -19,30 +19,30 @@ from ..overlay.shaker_fit import FittedShaker
 from ..signals.arrays import Flags, Integers, Reals
 from .specimen_fit import SpecimenFit
 
-# Parameters of a model from statistics of its runs: approximate Bayesian computation with regression.
+# Approximate Bayesian computation with regression: parameters of a model from statistics of its runs.
 #
-# Parameters are drawn from a box and each draw is simulated. Every parameter is regressed on the statistics
-# of these runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The prediction for the
-# observed statistics, with leave-one-out errors, is the posterior. Its intervals have the stated coverage
-# for parameters within the box, even for a poor regression (conformal prediction; Vovk, Gammerman and
-# Shafer 2005). The box is then narrowed and drawn from again (Deistler, Goncalves and Macke 2022).
+# Parameters are drawn from a box, and a run is simulated for each. Each parameter is regressed on the
+# statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The posterior is the
+# prediction for the observed statistics plus leave-one-out errors. Its intervals have the stated coverage for
+# parameters in the box, even for a poor regression (conformal prediction; Vovk, Gammerman and Shafer 2005).
+# Then the box is narrowed and sampled again (Deistler, Goncalves and Macke 2022).
 
 ROUNDS = (120, 120, 240)
-"""Number of runs per box."""
+"""Number of runs in each box, from the widest box to the narrowest."""
 _MARGIN = 1.25
 """Half width of the next box as a multiple of the largest error of the regression."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
-"""Number of principal components of the statistics in which the observed ones are checked."""
+"""Number of principal components of the statistics in which the observed statistics are checked."""
 _FAR = 1.05
-"""Distance of observed statistics, relative to the furthest run, above which the model is refused.
+"""Limit of the distance of the observed statistics, relative to the furthest run; above it, no model fits.
 
-A correct model exceeds the furthest of n runs at most once in n + 1 times; the margin is for small
+A correct model exceeds the furthest of n runs at most once in n + 1 times; the margin allows for small
 differences between rig and recording.
 """
 
 Runs = Callable[[Reals], Reals]
-"""Function from parameters, shape (draws, parameters), to statistics of runs, (draws, statistics)."""
+"""Function from parameters, shape (draws, parameters), to run statistics, shape (draws, statistics)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,33 +50,33 @@ class Posterior:
     """Posterior of parameters for observed statistics."""
 
     draws: Reals
-    """Parameters drawn from the posterior, shape (draws, parameters)."""
+    """Random parameters from the posterior, shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics from those of runs, relative to the furthest run."""
+    """Distance of the observed statistics from the simulated ones, relative to the furthest run."""
 
     @property
     def fits(self) -> bool:
-        """Return whether the observed statistics are compatible with the runs."""
+        """Whether the observed statistics are compatible with the runs."""
         return self.distance <= _FAR
 
 
 def posterior(
     runs: Runs, observed: Reals, box: Reals, seed: int, rounds: Sequence[int] = ROUNDS
 ) -> Posterior:
-    """Draw parameters, simulate, regress and narrow the box, once per round.
+    """Return the posterior: in each round, draw parameters, simulate, regress, and narrow the box.
 
     Parameters
     ----------
     runs
-        Function that simulates parameters and returns statistics.
+        Function that simulates runs for given parameters and returns their statistics.
     observed
         Observed statistics, shape (statistics,).
     box
-        Range of each parameter, shape (parameters, 2), with a uniform prior.
+        Range of each parameter with a uniform prior, shape (parameters, 2).
     seed
         Seed of the draws.
     rounds
-        Number of runs for each box.
+        Number of runs in each box.
     """
     rng = np.random.default_rng(seed)
     parameters, statistics = np.empty((0, len(box))), np.empty((0, observed.size))
@@ -84,7 +84,7 @@ def posterior(
         inside = np.all((parameters >= box[:, 0]) & (parameters <= box[:, 1]), axis=1)
         parameters, statistics = parameters[inside], statistics[inside]
         new = rng.uniform(box[:, 0], box[:, 1], (wanted - len(parameters), len(box)))
-        # If the box did not change, it contains all earlier runs and none may be missing.
+        # If the box did not change, it contains all earlier runs, and no new ones are needed.
         if len(new):
             parameters = np.concatenate([parameters, new])
             statistics = np.concatenate([statistics, runs(new)])
@@ -98,7 +98,7 @@ def posterior(
 
 
 def _regression(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[Reals, Reals]:
-    """Return parameters (n,) for the observed statistics, and leave-one-out errors of draws, (draws, n)."""
+    """Return the parameters (n,) for the observed statistics, and leave-one-out errors (draws, n)."""
     middle, scale = statistics.mean(axis=0), statistics.std(axis=0) + 1e-12
     u, sizes, vt = np.linalg.svd((statistics - middle) / scale, full_matrices=False)
     new = vt @ ((observed - middle) / scale)
@@ -124,14 +124,14 @@ def _leave_one_out_errors(u: Reals, sizes: Reals, target: Reals, ridge: float) -
 def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     """Return the distance of the observed statistics from the model, relative to the furthest run.
 
-    The effect of the fitted parameters is removed. The rest is measured along its largest components and
-    beyond them. Each run is compared with the others only, because including itself would make it seem
-    nearer.
+    The effect of the fitted parameters is removed. The remainder is measured along its largest components and
+    outside of them. Each run is compared only with the other runs; including itself would shorten its
+    distance.
 
     Parameters
     ----------
     parameters
-        Fitted parameters, the observed ones in the last row, shape (draws + 1, parameters).
+        Fitted parameters, with those of the observation in the last row, shape (draws + 1, parameters).
     statistics
         Statistics of runs, shape (draws, statistics).
     observed
@@ -150,9 +150,9 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
 
 
 def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
-    """Return two squared distances of a run from others, along the components and outside of them.
+    """Return two squared distances of a run from other runs: along their components and outside of them.
 
-    ``own_terms`` has the shape (terms,), ``own_values`` (statistics,).
+    ``own_terms`` and ``own_values`` belong to this run, with shapes (terms,) and (statistics,).
     """
     known, *_ = np.linalg.lstsq(terms, values, rcond=None)
     _, spread, axes = np.linalg.svd(values - terms @ known, full_matrices=False)
@@ -177,18 +177,18 @@ _SHARES = (0.5, 0.9, 0.99, 0.999)
 def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> Reals:
     """Return statistics of a stretch of irregular motion, shape (statistics,).
 
-    They are logarithmic band powers of base acceleration and m0's velocity, their coherence per band, the
-    distribution of m0's displacement (spread, skewness, tails), and under a sine the harmonics. Even
-    harmonics distinguish the two stops.
+    Statistics are the logarithmic band powers of base acceleration and m0's velocity, and their coherence per
+    band; spread, skewness and tails of m0's velocity and displacement; and for a sine drive the harmonics.
+    Even harmonics distinguish the two stops.
 
     Parameters
     ----------
     motion
         Base acceleration [m/s2] and m0's velocity [m/s], shape (2, samples).
     rate_hz
-        Samples a second.
+        Sample rate [Hz].
     drive_hz
-        Frequency of a sine; None for other drives.
+        Frequency of a sine drive; None for other drives.
     """
     velocity = motion[1]
     parts = (*_in_bands(motion, rate_hz), _spread(velocity), _spread(_displacement(velocity, rate_hz)))
@@ -197,7 +197,7 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
 
 
 def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
-    """Return flags of the statistics that are above the noise of the channels.
+    """Return which statistics are above the noise of the channels.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> F
     noise_rms
         White noise of base acceleration and m0's velocity per sample, shape (2,).
     rate_hz
-        Samples a second.
+        Sample rate [Hz].
     """
     length, first = _bands(rate_hz)
     floor = 2 * np.log(noise_rms) + np.log(np.sum(np.hanning(length) ** 2) * _ABOVE_NOISE)
@@ -217,7 +217,7 @@ def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> F
 
 
 def _bands(rate_hz: float) -> tuple[int, Integers]:
-    """Return the samples of a segment, and the edges of the bands as numbers of lines."""
+    """Return the segment length [samples], and the band edges as line numbers of its spectrum."""
     length = round(_SEGMENT_S * rate_hz)
     edges = np.geomspace(_LOWEST_HZ, min(_HIGHEST_HZ, _HIGHEST_PART * rate_hz), _BANDS + 1)
     return length, np.asarray(np.ceil(edges * length / rate_hz), dtype=np.int64)
@@ -236,7 +236,7 @@ def _in_bands(motion: Reals, rate_hz: float) -> tuple[Reals, ...]:
 
 
 def _displacement(velocity: Reals, rate_hz: float) -> Reals:
-    """Return displacement times the sample rate, with a high pass below all drive frequencies."""
+    """Return displacement times the sample rate, high-passed below all drive frequencies."""
     b, a = scipy.signal.butter(2, _DRIFT_HZ, "highpass", fs=rate_hz)
     return np.asarray(scipy.signal.lfilter(b, a, np.cumsum(velocity - velocity.mean())))
 
@@ -251,7 +251,7 @@ def _spread(values: Reals) -> Reals:
 
 
 def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
-    """Return components of the velocity over its rms, relative to the phase of the base's fundamental."""
+    """Return harmonics of the velocity over its rms, relative to the phase of the base's fundamental."""
     turn = np.exp(-2j * np.pi * drive_hz / rate_hz * np.arange(motion.shape[1]))
     tapered = motion * np.hanning(motion.shape[1])
     base = np.vdot(turn.conj(), tapered[0]) / motion.shape[1]
@@ -265,12 +265,12 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range as factors; gaps are given by their geometric mean and the root of upper over lower."""
+"""Search range as factors; the gaps are expressed by geometric mean and sqrt(upper / lower)."""
 _CONFIDENCE = 0.95
 _WIDEST = 0.5
-"""Width of bounds, relative to the search range, above which a parameter is undetermined."""
+"""Width of bounds relative to the search range; with wider bounds a parameter is undetermined."""
 _LIKELY = 2.0
-"""Largest factor between the recorded base motion and that of the first draw."""
+"""Largest allowed ratio between the rms base acceleration of recording and first draw."""
 _LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0
 _SEED = 29
 
@@ -284,11 +284,11 @@ def statistical_numbers(
     linear: SpecimenFit | None = None,
     rounds: Sequence[int] = ROUNDS,
 ) -> tuple[tuple[FoundParameter, ...], float]:
-    """Return gaps, m1, c1 and contact force with 95 % bounds, or why each is undetermined.
+    """Return gaps, m1, c1 and contact force with 95 % bounds, or the reason why each is undetermined.
 
-    Rig and specimens are simulated under the recorded voltage, and compared with the recording by
-    statistics. Returns the parameters, and the distance of the statistics relative to the furthest run.
-    Raises AnalysisError when rig, law or samples are unsuitable, or no specimen has these statistics.
+    Rig and specimens are simulated under the recorded voltage and compared with the recording by statistics.
+    The second result is the distance of the statistics relative to the furthest run. Raises AnalysisError
+    when rig, contact law or samples are unsuitable, or no specimen has these statistics.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def statistical_numbers(
     linear
         Fit of the linear parameters; each run draws them within its uncertainty.
     rounds
-        Number of runs for each box; boxes become narrower.
+        Number of runs in each box; boxes become narrower.
     """
     rate_hz = recording.sample_rate_hz
     start, stop = (round(each * rate_hz) for each in stretch_s)
@@ -334,7 +334,7 @@ def statistical_numbers(
 
 
 class _Runs:
-    """Simulation of runs with given parameters and random starts."""
+    """Simulated runs with given parameters and random starts."""
 
     def __init__(
         self,
@@ -349,7 +349,7 @@ class _Runs:
         self.rng = np.random.default_rng(_SEED)
 
     def __call__(self, parameters: Reals) -> Reals:
-        """Return the statistics of a run for each row."""
+        """Return the statistics of one run for each row of ``parameters``."""
         seeds = self.rng.spawn(len(parameters))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             return np.array(list(pool.map(self._one, parameters, seeds)))
@@ -361,7 +361,7 @@ class _Runs:
 
 
 def _relative(logarithms: Reals) -> dict[Hidden, Reals]:
-    """Convert parameters, shape (5,) or (5, draws), to logarithms relative to the description."""
+    """Return logarithms relative to the description for parameters of shape (5,) or (5, draws)."""
     mean, apart, m1, c1, force = logarithms
     return {
         Hidden.LOWER_GAP: mean - apart,
@@ -386,7 +386,7 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
 
 
 def _require_likely(made: _Runs, measured: Reals) -> None:
-    """Raise UnusableData if the base motion of a first draw does not resemble the recorded one."""
+    """Raise UnusableData if the rms base motion of a first draw differs from the recorded one."""
     first = made.draws.draw(made.specimen, made.rng)
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:
@@ -408,7 +408,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
         why = "the statistics of the motion do not determine it better than the description" if flat else ""
-        # Use the centre of the bounds as value, because results are written with a half width.
+        # The value is the centre of the bounds, because results are written with a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
     nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"
     for untold in (Hidden.EXPONENT, Hidden.LOSS):

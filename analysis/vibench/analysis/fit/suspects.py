@@ -1,4 +1,4 @@
-"""Search for the wrong assumption of a model that does not fit, by freeing each one in turn."""
+"""Find wrong assumptions of a model that does not fit, by freeing each assumption in turn."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ TOLD_APART = 2.0 * float(np.log(20.0))
 """Twice the log likelihood ratio (20 to 1) above which only the better explanation is named."""
 _HIGHEST_HZ = 2e4
 _MODE_LOW, _MODE_HIGH = (1e-6, 1e-4), (1.0, 0.3)
-"""Limits of the mass ratio and the damping ratio of a further mode."""
+"""Lower and upper limits of mass ratio and damping ratio of a further mode."""
 _MODE_START = (float(np.log(0.02)), float(np.log(0.01)))
-"""Start of the search for a further mode: logarithms of mass ratio and damping ratio."""
+"""Start values of the search for a further mode: logarithms of mass ratio and damping ratio."""
 
 
 class Assumption(StrEnum):
@@ -42,7 +42,7 @@ class Assumption(StrEnum):
 
 @dataclass(frozen=True)
 class Suspect:
-    """A freed assumption, and the quality of the resulting fit."""
+    """An assumption that was freed, and the quality of the resulting fit."""
 
     DOCUMENT: ClassVar = (
         "assumption would_mend_it=sentence reduced_chi_square mends behind_the_likeliest=behind"
@@ -55,25 +55,25 @@ class Suspect:
     mends: bool
     """Whether the model fits when this assumption is freed."""
     behind: float
-    """Twice the log likelihood ratio to the best suspect, with ln(values) per parameter added; 0 is best."""
+    """Twice the log likelihood ratio to the best suspect, plus ln(values) per parameter; 0 for the best."""
 
     @property
     def may_be_it(self) -> bool:
-        """Return whether the data do not distinguish this suspect from the best one."""
+        """Whether the data do not distinguish this suspect from the best one."""
         return self.behind < TOLD_APART
 
 
 def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
-    """Free each assumption in turn; rank them by likelihood and number of parameters.
+    """Free each assumption in turn, and return them ranked by likelihood and number of parameters.
 
     Parameters
     ----------
     lines
-        Lines that the described model does not fit.
+        Spectral lines that the described model does not fit.
     usual
         Fit of the described model.
     is_nonlinear
-        Whether realisations scatter beyond noise; None if unknown.
+        Whether realisations scatter more than noise; None if unknown.
     """
     tried = []
     for assumption, allowed, describe in _ways(lines, is_nonlinear=is_nonlinear):
@@ -85,7 +85,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
             tried.append((assumption, sentence, found.chi_square, parameters, freedom))
     if not tried:
         return ()
-    # Scale the scatter by the misfit of the best one, so that small differences are not significant.
+    # Scale the scatter by the misfit of the best suspect, so that small differences are not significant.
     left = max(1.0, min(chi / freedom for _, _, chi, _, freedom in tried)) * lines.correlation[0]
     reals = 2 * lines.frequency_hz.size
     scores = [chi / left + count * np.log(reals) for _, _, chi, count, _ in tried]
@@ -103,7 +103,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
 
 
 _Told = Callable[[Specimen, Reals], str]
-"""Function that describes the fitted change; empty if the change is impossible."""
+"""Function that describes the fitted change; an empty text if the change is impossible."""
 
 
 def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:
@@ -182,7 +182,7 @@ def _off(_: Specimen, further: Reals) -> str:
 
 
 def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
-    """Return the dynamic stiffness that a small mass on a damped spring adds to a mass."""
+    """Return the dynamic stiffness added to a mass by a small mass on a damped spring."""
     own_hz, share, damping = np.exp(further)
     ratio = frequency_hz / own_hz
     spring = 1.0 + 2j * damping * ratio

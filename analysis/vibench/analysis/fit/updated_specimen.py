@@ -28,9 +28,9 @@ from .specimen_fit import SpecimenFit, fit_specimen
 from .suspects import Assumption, Suspect
 
 _SURELY = 3.3
-"""Deviation in standard deviations that one correct description in a thousand exceeds."""
+"""Number of standard deviations that one correct description in a thousand exceeds."""
 _LEAST_RELATIVE_SD = 2e-3
-"""Relative error of the fitted table mass that remains from coil, filters and held samples."""
+"""Relative error of the fitted table mass due to coil, filters and held samples."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,12 @@ class TableFit:
 
     @property
     def z(self) -> float:
-        """Difference of described and fitted mass in standard deviations."""
+        """Difference of fitted and described mass in standard deviations."""
         return float(np.log(self.mass_kg / self.described_kg) * self.mass_kg / self.sd_kg)
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Changes that explain a misfit; empty if the description holds."""
+        """Changes that would explain the difference; empty if the described mass fits."""
         if abs(self.z) <= _SURELY:
             return ()
         ratio = self.mass_kg / self.described_kg
@@ -62,7 +62,7 @@ class TableFit:
 
     @property
     def sentence(self) -> str:
-        """Return a sentence on the mass with two standard deviations, and the described one."""
+        """Fitted mass with two standard deviations, and the described mass, in words."""
         mass = plus_minus(1e3 * self.mass_kg, 2e3 * self.sd_kg)
         return (
             f"Fitted mass of the moving table = ({mass}) g; the bench says {1e3 * self.described_kg:.4g} g."
@@ -72,8 +72,8 @@ class TableFit:
 def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
     """Fit the shaker to weak noise and compare its mass with the bench; None without a described shaker.
 
-    The reaction of the specimen's resonances on the base determines the mass. Raises UnusableData when
-    no shaker explains the transmission from voltage to base.
+    The reaction of the specimen's resonances on the base determines the mass. Raises UnusableData when no
+    shaker explains the transmission from voltage to base.
     """
     with open_recording(analysis.facts.path) as recording:
         described = described_shaker(recording)
@@ -90,26 +90,26 @@ _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 
 @dataclass(frozen=True, eq=False)
 class UpdatedSpecimen(Labelled):
-    """A specimen fitted to recordings, with undetermined values and misfits."""
+    """A specimen fitted to recordings, with the values that stayed undetermined and the misfits."""
 
     specimen: Specimen
     values: tuple[FittedValue, ...]
     """Fitted values; empty if the model does not fit."""
     collisions: CollisionNumbers | None
-    """Parameters from tracking collisions or from their statistics; None if neither is possible."""
+    """Parameters from tracked collisions or from statistics; None if neither is possible."""
     linear: SpecimenFit | None
     """Linear fit of the weakest noise; None without noise."""
     linear_from: str
-    """Recording for damping and frequencies; empty if none."""
+    """Name of the recording that gives damping and frequencies; empty if none."""
     table: TableFit | None
     not_determined: tuple[str, ...]
-    """Sentences with the reason for each value that remains as described."""
+    """One sentence for each value that stays as described, with the reason."""
     nominal: SpecimenTable
-    """Specimen described by the bench."""
+    """Specimen as described by the bench configuration."""
 
     @property
     def fitted(self) -> bool:
-        """Whether anything was fitted."""
+        """Whether any parameter was fitted."""
         return bool(self.values) or self.collisions is not None
 
     @property
@@ -124,14 +124,14 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Assumptions that recordings contradict; for each source, the most likely ones first."""
+        """Assumptions that recordings contradict; the most likely first for each source."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     @property
     def description(self) -> SpecimenDescription:
-        """Return the fitted specimen for a file, with the bench's values for the rest."""
+        """Fitted specimen in the form of a specimen file; other values as in the bench configuration."""
         lower, upper = self.specimen.gaps_m
         fitted = {each.parameter.value for each in self.values}
         if self.collisions is not None:
@@ -157,11 +157,11 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Return sentences on every value with its interval, misfits and remarks."""
+        """Sentences on every value with its interval, on misfits and on undetermined values."""
         return tuple(_sentences(self))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the results as JSON."""
+        """Return the results as a dictionary for JSON."""
         values = {each.parameter: each for each in self.values}
         collisions = {key: value for way in Way for key, value in self._collision_results(way).items()}
         linear = columns(
@@ -181,7 +181,7 @@ class UpdatedSpecimen(Labelled):
         return dict(plain(document))
 
     def _collision_results(self, way: Way) -> dict[str, object]:
-        """Return parameters from collisions by one method."""
+        """Return the parameters that ``way`` found from collisions, as a dictionary for JSON."""
         found = self.collisions if self.collisions is not None and self.collisions.way is way else None
         return {
             f"{way}_from": None if found is None else found.recording,
@@ -214,7 +214,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
 
 
 def culprits_text(suspects: Sequence[Suspect]) -> str:
-    """Return the possible causes of a misfit, as far as the data distinguish them."""
+    """Return the possible causes of a misfit as text, with all causes that the data do not distinguish."""
     best = suspects[0]
     alike = list(dict.fromkeys(each.sentence for each in suspects if each.may_be_it))
     named = ", or ".join(alike)
@@ -237,7 +237,7 @@ def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ..
 def _in_words(found: FittedValue) -> str:
     name, scale, unit = SHOWN[found.parameter]
     half = 0.5 * (found.high - found.low)
-    # Round to two digits of the half width, so that the printed bounds differ.
+    # Round to the second digit of the half width, so that the printed bounds differ.
     places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
     value, low, high, nominal = (
         f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
@@ -250,19 +250,18 @@ def update_model(
     also_free: Sequence[Parameter | str] = (),
     observer: Observer = ignore_progress,
 ) -> UpdatedSpecimen:
-    """Fit a specimen to recordings, or name the assumption that they contradict.
+    """Return a specimen fitted to recordings, or the assumptions that the recordings contradict.
 
-    Damping and frequencies come from the weakest noise. The gap of each side, m1, c1 and the contact law
-    come from tracking a colliding motion, or else from statistics of chaos (minutes of simulation). If both
-    fail, the smaller gap comes from the onset of collisions in sweeps or dwells. The table mass comes from
-    the transmission from voltage to base. Raises NotEnoughData when nothing could be fitted: no noise, no
-    trackable motion, no onset of collisions.
+    Damping and frequencies come from the weakest noise. The gap of each side, m1, c1 and the contact law come
+    from a tracked colliding motion, or else from statistics of chaos (minutes of simulation). If both fail,
+    the smaller gap comes from the onset of collisions in sweeps or dwells. The table mass comes from the
+    transmission from voltage to base. Raises NotEnoughData when nothing can be fitted: no noise, no trackable
+    motion, no onset of collisions.
 
     Parameters
     ----------
     results
-        Results of recordings of one specimen, noise in displacement over
-        displacement.
+        Results of recordings of one specimen; noise results are displacement over displacement.
     also_free
         Additional parameters to fit to noise: one mass, and single dampers.
     observer
@@ -329,7 +328,7 @@ def _table(weakest: NoiseResult, linear: SpecimenFit, reasons: list[str]) -> Tab
 def _with_gaps(
     updated: UpdatedSpecimen, results: CampaignResults, reasons: list[str], observer: Observer
 ) -> UpdatedSpecimen:
-    """Add the gaps by tracking, else by statistics, else the smaller one by the onset of collisions."""
+    """Add the gaps from tracking, else from statistics, else the smaller gap from the onset of collisions."""
     found, why = tracked_numbers(results, updated.specimen)
     if found is None:
         found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
@@ -356,7 +355,7 @@ def _with_gaps(
 def _onset_gap(
     results: CampaignResults, model: Specimen, linear: SpecimenFit | None, reasons: list[str]
 ) -> FittedValue | None:
-    """Return the narrower gap of those from sweeps and from dwells."""
+    """Return the gap with the narrower bounds, from sweeps or from dwells."""
     sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
     ways: tuple[Callable[[], FittedValue], ...] = (
         lambda: fit_gap(sweeps, model, linear),
