@@ -26,7 +26,7 @@ from .statistical_numbers import statistical_numbers
 CALM, COLLIDING = 1.01, 1.05
 """Limits of Response I over Response II (1 for a sine): no collisions below, collisions above."""
 _LENGTH_S = 3.0
-"""Length of the tracked stretch [s]."""
+"""Length of the tracked stretch [s], long enough for four restarts."""
 _MOST_RECORDINGS = 3
 _JUDGED = (
     Hidden.LOWER_GAP,

@@ -21,7 +21,7 @@ Pair = tuple[Curve, Curve]
 
 
 class ExportKind(StrEnum):
-    """Formats of a comparison; the value is the file's suffix."""
+    """Export formats of a comparison; the value is the file suffix."""
 
     PNG = "png"
     SVG = "svg"
@@ -38,23 +38,23 @@ def write_comparison(
     pair: Pair | None = None,
     markers_hz: Sequence[float] = (),
 ) -> Path:
-    """Write a comparison as a report, a table or a picture; return the path.
+    """Write a comparison as a report, a table or a picture; return the path of the file.
 
     Raises InvalidRequest when the suffix is unknown, or there is nothing to write.
 
     Parameters
     ----------
     path
-        Its suffix selects the format: ``.html``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``. An existing
-        name becomes ``NAME-2``.
+        The suffix selects the format: ``.html``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``. If the file
+        exists, ``NAME-2`` is written.
     curves
         Curves of the table and the pictures, over frequency [Hz].
     recordings
-        Recordings of the report.
+        Recordings for the report.
     pair
-        Two of the curves; their difference is shown too.
+        Two of the curves whose difference is shown too.
     markers_hz
-        Vertical lines in pictures.
+        Frequencies of vertical lines in pictures [Hz].
     """
     try:
         kind = ExportKind(path.suffix.removeprefix(".").lower())
@@ -84,7 +84,7 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
 
 
 def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:
-    """Return all curves in one table; headings name curve and unit."""
+    """Return all curves in one table; each heading names a curve and a unit."""
     if not curves:
         raise InvalidRequest("numbers of no curves were requested; choose one or more")
     columns: list[tuple[str, tuple[float | str, ...]]] = []
@@ -109,7 +109,7 @@ def _cells(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple
 
 
 def first_free_path(path: Path) -> Path:
-    """Return the first of ``NAME.svg``, ``NAME-2.svg``, ... that no file has."""
+    """Return the first of ``NAME.svg``, ``NAME-2.svg``, ... that does not exist yet."""
     if not path.exists():
         return path
     numbered = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))

@@ -1,4 +1,4 @@
-"""Figures, sentences, numbers and tables of a report for each kind of excitation, in one table."""
+"""Figures, sentences, numbers and tables of a report for each kind of excitation."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
 
 
 def sweep_findings(result: SweepResult) -> Iterator[str]:
-    """Yield sentences on where the masses collide, measured and simulated."""
+    """Yield sentences on the frequencies at which the masses collide, measured and simulated."""
     plan = result.analysis.excitation
     yield (
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz "
@@ -79,7 +79,7 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Yield sentences on the range of Response II and the results of feedback."""
+    """Yield sentences on the largest Response II and on the results of feedback."""
     found, plan = result.analysis.response.response_ii, result.analysis.excitation
     yield (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp: Response II "
@@ -107,7 +107,7 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
 
 
 def limits(results: CampaignResults) -> Iterator[str]:
-    """Yield the sentences on limits of these results."""
+    """Yield sentences on the limits of these results."""
     if any(each.is_simulated for each in results.facts):
         yield (
             "The instruments were simulated: the samples are what the simulated generator's output does to "
@@ -163,12 +163,12 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 @dataclass(frozen=True)
 class Drawing(Generic[A, L]):
-    """Presentation of results of one kind, on each card and together."""
+    """How results of one kind are presented: each on its card, and several together."""
 
     figures: Callable[[Result[A, L]], Iterator[DrawnFigure]]
-    """Figures of a card; all but the first are folded."""
+    """Figures of a card; all except the first are folded."""
     findings: Callable[[Result[A, L]], Iterator[str]]
-    """Sentences: the result first, then its statistics."""
+    """Sentences: the main result first, then its statistics."""
     numbers: Callable[[Result[A, L]], Iterator[tuple[str, str]]]
     """Main numbers with bounds, the most important first."""
     tables: tuple[Callable[[Sequence[Result[A, L]]], ReportTable], ...] = ()
@@ -195,7 +195,7 @@ def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
 
 
 def _dwell_levels(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
-    """Draw dwells of one frequency in one figure."""
+    """Draw all dwells at one frequency in one figure."""
     for _, group in groupby(dwells, key=lambda each: each.analysis.excitation.frequency_hz):
         same = tuple(group)
         if len(same) > 1:
@@ -207,7 +207,7 @@ def _stepped_figures(look: SteppedLook[Any]) -> Callable[[SteppedSineResult], It
 
 
 def _tracked_figures(tracked: SteppedSineResult) -> Iterator[DrawnFigure]:
-    """Draw the resonance over level, where one was found."""
+    """Draw the tracked resonance over level if one was found, otherwise the stepped sine."""
     if tracked_resonances(tracked.analysis.facts.feedback):
         yield backbone_figure(tracked.analysis, tracked.overlay)
     else:
@@ -237,7 +237,7 @@ def _budget_numbers(result: AnyResult) -> Iterator[tuple[str, str]]:
 
 
 def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
-    """Yield the resonances, the level of the base, and the other budgets."""
+    """Yield the resonances, the base level, and the remaining budgets."""
     budgets = budgets_of(noise)
     yield from ((each.quantity, each.text) for each in budgets if each.unit == "Hz")
     level = noise.analysis.response.base_level
@@ -247,7 +247,7 @@ def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
 
 
 def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
-    """Yield the beginning of collisions and the budgets."""
+    """Yield the onset of collisions and the budgets."""
     for region in sweep.analysis.collisions.regions[:1]:
         yield "collisions begin at", edge_text(region.start, "start of sweep" if region.reaches_start else "")
     amplitude, *largest = _budget_numbers(sweep)
@@ -255,7 +255,7 @@ def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
 
 
 def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
-    """Yield the first resonance tracked, if any, the budgets, and the level of the base."""
+    """Yield the first tracked resonance, if any, the budgets, and the base amplitude."""
     for each in tracked_resonances(stepped.analysis.facts.feedback)[:1]:
         yield "phase resonance", f"{plus_minus(each.frequency_hz, 2 * each.u_frequency_hz)} Hz"
     yield from _budget_numbers(stepped)
@@ -269,7 +269,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
 STEPPED: Drawing[Any, Any] = Drawing(
     _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
 )
-"""Drawing of stepped recordings; other packages may replace parts of it for their kinds."""
+"""Presentation of stepped recordings; other packages may replace parts of it for their kinds."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         Family.NOISE: Drawing(
@@ -307,24 +307,24 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     },
     PlugInKind.DRAWING,
 )
-"""Drawings, keyed by the kind of excitation."""
+"""Presentation of results, keyed by the kind of excitation."""
 
 
 def figures_together(results: CampaignResults) -> Iterator[DrawnFigure]:
-    """Draw figures of several recordings of one kind together."""
+    """Draw several recordings of one kind in common figures."""
     for drawing, group in groupby(results.in_order, key=lambda each: DRAWINGS[each.kind]):
         yield from drawing.together(tuple(group))
 
 
 def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
-    """Draw the figures of all results: transmissions, sweeps, dwells, stepped sines."""
+    """Draw the common figures, then those of each result: noise, sweeps, dwells, stepped sines."""
     yield from figures_together(results)
     for each in results.in_order:
         yield from DRAWINGS[each.kind].figures(each)
 
 
 def findings(results: CampaignResults) -> Iterator[str]:
-    """Yield sentences on each measurement, weak to strong, and on its simulation.
+    """Yield sentences on each measurement and its simulation, in the order of the report.
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ def findings(results: CampaignResults) -> Iterator[str]:
 
     Returns
     -------
-    Sentences: first on a fit to all recordings, then on each recording, which they name.
+    Sentences on the fit to all recordings, then on each recording, starting with its name.
     """
     yield from results.model_sentences
     for each in results.in_order:
@@ -341,12 +341,12 @@ def findings(results: CampaignResults) -> Iterator[str]:
 
 
 def result_sentence(result: AnyResult) -> str:
-    """Return the first finding, or a description of the plan if nothing was found."""
+    """Return the first finding; without findings, a description of the plan."""
     sentence = next(DRAWINGS[result.kind].findings(result), "")
     return sentence or f"{excitation_text(result.analysis.excitation)}: no result."
 
 
 def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:
-    """Draw the plan and the extremes of every channel."""
+    """Draw the plan, and the smallest and largest values of every channel."""
     facts = result.analysis.facts
     return excitation_figure(facts.measurement), bench_levels_figure(facts)

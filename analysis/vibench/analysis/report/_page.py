@@ -1,4 +1,4 @@
-"""Page layout of every report: first screen, one card for each part, and folds below the cards."""
+"""Page layout of every report: overview, one card for each part, and folded details below the cards."""
 
 import base64
 import re
@@ -18,16 +18,16 @@ from ..figures.style import DrawnFigure
 
 Rows = tuple[tuple[str, str], ...]
 LONGEST_CAPTION = 225
-"""Characters of title and caption together: three lines in the column of a figure."""
+"""Maximum characters of title and caption together; they fill three lines of a figure's column."""
 MOST_OPEN_CARDS = 12
-"""Most cards that are shown unfolded, which keeps the page short."""
+"""Maximum number of cards shown unfolded, which keeps the page short."""
 _LARGEST_SVG_BYTES = 300_000
-"""Size of an SVG above which a PNG is smaller, faster to show, and equally legible."""
+"""Largest embedded SVG; a PNG instead of a larger one is smaller, faster to show and equally legible."""
 _SENTENCE_ENDS = re.compile(r"(?<=\.)(?<!\bal\.)(?<!\bFig\.)\s+(?=[A-Z0-9])")
 
 
 class Agreement(StrEnum):
-    """Whether a simulation, or a claim, agrees with what was measured."""
+    """Whether a simulation, or a claim, agrees with the measurement."""
 
     YES = "yes"
     NO = "no"
@@ -36,7 +36,7 @@ class Agreement(StrEnum):
 
 @dataclass(frozen=True)
 class ReportTable:
-    """Table of text with a sentence below it."""
+    """Table of texts with a note below it."""
 
     title: str
     headings: tuple[str, ...]
@@ -56,7 +56,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Card:
-    """One recording, or one group of claims: its row in the first table and its card."""
+    """One recording, or one group of claims: its card, and its row in the overview table."""
 
     name: str
     result: str
@@ -65,7 +65,7 @@ class Card:
     look_at: str
     """Warnings to read before the result is used."""
     numbers: Rows = ()
-    """Up to three names of quantities and their values with bounds."""
+    """Up to three quantities: name, and value with bounds."""
     warnings: tuple[str, ...] = ()
     figure: DrawnFigure | None = None
     folds: tuple[Fold, ...] = ()
@@ -77,17 +77,17 @@ class Page:
 
     title: str
     about: str
-    """Subject of the report, shown beside date and version."""
+    """Subject of the report, shown next to date and version."""
     warnings: tuple[str, ...]
     """Warnings that change a conclusion."""
     findings: str
     """Summary of at most 120 words."""
     figure: DrawnFigure | None
     noun: str
-    """Heading of the first table's rows, such as recording or claims."""
+    """What the rows of the overview table are, such as recording or claims."""
     cards: tuple[Card, ...]
     further: Fold
-    """Unfolded part: figures of several recordings, and sentences on the model."""
+    """Unfolded part: common figures of several recordings, and sentences on the model."""
     folds: tuple[Fold, ...]
     limits: tuple[str, ...]
 
@@ -96,10 +96,10 @@ class Page:
 class _Embedded:
     number: int
     source: str
-    """A ``data:`` address with the whole image in it."""
+    """A ``data:`` address that contains the whole image."""
     caption: str
     rest: str
-    """Folded sentences of the caption."""
+    """Sentences of the caption that are folded."""
 
 
 def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Path:
@@ -108,7 +108,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
     Parameters
     ----------
     figures_folder
-        Folder for PNG, SVG and CSV of each figure; None saves none.
+        Folder for PNG, SVG and CSV of each figure; nothing is saved if None.
     """
     figures = list(dict.fromkeys(_figures(page)))
     environment = Environment(
@@ -133,7 +133,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
 
 
 def _figures(page: Page) -> Iterator[DrawnFigure]:
-    """Yield every figure in numerical order: unfolded ones first, then those in folds."""
+    """Yield all figures in the order of their numbers: unfolded figures first, then those in folds."""
     yield from (each for each in (page.figure, *(card.figure for card in page.cards)) if each is not None)
     yield from page.further.figures
     for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):
@@ -141,7 +141,7 @@ def _figures(page: Page) -> Iterator[DrawnFigure]:
 
 
 def _escape(content: object) -> object:
-    """Escape control characters in names and texts; Markup comes from the template and is not changed."""
+    """Escape control characters in names and texts; Markup from the template stays unchanged."""
     return printable(content) if type(content) is str else content
 
 
@@ -155,7 +155,7 @@ def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _Embedded:
 
 
 def divided_caption(drawn: DrawnFigure) -> tuple[str, str]:
-    """Split a caption into first sentences of at most three lines and the rest."""
+    """Split a caption into its first sentences, which fill at most three lines, and the rest."""
     sentences = _SENTENCE_ENDS.split(drawn.caption)
     lengths = [len(drawn.title) + len(" ".join(sentences[:end])) for end in range(len(sentences) + 1)]
     fitting = sum(each <= LONGEST_CAPTION for each in lengths) - 1

@@ -38,7 +38,7 @@ _REST = "The table has the rest."
 
 
 def summary(results: CampaignResults, verdicts: Sequence[Agreement]) -> str:
-    """Summarise the findings and the agreement of the simulation in at most 120 words."""
+    """Return the findings and the agreement of the simulation in at most 120 words."""
     last = _agreement(verdicts)
     kept: list[str] = []
     for each in _sentences(results):
@@ -67,7 +67,7 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
-    """Yield sentences on the resonances at the weakest noise and their change at the strongest."""
+    """Yield sentences on the resonances at the weakest noise and on their changes at the strongest."""
     if not noise:
         return
     weak, strong = noise[0], noise[-1]
@@ -106,7 +106,7 @@ def _resonances(result: NoiseResult) -> str:
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
-    """Yield sentences on the kind of motion at each level, for each frequency."""
+    """Yield one sentence per frequency on the kind of motion at each level."""
     by_place: dict[float, dict[str, list[str]]] = {}
     for each in dwells:
         kinds = by_place.setdefault(each.analysis.excitation.frequency_hz, {})
@@ -143,7 +143,7 @@ def _level(result: NoiseResult) -> str:
 
 
 def _band(result: NoiseResult) -> tuple[float, float]:
-    """Return the ends of the measured band, rounded because two clocks differ by some ppm."""
+    """Return the measured band, rounded because two converter clocks differ by some ppm."""
     found = result.analysis.response.frequency_response.frequency_hz
     return round(float(found[0])), round(float(found[-1]))
 
@@ -171,7 +171,7 @@ def _count(count: int, noun: str) -> str:
 
 
 def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
-    """Draw each map with levels and Responses I of stepped sines and sweeps."""
+    """Draw each map, with the levels and Responses I of stepped sines and sweeps on it."""
     levels = [
         RecordedLevel(each.analysis.facts.name, level, tuple(_curves(each, CurveKind.RESPONSE_I)))
         for each in results.in_order
@@ -190,7 +190,7 @@ def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each diagram along frequency with the results of stepped sines and sweeps."""
+    """Draw each branch diagram; along frequency, with the results of stepped sines and sweeps."""
     levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
@@ -206,7 +206,7 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
 
 
 def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
-    """Draw a computed phase resonance with the tracked ones near it."""
+    """Draw a computed phase resonance with the tracked resonances near it."""
     low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
     facts = [each.analysis.facts for each in results.in_order]
     bands = [each.measurement.excitation.band_hz for each in facts]
@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest multipliers, or that it has no motion, at a level without a resonance."""
+    """State the model's largest multipliers, or its lack of motion, at a level without a resonance."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
@@ -235,7 +235,7 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
 
 
 def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
-    """State the ratio of a recording's level to the branches' level, where both exist."""
+    """State the ratio of a recording's base amplitude to that of the branches, where both exist."""
     request = diagram.request
     ratios = [
         amplitude / request.path.drive(frequency)[1]
@@ -250,7 +250,7 @@ def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tupl
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:
-    """Return a table of what was played, when, and how it ended."""
+    """Return a table of the measurement plan, its start, its duration and how it ended."""
     plan = facts.measurement
     reason = f": {facts.reason}" if facts.reason else ""
     rows = (
@@ -266,7 +266,7 @@ def measured_table(facts: RecordingFacts) -> ReportTable:
 
 
 def excitation_text(plan: Mapping[str, Any]) -> str:
-    """Describe a plan in one line with all its numbers."""
+    """Return a plan as one line of text with all its numbers."""
     rest = [
         f"{key} = {value}" for key, value in plan.items() if key != "kind" and not isinstance(value, list)
     ]
@@ -274,7 +274,7 @@ def excitation_text(plan: Mapping[str, Any]) -> str:
 
 
 def bench_table(facts: RecordingFacts) -> ReportTable:
-    """Return a table of the bench, its instruments, and the settings confirmed by hand."""
+    """Return a table of the bench, its instruments, and the settings that were confirmed by hand."""
     rows = [("bench", str(facts.bench.get("name", "not named")))]
     rows += [
         (part, f"{who.maker} {who.model}, serial {who.serial}, firmware {who.firmware}")
@@ -297,7 +297,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """State the result and age of the last check of the bench, and its findings that are not ok."""
+    """Return result and age of the last bench check, and its findings that are not ok, as text."""
     check = facts.bench_check
     if not check:
         return "none"
@@ -350,7 +350,7 @@ def channel_table(facts: RecordingFacts) -> ReportTable:
 
 
 def version_table(facts: RecordingFacts) -> ReportTable:
-    """Return a table of the programs that made the recording."""
+    """Return a table of the program versions that made the recording."""
     provenance = facts.provenance
     packages = ", ".join(f"{name} {which}" for name, which in dict(provenance.get("packages", {})).items())
     rows = (
@@ -363,13 +363,13 @@ def version_table(facts: RecordingFacts) -> ReportTable:
 
 
 def check_table(checks: tuple[Check, ...]) -> ReportTable:
-    """Return a table of each check's verdict, name and text."""
+    """Return a table with verdict, name and text of each check."""
     rows = tuple((each.verdict.value, each.what, each.text) for each in checks)
     return ReportTable("Checks", (), rows)
 
 
 CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Copies", "Overloads", "Drop-outs", "Drive level"})
-"""Checks whose warnings mean that a result is wrong or unplanned; other warnings only qualify it."""
+"""Checks whose warnings mean a wrong or unplanned result; other warnings only limit its validity."""
 _MOST_NUMBERS = 3
 
 
@@ -381,7 +381,7 @@ def write_report(
     hidden: Sequence[HiddenMotion] = (),
     maps: Sequence[MapResults] = (),
 ) -> Path:
-    """Write one HTML file with all figures; replace an older report of that name.
+    """Write one HTML file with all figures; replace an older report of the same name.
 
     Raises NotEnoughData when there are neither results nor failures to report.
 
@@ -392,13 +392,13 @@ def write_report(
     path
         Path of the HTML file; its folder is created.
     figures_folder
-        Folder for PNG, SVG and CSV of each figure; None writes none.
+        Folder for PNG, SVG and CSV of each figure; nothing is saved if None.
     diagrams
-        Branches that are overlaid on the stepped sines and sweeps.
+        Computed branches, drawn with the results of stepped sines and sweeps.
     hidden
-        Hidden motions of these recordings.
+        Estimated hidden motions of these recordings.
     maps
-        Maps on which the levels of stepped sines and sweeps are drawn.
+        Maps, drawn with the levels of stepped sines and sweeps.
     """
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
@@ -476,12 +476,12 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
 
 
 def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Agreement, str]:
-    """Return whether the measurement could be one of the simulated draws, with the reason if not.
+    """Return whether the measurement could be one of the simulated draws, and the reason if not.
 
     Parameters
     ----------
     failure
-        Reason why a simulation failed.
+        Failure of the simulation; None if it did not fail.
     """
     overlay = result.overlay
     if overlay is None:
@@ -502,16 +502,16 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
 
 
 def check_warnings(results: CampaignResults, checks: frozenset[str] | None = None) -> Iterator[str]:
-    """Yield the warnings of checks to read before a result is trusted.
+    """Yield warnings of checks that should be read before a result is trusted.
 
-    Returns a sentence for each check of a recording that ended with a warning.
+    Each warning is one sentence that starts with the name of the recording.
 
     Parameters
     ----------
     results
         Results of `vibench.analysis.analyse_files`.
     checks
-        Names of the checks whose warnings are wanted; by default all.
+        Names of the checks to include; by default all.
     """
     for result in results.results:
         for check in result.analysis.checks:
@@ -520,7 +520,7 @@ def check_warnings(results: CampaignResults, checks: frozenset[str] | None = Non
 
 
 def _benches(results: CampaignResults) -> Iterator[Fold]:
-    """Group recordings with the same bench, so that it is described once."""
+    """Yield one fold per bench with the names of its recordings, so that each bench is described once."""
     groups: dict[tuple[ReportTable, ...], list[str]] = {}
     for facts in results.facts:
         bench_tables = (bench_table(facts), channel_table(facts), version_table(facts))

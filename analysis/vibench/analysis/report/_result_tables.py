@@ -1,4 +1,4 @@
-"""The tables of a report: resonances, collisions, dwells and the lines of their spectra."""
+"""Tables of a report: resonances, collisions, dwells and the spectral lines of dwells."""
 
 from collections.abc import Iterator, Sequence
 
@@ -17,12 +17,12 @@ from ..uncertainty.budget import COVERAGE, Budget, Cause
 from ._page import ReportTable
 
 _NEAR = 0.08
-"""Largest relative distance of resonances in one row; modes lie at least 9 % apart."""
+"""Largest relative distance of resonances in one table row; modes are at least 9 % apart."""
 ABSENT = "–"
 _SMALLEST_BIAS = 1e-3
-"""Smallest bias that is shown; below it noise does not matter."""
+"""Smallest noise bias that is printed; a smaller bias does not matter."""
 _PAPER_COLLISION = "about 240 to 290 Hz"
-"""Gong et al. 2025, section 5: the grey area of the sweep."""
+"""Collision region in Gong et al. 2025, section 5: the grey area of the sweep."""
 
 
 def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
@@ -46,7 +46,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
 
 
 def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
-    """Return a table of each cause's part in the uncertainty of each quantity."""
+    """Return a table of the contribution of each cause to the uncertainty of each quantity."""
     return ReportTable(
         "Uncertainty, and what it is made of",
         ("recording", "quantity", "value", *(each.value for each in Cause)),
@@ -94,7 +94,7 @@ def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
 
 
 def nearest_resonance(frequency_hz: float, among: Sequence[Resonance]) -> Resonance | None:
-    """Return the nearest resonance if it may be the same mode, else None."""
+    """Return the nearest resonance if it is close enough to be the same mode, else None."""
     near = [each for each in among if abs(each.frequency_hz - frequency_hz) < _NEAR * frequency_hz]
     return min(near, key=lambda each: abs(each.frequency_hz - frequency_hz), default=None)
 
@@ -107,7 +107,7 @@ def _nearest(frequency_hz: float, among: Sequence[tuple[float, str]], form: str)
 
 
 def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
-    """Return a table of each sweep's collisions: measured, simulated and published."""
+    """Return a table of the collision regions in each sweep: measured, simulated and published."""
     return ReportTable(
         "Where the masses collide in a sweep",
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
@@ -140,12 +140,12 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 
 
 def edge_text(edge: Edge, instead: str) -> str:
-    """Return an edge with its bounds, or the given text if there is none."""
+    """Return an edge with its bounds as text, or ``instead`` if that is not empty."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
 
 
 def _last(edge: Edge) -> str:
-    """Return an end without bounds: collisions continue by chance and end elsewhere in another run."""
+    """Return the end of a region without bounds; it occurs by chance and differs in another run."""
     return f"{edge.frequency_hz:.1f} Hz in this run"
 
 
@@ -198,7 +198,7 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
 
 
 def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, str]:
-    """Return one response of the draws with the 95 % band, and the z of the measured one."""
+    """Return the draws' response with its 95 % band, and the z of the measured response."""
     found = None if overlay is None else overlay.quantity(name)
     if overlay is None or found is None:
         return ABSENT, ABSENT
@@ -210,7 +210,7 @@ def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, s
 
 
 def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
-    """Return a band's level in the draws [dB]; for a single run or a low level, that of the first run."""
+    """Return a band's level over all draws [dB]; for a single run or a low level, the level of the first."""
     found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]
@@ -223,7 +223,7 @@ def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
 
 
 def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
-    """Return a table of each dwell's motion at orders of the drive and in the terminal bands."""
+    """Return a table of each dwell's motion at multiples of the drive frequency and in the terminal bands."""
     rows = []
     for each in dwells:
         plan = each.analysis.excitation
