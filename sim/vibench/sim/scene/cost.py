@@ -1,6 +1,6 @@
-"""Expected run times on this machine, from previous runs or, for scenes with a target, from a pilot.
+"""Expected run times on this machine, from previous runs or, for scenes with a target, from a pilot run.
 
-A ledger keeps mean and scatter of actual over planned time for every kind of run.
+A ledger stores the mean and scatter of the ratio of actual to planned time for every kind of run.
 """
 
 import atexit
@@ -28,35 +28,34 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Number of later runs after which the weight of a run has fallen to a third."""
+"""Memory of the moving average: after this number of later runs, a run has a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Largest deviation that is learnt from one run: the reached motion may be random."""
+"""Largest logarithmic deviation used from one run, because the reached motion may be random."""
 FEWEST = 3
 """Fewest runs of a kind for an estimate of its scatter."""
 UNKNOWN_FACTOR = 10.0
-"""Factor of uncertainty on an unknown machine."""
+"""Uncertainty factor of the estimate before any runs are known."""
 LEAST_FACTOR = 1.5
 SURE, FEW = 2.0, 1.6
-"""Standard deviations that include 19 of 20 runs, and the addition for few runs: Student's t is about SURE (1
-+ FEW / (runs - 1))."""
+"""Coefficients of an approximation to Student's t for 19 of 20 runs: t = SURE (1 + FEW / (runs - 1))."""
 SAVED_EVERY_S = 5.0
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """Logarithms of actual over planned time for one kind."""
+    """Statistics of the logarithm of actual over planned time, for one kind of run."""
 
     runs: int = 0
     mean: float = 0.0
     variance: float = 0.0
 
     def off(self, ratio: float) -> float:
-        """Return the logarithmic deviation of one run, limited once enough runs are known."""
+        """Return the logarithmic deviation of one run; it is limited once enough runs are known."""
         off = math.log(ratio) - self.mean
         return off if self.runs < FEWEST else max(-SURPRISE, min(SURPRISE, off))
 
     def after(self, ratio: float) -> Self:
-        """Learn from one more run; the mean and variance fade (West, Comm. ACM 22 (1979) 532)."""
+        """Return the statistics after one more run, with fading memory (West, Comm. ACM 22 (1979) 532)."""
         runs = min(self.runs + 1, MEMORY)
         off, share = math.log(ratio) - self.mean, 1.0 / runs
         spread = (1.0 - share) * (self.variance + share * off * off)
@@ -68,11 +67,11 @@ class Expected:
     """Expected time of a job."""
 
     time_s: float
-    """On one core of this machine."""
+    """Expected time on one core of this machine [s]."""
     factor: float
-    """19 of 20 runs of this kind take between the time divided and multiplied by this factor."""
+    """Uncertainty factor: 19 of 20 such runs take between ``time_s / factor`` and ``time_s * factor``."""
     runs: int
-    """Number of runs behind the estimate; 0 without any."""
+    """Number of runs on which the estimate is based."""
 
     def __str__(self) -> str:
         """Return the estimate as text."""
@@ -87,7 +86,7 @@ class Expected:
 
 
 class CostLedger:
-    """Run times by kind, shared by all threads of a process."""
+    """Run times by kind of run, shared by all threads of a process."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -96,21 +95,21 @@ class CostLedger:
         self._saved_s = time.monotonic()
         self._is_new = False
         self._lately = deque[float](maxlen=MEMORY)
-        """Recent deviations of all kinds of run: a slower machine affects all kinds."""
+        """Recent logarithmic deviations of all kinds of run, to detect a slower machine."""
 
     def expected(self, kind: str, planned_s: float) -> Expected:
-        """Return the expected time of planned work; a new kind uses the data of a prefix of its name."""
+        """Return the expected time of a run; a new kind uses the statistics of a prefix of its name."""
         with self._lock:
             known, drift = self._known(kind), self._drift
         factor = UNKNOWN_FACTOR
         if known.runs >= FEWEST:
-            # The uncertainty of the mean is the scatter over the square root of the number of runs.
+            # Variance of a new run about the estimated mean: scatter of runs plus uncertainty of the mean.
             spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
         return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
-        """Record the time of a run, without the time for loading modules."""
+        """Record the time of a run, which must not include loading of modules."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
@@ -124,13 +123,13 @@ class CostLedger:
             self.save()
 
     def _known(self, kind: str) -> _Kind:
-        """Return the data of a kind, or of the longest known prefix of its name."""
+        """Return the statistics of a kind, or of the longest prefix of its name with enough runs."""
         enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
         return next((each for each in enough if each.runs >= FEWEST), _Kind())
 
     @property
     def _drift(self) -> float:
-        """Return the common recent deviation of all kinds; 0 unless significant."""
+        """Return the mean of the recent deviations of all kinds; 0 unless it is significant."""
         if len(self._lately) < MEMORY:
             return 0.0
         mean = math.fsum(self._lately) / MEMORY
@@ -138,7 +137,7 @@ class CostLedger:
         return mean if mean * mean * MEMORY > SURE * SURE * variance else 0.0
 
     def save(self) -> None:
-        """Save new data; ignore a folder that cannot be written."""
+        """Write new statistics to the file, if its folder is writable."""
         with self._lock:
             self._saved_s = time.monotonic()
             if not self._is_new:
@@ -158,7 +157,7 @@ def _names(kind: str) -> list[str]:
 
 
 def _read(path: Path) -> dict[str, _Kind]:
-    """Read the saved data; empty without a valid file."""
+    """Return the saved statistics by kind; empty without a valid file."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         known = {
@@ -175,7 +174,7 @@ def _read(path: Path) -> dict[str, _Kind]:
 
 @cache
 def cost_ledger() -> CostLedger:
-    """Return the ledger for this machine and these versions and sources; it is saved at exit."""
+    """Return the ledger for this machine, Python version and engine source; it is saved at exit."""
     about = (
         platform.node(),
         platform.machine(),
@@ -191,27 +190,27 @@ def cost_ledger() -> CostLedger:
 
 
 PILOTS, PILOT_S, PILOT_SHARE = 16, 1.0, 0.25
-"""Pilot of scenes with a target: most scenes, total time [s], and share of the remaining time for the next
+"""Pilot runs of scenes with a target: most scenes, total time [s], and share of the remaining time for each
 scene."""
 UNDECIDED = 3.0
-"""Assumed ratio of the time of a scene to the time of a pilot that did not determine it."""
+"""Assumed ratio of the time of a scene to the time of an inconclusive pilot run."""
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",
     InBatches(Question.MOTION): "settled in lanes",
     InBatches(Question.ANSWER): "in lanes",
 }
-"""Solvers other than `solve_scene`, and their kinds in the ledger."""
+"""Prefix of the kind in the ledger, for solvers other than `solve_scene`."""
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
-    """Record the processor time of a scene, without the time for loading modules and tables."""
+    """Record the processor time of a scene, which must not include loading of modules and tables."""
     plan = plan_scene(scene)
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 
 
 def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: bool = True) -> float:
-    """Return the expected time of a solver for a scene, from its recent runs or those of `solve_scene` [s].
+    """Return the expected time of a solver for a scene [s], from its recent runs or those of `solve_scene`.
 
     Raises ValueError when the specimen cannot be simulated.
     """
@@ -222,10 +221,10 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: b
 
 
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
-    """Return the mean time of ``count`` scenes with a target, from a pilot of some of them [s].
+    """Return the mean time of ``count`` scenes with a target [s], from pilot runs of some of them.
 
-    The time depends on whether the motion depends sensitively on its start, which is unknown beforehand.
-    Invalid scenes cost nothing.
+    Pilot runs are needed because the time depends on whether the motion is sensitive to its start, which is
+    not known in advance. The time of an invalid scene is zero.
     """
     ends_s, costs = time.monotonic() + PILOT_S, list[float]()
     for number in np.random.default_rng(count).permutation(count)[:PILOTS]:
@@ -240,7 +239,7 @@ def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
 
 
 def _target_cost_s(scene: Scene, most_s: float) -> float:
-    """Solve one scene for at most ``most_s``; return the estimated time of the complete solution [s]."""
+    """Solve a scene for at most ``most_s``; return the estimated time of its complete solution [s]."""
     assert scene.target is not None
     limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
     tried_s, began_s = min(most_s, limit_s), time.monotonic()

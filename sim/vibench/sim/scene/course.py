@@ -1,8 +1,8 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
-Both have three steps, so that many scenes can be batched: `way` is the motion to follow first; `watch`
-classifies it and returns any motion to follow further; `seen` observes the end. Between the steps,
-`StatesAlone.follow` follows one motion, and `in_batches` follows the motions of many scenes. SI units.
+Both have three steps, so that many scenes can be batched. `way` is the motion to follow first. `watch`
+classifies the motion and returns it if it must be followed further. `seen` observes the end. Between the
+steps, the caller follows one motion (`StatesAlone.follow`) or many scenes (`in_batches`). SI units.
 """
 
 import math
@@ -36,11 +36,11 @@ from .states_alone import StatesAlone
 
 @dataclass(frozen=True, eq=False)
 class SceneRun:
-    """End of a run and its findings."""
+    """Observed window of a run, and the classification of its motion."""
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
-    """Blocks of the watched motion; the last ones form the window."""
+    """Peaks and lines of consecutive parts of the motion; the last parts form the window."""
     was_settled: bool
     """Whether the motion repeated before the window began."""
     motion: MotionKind
@@ -50,22 +50,22 @@ class SceneRun:
     ended: str
     """Reason for the end of the run."""
     path: tuple[Stretch, ...]
-    """Stretch from the start until the motion settled or was certainly chaotic."""
+    """Stretches from the start until the motion settled or was certainly chaotic."""
     grew: bool
-    """Whether a propagated small change has grown enough to prove chaos."""
+    """Whether a small perturbation grew enough to prove chaos."""
     wandered_until_s: float
     """Last time at which the motion changed from period to period."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
-    """Relative change of the responses if the lines used the whole window, shape (4,); zero unless the motion
-    was only found to repeat in the window."""
+    """Relative effect of leakage if lines were taken over the whole window, shape (4,). Zero unless the
+    repetition was detected only within the window."""
 
 
 class FixedCourse:
     """Run of a motion for a given time, observed at its end.
 
-    The motion is checked once per drive period. If it does not repeat when the transient should have decayed,
-    a small change is propagated and extremes are kept by block, because only growth and statistics describe
-    a motion that never repeats.
+    The motion is checked once per drive period. If it does not repeat after the expected transient, a tangent
+    vector is propagated and the peaks of blocks are kept: a motion that never repeats is described only by
+    the growth of perturbations and by statistics.
     """
 
     def __init__(self, run: FollowedRun, pace: Pace, duration: FixedDuration) -> None:
@@ -74,11 +74,11 @@ class FixedCourse:
 
     @property
     def way(self) -> StatesAlone | None:
-        """Return the motion until it should have settled; None if followed without checks."""
+        """Return the motion up to the expected settling; None if it is advanced without checks."""
         return self._lead.states
 
     def watch(self) -> None:
-        """Return None: nothing more is followed."""
+        """Return None, because the motion of a fixed duration is never followed further."""
 
     def seen(self) -> SceneRun:
         """Observe the end of the motion and classify it."""
@@ -93,7 +93,7 @@ class FixedCourse:
         seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s requested have passed")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
-            # The period is known only now: observe the window again for lines without leakage.
+            # The period became known in the window: observe the window again, for lines without leakage.
             begins = window.begins.apart()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)
@@ -101,7 +101,7 @@ class FixedCourse:
             seen = replace(seen, window=whole, leaked=leaked)
         has_settled = self.way is not None and self.way.repeats is not None
         path = lead if has_settled else (*lead, last, *window.stretches)
-        # The start of the repetition was not determined.
+        # The time at which the motion settled was not determined.
         return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
@@ -115,9 +115,9 @@ def classify(
 ) -> SceneRun:
     """Return the kind of a motion from its window and the stretches before it.
 
-    Watched stretches before the window are blocks as long as those of the window. A motion that repeats is
-    periodic only if Newton's iteration finds a stable motion nearby. Chaos also comes close to unstable
-    periodic motions, and stays long near those that have just vanished in a fold.
+    The stretches before the window are as long as its blocks. A repeating motion is periodic only if Newton's
+    iteration finds a stable periodic motion nearby: chaos also comes close to unstable periodic motions, and
+    stays long where a periodic motion has just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
@@ -148,18 +148,18 @@ def classify(
 
 
 MOST_LOOKS = 4096
-"""Most states kept of a long lead: enough to detect that other starts diverge."""
+"""Most states kept before the window: enough to detect that other starts diverge."""
 LOOKS = 16
-"""Fewest checks for repetition on a long lead."""
+"""Fewest checks for repetition before the window."""
 LONGEST_SLICE = 1 << 16
-"""Most drive periods between two checks: their states are kept in memory."""
+"""Most drive periods between two checks, limited by the memory for their states."""
 
 
 class Lead:
-    """A motion advanced to an instant, with some of its states.
+    """The part of a run before its window, with some of its states.
 
-    Once it repeats to rounding, the remaining whole cycles are skipped. Motions integrated step by step never
-    repeat so closely.
+    Once the motion repeats to rounding, its remaining whole periods are skipped. A motion that is integrated
+    in time steps never repeats to rounding.
     """
 
     def __init__(self, run: FollowedRun, until_s: float, pace: Pace) -> None:
@@ -176,7 +176,7 @@ class Lead:
             self.states = states.aim(self._until_s)
 
     def end(self) -> tuple[Stretch, ...]:
-        """Advance the followed motion to the instant; return its path."""
+        """Advance the motion to the end of this part; return its stretches."""
         run, states = self._run, self.states
         if states is None:
             rate_hz = self._frequency_hz / self._every
@@ -189,31 +189,31 @@ class Lead:
 
 
 SLICE_S, SLICE_PERIODS = 0.25, 4
-"""Time and drive periods between two checks; less for shorter windows."""
+"""Least time [s] and drive periods between two checks; at most one window."""
 WINDOWS = 2
-"""Number of windows for which a motion that does not repeat is watched; the last one is observed."""
+"""Number of windows for which a non-repeating motion is watched; the last window gives the responses."""
 DRIFT_SHARE = 0.25
-"""Share of the budget for a slow drift: estimating its error repeats its path three times."""
+"""Share of the budget for following a slow drift; its error estimate repeats the run three times."""
 
 
 class SettlingCourse:
-    """Run of a motion until it repeats or certainly never will; then it is observed.
+    """Run of a motion until it repeats or certainly never will; then the motion is observed.
 
-    A repeating motion is observed over one of its periods, any other over a window. Because chaos can die
-    out, it is followed further by its states alone, as far as a budget allows.
+    A repeating motion is observed over one of its periods, any other motion over a window. Because chaos can
+    die out, a chaotic motion is followed further without a tangent vector, as far as a budget allows.
 
     Parameters
     ----------
     run, pace
         The motion, and its time scales and tolerances.
     window_s
-        Observed time of a motion that does not repeat; rounded to equal parts of whole drive periods.
+        Length of the window for a non-repeating motion; rounded to equal parts of whole drive periods.
     longest_s
-        Longest time to follow, at least a window; after it the motion may be undecided.
+        Longest time to follow the motion, at least a window; then an unclear motion is undecided.
     alone_s
-        Nominal cost for following chaos further by its states alone; zero disables this.
+        Nominal cost for following chaos further; zero disables this.
     by_itself_s
-        Time before which the motion is not followed in a batch; see `StatesAlone`.
+        Time after which the motion may join a batch; see `StatesAlone`.
     """
 
     def __init__(
@@ -278,7 +278,7 @@ class SettlingCourse:
         return None
 
     def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
-        """Return the motion to follow further in a budget; the last ``watched`` stretches were observed."""
+        """Return the motion to follow further; the last ``watched`` stretches of its path have a tangent."""
         run, frequency_hz = self._run, self._pace.frequency_hz
         self._path, self._watched = path, watched
         until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
@@ -286,7 +286,7 @@ class SettlingCourse:
         return self._on
 
     def seen(self) -> SceneRun:
-        """Return the findings; observe a last window first if the motion was followed further."""
+        """Return window and classification; observe a new window if the motion was followed further."""
         if self._on is not None:
             return self._after(self._on)
         assert self._seen is not None
@@ -297,7 +297,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have settled on a torus, which does not repeat either: only growth distinguishes the two.
+        # Chaos may have ended on a torus, which does not repeat either: only the growth tells them apart.
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [
@@ -320,7 +320,7 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the drive periods of a slice and the slices of a window."""
+    """Return the drive periods between two checks, and the number of these slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))
@@ -355,7 +355,7 @@ def _observe_last(
     pace: Pace,
     ended: str,
 ) -> SceneRun:
-    """Return the run with the last stretches as its window."""
+    """Return the findings for a run whose window is formed by its last ``in_window`` stretches."""
     last = stretches[-in_window:]
     begins = starts[-len(last)] if starts else run
     window = window_of(begins, last)

@@ -8,9 +8,9 @@ from ..specimen.state import Floats
 from .followed_run import FollowedRun
 
 TOLERANCE = 1e-10
-"""Tolerance of the map: far below the distance at which a motion counts as settled."""
+"""Integration tolerance of the period map: far below the distance that counts as settled."""
 RETURNED = 1e-10
-"""A motion is periodic when it returns this close, relative to its size."""
+"""Largest distance from the state a period earlier, over the size of the motion, of a periodic motion."""
 ITERATIONS = 8
 
 
@@ -21,17 +21,17 @@ class FixedPoint:
     run: FollowedRun
     """Run on this motion."""
     away: Floats
-    """Inverse of the identity minus the scaled derivative of the map, shape (6, 6)."""
+    """Inverse of the identity minus the scaled Jacobian of the period map, shape (6, 6)."""
     distance: float
-    """Distance of the given run from this motion, over the size of the motion."""
+    """Distance between the given run and this motion, over the size of the motion."""
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
-    """Find the stable motion of this many drive periods near a run; None if there is none."""
+    """Return the stable motion with this period, in drive periods, near a run; None if there is none."""
     try:
         return _fixed_point(near, period)
     except (ValueError, np.linalg.LinAlgError):
-        # The iteration came to a state that is not allowed, or a multiplier is one.
+        # The iteration left the allowed states, or a Floquet multiplier is one.
         return None
 
 

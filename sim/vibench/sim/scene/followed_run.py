@@ -1,4 +1,4 @@
-"""Motion under a harmonic drive, followed in stretches with different observations. SI units."""
+"""Motion under a harmonic drive, integrated stretch by stretch with different observations. SI units."""
 
 import math
 import sys
@@ -29,27 +29,27 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen, energy_metric, state_scales
 from ..specimen.state import Floats
 
-# Nominal cost of following a motion on the machine of docs/accuracy.md; the unit of budgets. SI units. It is
-# not measured at run time, so that a scene with a budget has the same result everywhere.
+# Nominal cost of integrating a motion: the processor time on the machine of docs/accuracy.md [s]. Budgets use
+# it instead of measured time, so that a scene with a budget has the same result on every machine.
 
 FLIGHT, STEPS = 5e-5, 3.5e-4
-"""Cost of one second of motion between contacts, and under a force at every p [s]."""
+"""Cost of one second of motion without contact, and of motion under a force that acts at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
 """Cost of an impact on a Hertz or rigid stop, and on a linear gap [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""Factors of the cost of contacts if a small change is propagated, because collisions then need steps."""
+"""Factors on the cost of contacts with a tangent vector, because collisions then need time steps."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 """Tolerance below which contacts cost more, and the factor."""
 STEP = 1e-9
-"""Smallest cost of a step of flight [s]: dominates where a mode is far faster than those of the paper."""
+"""Smallest cost of a step without contact [s]; dominates if a mode is far faster than those of the paper."""
 TANGENT_STEPS = 4
-"""Number of steps that one step with a small change counts as, where steps are limited."""
+"""Where steps are limited, one step with a tangent vector counts as this number of steps."""
 
 
 def nominal_cost_s(
     contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
 ) -> float:
-    """Return the nominal cost of a stretch with this many impacts, small changes and steps [s]."""
+    """Return the nominal cost of a stretch [s], from its impacts, tangent vectors and steps."""
     strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
     match contact:
         case PowerLaw():
@@ -64,7 +64,7 @@ def nominal_cost_s(
 
 @dataclass(frozen=True)
 class Samples:
-    """States to keep: the first at an instant, the others at a rate."""
+    """Sample times of stored states: time of the first sample, sample rate, and number."""
 
     first_s: float
     rate_hz: float
@@ -79,11 +79,11 @@ class Stretch:
     end_s: float
     outcome: Outcome
     impacts: int
-    """Contacts that began."""
+    """Number of contacts that began."""
     samples: Samples
-    """Which states were kept."""
+    """Sample times of the stored states."""
     states: Floats
-    """Kept states, shape (n, 6)."""
+    """Stored states, shape (n, 6)."""
     peak_x_m: float = 0.0
     """Largest abs(x); zero if not observed."""
     peak_p_m: float = 0.0
@@ -91,7 +91,7 @@ class Stretch:
     """Integral of x exp(-i (omega t + phase)) [m s]; zero if not observed."""
     area_p: complex = 0j
     growth: float = math.nan
-    """Natural logarithm of the growth of a small change; NaN without a tangent."""
+    """Natural logarithm of the growth of the tangent vector; NaN without one."""
 
     @property
     def length_s(self) -> float:
@@ -99,14 +99,14 @@ class Stretch:
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
-        """Return the stretch with only every n-th state."""
+        """Return the stretch with every n-th state only."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
 
 
 class FollowedRun:
-    """A running motion of a specimen, advanced in place.
+    """A motion of a specimen that is advanced in place.
 
     Raises ValueError when the specimen cannot be simulated, or not from this start.
     """
@@ -122,12 +122,12 @@ class FollowedRun:
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
         self.cost_s = 0.0
-        """Nominal cost since the start; see `nominal_cost_s`."""
+        """Nominal cost since the start [s]; see `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
 
     @property
     def tolerance(self) -> float:
-        """Relative error allowed in a step of a contact."""
+        """Relative tolerance of a time step in contact."""
         return self._run.tolerance
 
     @property
@@ -137,7 +137,7 @@ class FollowedRun:
 
     @property
     def state(self) -> Floats:
-        """X, y, z, vx, vy, vz now, shape (6,)."""
+        """Current x, y, z, vx, vy, vz, shape (6,)."""
         return self._run.motion
 
     def apart(self, tolerance: float | None = None) -> Self:
@@ -147,37 +147,37 @@ class FollowedRun:
         return twin
 
     def pass_over(self, drive_periods: int) -> None:
-        """Skip this many drive periods, after which a repeating motion has the same state."""
+        """Skip drive periods of a repeating motion: add them to the time and keep the state."""
         self._run.pass_over(drive_periods / self.drive.frequency_hz)
 
     @property
     def periods(self) -> int | None:
-        """Return the number of whole drive periods so far; None within a period."""
+        """Return the number of drive periods since time zero; None within a period."""
         whole = round(self.time_s * self.drive.frequency_hz)
         return whole if whole / self.drive.frequency_hz == self.time_s else None
 
     @property
     def is_in_flight(self) -> bool:
-        """Return whether no stop is touched now."""
+        """Return whether no stop is in contact."""
         return self._run.is_in_flight
 
     def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
-        """Return the stretch from an instant until now, followed in a batch."""
+        """Return the stretch that a batch has followed, from ``start_s`` until now."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
         self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
         samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, count)
         return Stretch(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states)
 
     def follow_tangent(self) -> None:
-        """Propagate a small change in a generic direction from now on."""
+        """Propagate a tangent vector in a generic direction from now on."""
         self._run.carry((self._scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
 
     def drop_tangent(self) -> None:
-        """Follow the states alone from now on."""
+        """Propagate no tangent vector from now on."""
         self._run.carry(np.empty((0, DIRECTIONS)))
 
     def pushed(self, push: Floats) -> Self:
-        """Return another motion that starts now, displaced by a small change of the state, shape (6,)."""
+        """Return a copy of the motion whose present state is changed by ``push``, shape (6,)."""
         twin, run = self.apart(), self._run.apart()
         run.place(start_motion(self.state + push))
         twin.__dict__.update(_run=run)
@@ -189,7 +189,7 @@ class FollowedRun:
         observe: Watch = Watch.NOTHING,
         samples: Samples | None = None,
     ) -> Stretch:
-        """Advance to an instant; a failed run does not move."""
+        """Advance to a time and return the stretch; a run that has failed stays where it is."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
         counts_as = TANGENT_STEPS if len(self._run.growth) else 1
@@ -224,13 +224,13 @@ class FollowedRun:
             area_x=record.area_x,
             area_p=record.area_p,
             samples=kept,
-            # Rounding may put samples just beyond the end.
+            # Rounding may place samples just after the end.
             states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )
 
     def image(self, drive_periods: int) -> tuple[Floats, Floats]:
-        """Return the state `drive_periods` later, and its derivative by the state now; NaN if lost."""
+        """Return the state `drive_periods` later and its Jacobian, shapes (6,) and (6, 6); NaN if lost."""
         run, frequency_hz = self._run.apart(), self.drive.frequency_hz
         made = self.time_s * frequency_hz if self.periods is None else self.periods
         until_s = (made + drive_periods) / frequency_hz
@@ -244,10 +244,10 @@ class FollowedRun:
         return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
 
     def _size(self) -> float:
-        """Return the natural logarithm of the size of the small change; NaN without one.
+        """Return the natural logarithm of the norm of the tangent vector; NaN without one.
 
-        The size is the root of its energy without stops, which only a stop can increase: the exchange of
-        displacement and velocity in a fast mode does not count as growth.
+        The norm is the square root of its energy in the linear system, which only contact can increase. In
+        this norm, oscillation between displacement and velocity does not count as growth.
         """
         if len(self._run.growth) == 0:
             return math.nan
@@ -258,9 +258,9 @@ class FollowedRun:
 
 
 def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list[Stretch | None]:
-    """Follow motions of one specimen in a batch, each for whole drive periods, by their states alone.
+    """Follow motions of one specimen in a batch, each for whole drive periods, without a tangent vector.
 
-    The result is None for a lost motion, which stays at its previous state.
+    The result for a motion that the batch cannot follow is None; its state does not change.
     """
     starts_s = [run.time_s for run in runs]
     found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
@@ -271,15 +271,15 @@ def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list
 
 
 BLOCKS = 10
-"""Number of parts of a window, from which its scatter is estimated."""
+"""Number of parts of a window; the scatter is estimated from them."""
 FIRST, LAST = 2, 3
-"""Number of first and last parts of a window whose growth proves lasting chaos: half of them are late, with
-or without a stretch before the window."""
+"""Number of first and last parts of a window in which growth is measured to prove lasting chaos. About half
+of them are late, with or without a stretch before the window."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Observations in the whole drive periods of a part of a motion."""
+    """Peaks and lines of a part of a motion that contains whole drive periods."""
 
     peak_x_m: float
     """Largest abs(x)."""
@@ -296,12 +296,12 @@ class ObservedWindow:
     begins: FollowedRun
     """Run at the start of the window."""
     stretches: tuple[Stretch, ...]
-    """Followed parts."""
+    """Consecutive stretches of the window."""
     blocks: tuple[Block, ...]
-    """Blocks, equally long to within a drive period."""
+    """Blocks of the window; their lengths differ by at most one drive period."""
     line_periods: int
-    """Number of whole drive periods before the end over which lines are taken: the largest multiple of the
-    motion's period in the window."""
+    """Number of drive periods at the end of the window over which lines are taken: the largest multiple of
+    the motion's period."""
     line_x_m: complex
     """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
     line_p_m: complex
@@ -323,12 +323,12 @@ class ObservedWindow:
 
     @property
     def responses_m(self) -> Floats:
-        """Return largest abs(x), line of x, largest abs(p) and line of p, absolute, shape (4,)."""
+        """Largest abs(x), drive-frequency amplitude of x, and the same for p, shape (4,)."""
         return np.array([self.largest_x_m, abs(self.line_x_m), self.largest_p_m, abs(self.line_p_m)])
 
     @property
     def impacts(self) -> int:
-        """Contacts that began."""
+        """Number of contacts that began in the window."""
         return sum(stretch.impacts for stretch in self.stretches)
 
 
@@ -338,13 +338,13 @@ def whole_periods(duration_s: float, frequency_hz: float) -> int:
 
 
 def samples_between(rate_hz: float, start_s: float, end_s: float) -> Samples:
-    """Return samples after ``start_s`` up to ``end_s``, at multiples of 1 / ``rate_hz`` from time zero."""
+    """Return the multiples of 1 / ``rate_hz`` after ``start_s`` and up to ``end_s`` as sample times."""
     first, last = (math.floor(time_s * rate_hz * (1.0 + WHOLE) + WHOLE) for time_s in (start_s, end_s))
     return Samples((first + 1) / rate_hz, rate_hz, max(0, last - first))
 
 
 def follow_with_section(run: FollowedRun, until_s: float, observe: Watch = Watch.NOTHING) -> Stretch:
-    """Follow a motion to an instant; keep its states once per drive period."""
+    """Follow a motion until a time, and store its state once per drive period."""
     end_s = max(until_s, run.time_s)
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
@@ -357,9 +357,9 @@ def observe_window(
 ) -> ObservedWindow:
     """Observe a motion through a window that begins now and contains at least one drive period.
 
-    Lines of a motion that repeats after ``cycle`` drive periods are taken over a multiple of ``cycle``, if
-    the window contains one: over other lengths, other lines leak in. If ``is_chaos`` is True for the first
-    parts, a small change is only propagated at both ends of the window.
+    For a motion that repeats after ``cycle`` drive periods, lines are taken over a multiple of ``cycle`` if
+    the window contains one; this avoids leakage from other lines. If ``is_chaos`` returns True for the first
+    parts, the tangent vector is propagated only at both ends of the window.
     """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
@@ -381,7 +381,7 @@ def observe_window(
 
 
 def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stretch] = ()) -> ObservedWindow:
-    """Return a window of parts with whole drive periods, after a head that only contributes peaks."""
+    """Return a window of ``parts`` with whole drive periods; ``head`` before them contributes only peaks."""
     frequency = begins.drive.frequency_hz
     periods = round(sum(part.length_s for part in parts) * frequency)
     scale = 2.0 * frequency / max(periods, 1)
@@ -396,7 +396,7 @@ def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stre
 
 
 def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
-    """Return each watched part as a block; a line is twice the mean of motion times drive phasor."""
+    """Return peaks and lines of each observed part; a line is 2 / T times the integral in `Stretch`."""
     return tuple(
         Block(
             part.peak_x_m,
@@ -410,30 +410,30 @@ def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
 
 
 def states_of(stretches: Sequence[Stretch]) -> Floats:
-    """Return all kept states, shape (n, 6)."""
+    """Return all stored states of consecutive stretches, shape (n, 6)."""
     return np.concatenate([np.empty((0, 6)), *(stretch.states for stretch in stretches)])
 
 
 LEAST_RATE_HZ = 20_000.0
-"""Lowest sample rate [1/s]: contacts are ten times slower, and m0 hardly responds to them."""
+"""Lowest sample rate [1/s]: ten times faster than contacts, to which m0 hardly responds."""
 HIGHEST = 0.25
-"""Highest kept frequency over the sample rate: aliases there are attenuated by m0 twice."""
+"""Highest frequency of the spectrum over the sample rate; aliases below it are attenuated by m0."""
 
 
 @dataclass(frozen=True, eq=False)
 class LineSpectrum:
-    """Amplitudes of x with a rectangular window, so that the drive's line and its multiples are exact."""
+    """Amplitude spectrum of x with a rectangular window, exact at multiples of the drive frequency."""
 
     frequency_hz: Floats
-    """Shape (lines,)."""
+    """Frequencies [Hz], shape (lines,)."""
     amplitude_m: Floats
-    """Shape (lines,)."""
+    """Amplitudes [m], shape (lines,)."""
 
 
 def spectrum_of(window: ObservedWindow) -> LineSpectrum:
-    """Follow a window again with samples, and return the spectrum of its whole periods.
+    """Integrate a window again with samples, and return the spectrum over its whole periods.
 
-    Sampling does not change the motion: it is the same to the last digit, even in chaos.
+    Sampling does not change the motion: both runs agree to the last digit, even in chaos.
     """
     run, periods = window.begins.apart(), window.line_periods
     frequency = run.drive.frequency_hz

@@ -1,4 +1,4 @@
-"""Mean over indistinguishable starts: its error, and how to reduce the error. SI units."""
+"""Mean responses over nearly equal starts: their error, and how to reduce it. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from .shares import student_quantile, wilson_share
 from .stated_error import ROUNDING
 
 ALIKE = 1e-2
-"""Relative tolerance of responses for starts on one motion: some are still settling."""
+"""Largest relative difference of responses for starts on one motion; some starts are still settling."""
 OTHER_DIFFERS = 1.0
-"""Assumed relative difference of a motion not yet found, such as chaos beside a motion without impacts."""
+"""Assumed relative difference of an undetected motion, such as chaos beside a motion without impacts."""
 FEWEST_STARTS = 16
 MOST_FREEDOM = 200
 """Degrees of freedom above which Student's quantile hardly changes."""
@@ -24,17 +24,17 @@ MOST_FREEDOM = 200
 
 @dataclass(eq=False)
 class Start:
-    """One of the indistinguishable starts, with the results of its windows."""
+    """One of several nearly equal starts, with the results of its windows."""
 
     run: FollowedRun
     windows: list[Floats]
-    """Responses of each window, shape (4,); a single one for a periodic motion."""
+    """Responses of each window, shape (4,); a periodic motion needs one window."""
     repeats: Repetition | None
-    """Period if the motion is nearly periodic: all its windows are alike."""
+    """Period of a nearly periodic motion, whose windows are all alike; otherwise None."""
     impacts: int
-    """Impacts in the first window."""
+    """Number of impacts in the first window."""
     section: Floats
-    """States once a drive period in the first window, shape (n, 6)."""
+    """States once per drive period in the first window, shape (n, 6)."""
 
     def mean(self, windows: int) -> Floats:
         """Return the mean of the responses over the first windows, shape (4,)."""
@@ -44,10 +44,10 @@ class Start:
 def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
     """Return the relative error of the mean over starts, shape (4,).
 
-    Student's interval for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
-    Coull, Am. Stat. 52 (1998) 119), so that a rare motion counts once a start reaches it. If most starts
-    reached one repeating motion and ``others`` did not, the share of the others may reach the upper end of
-    Wilson's interval. The larger of the two errors is used, since both are intervals of that share.
+    The error is the larger of two estimates. The first is Student's 95 % interval with the smallest and the
+    largest value counted twice (Agresti and Coull, Am. Stat. 52 (1998) 119), which gives weight to a rare
+    motion. The second applies if most starts reached one repeating motion and ``others`` starts did not: it
+    allows the share of the others to be at the upper end of Wilson's interval.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
@@ -63,18 +63,18 @@ def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
 
 
 def error_of(starts: Sequence[Start]) -> Floats:
-    """Return the relative error of the mean over the starts and windows so far, shape (4,)."""
+    """Return the relative error of the mean over all starts and their common windows, shape (4,)."""
     windows = windows_of(starts)
     return mean_error([each.mean(windows) for each in starts], others_of(starts))
 
 
 def windows_of(starts: Sequence[Start]) -> int:
-    """Return the number of windows that all starts have; periodic motions need only one."""
+    """Return the number of windows that all non-periodic starts have; 1 if all are periodic."""
     return min((len(each.windows) for each in starts if each.repeats is None), default=1)
 
 
 def others_of(starts: Sequence[Start]) -> int | None:
-    """Return how many starts did not reach the most common motion; None if that does not repeat."""
+    """Return how many starts missed the repeating motion that most starts reached; None without one."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None
@@ -84,7 +84,7 @@ def others_of(starts: Sequence[Start]) -> int | None:
 
 
 def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tuple[int, int]:
-    """Return the next numbers of starts and windows, at most doubling the motion followed so far."""
+    """Return the next number of starts and of windows; the work at most doubles."""
     windows = windows_of(starts)
     if len(starts) < FEWEST_STARTS:
         return FEWEST_STARTS, windows
@@ -95,10 +95,10 @@ def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tupl
 
 
 def windows_help(starts: Sequence[Start], lead: float) -> bool:
-    """Return whether more windows of the same starts reduce the error more cheaply than more starts.
+    """Return whether more windows per start should be added instead of more starts.
 
-    More starts also find rare motions, so windows must cost half as much or less. ``lead`` is the time before
-    the first window, in windows.
+    More starts also find rare motions. Windows are therefore added only if the variance within starts exceeds
+    half the variance between starts. ``lead`` is the time before the first window, in windows.
     """
     windows = windows_of(starts)
     if lead < 1.0 or any(each.repeats is not None for each in starts):
@@ -112,6 +112,6 @@ def windows_help(starts: Sequence[Start], lead: float) -> bool:
 
 
 def more_needed(starts: Sequence[Start], error: float) -> float:
-    """Return the factor by which more motion must be followed for the requested error."""
+    """Return the factor by which the simulated time must grow to reach the requested error."""
     power = 2.0 if others_of(starts) is None else 1.0
     return 1.05 * math.pow(float(error_of(starts).max()) / error, power)

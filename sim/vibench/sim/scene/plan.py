@@ -1,4 +1,4 @@
-"""Plan of a scene before it is run: method, reasons and cost. SI units."""
+"""Plan of a scene before its run: method, with reasons, and cost. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -22,59 +22,59 @@ from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observ
 if TYPE_CHECKING:
     from .cost import Expected
 
-# Without contact every displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0, at most
-# abs(S) + sum abs(m_j). A bound on p below the gap proves that no stop is ever touched.
+# Without contact a displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0. Its
+# magnitude is at most abs(S) + sum abs(m_j). If this bound on p is below the gap, no stop is ever touched.
 
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """A motion without contact, from time zero on."""
+    """Linear motion without contact from time zero: steady part and transient."""
 
     drive: Harmonic
     rates: Complex
-    """Rates of the modes, shape (n,) [1/s]."""
+    """Eigenvalues of the modes [1/s], shape (n,)."""
     modes: Complex
     """Contribution of each mode to x, y, z, vx, vy, vz at time zero, shape (n, 6)."""
     steady: Complex
-    """Phasors of the steady part, shape (6,), for exp(i (omega t + phase))."""
+    """Phasors of the steady part for exp(i (omega t + phase)), shape (6,)."""
 
     @property
     def steady_p(self) -> complex:
-        """Phasor of p = y - z [m]."""
+        """Phasor of the steady p = y - z [m]."""
         return complex(self.steady[Y] - self.steady[Z])
 
     @property
     def steady_x(self) -> complex:
-        """Phasor of x [m]."""
+        """Phasor of the steady x [m]."""
         return complex(self.steady[X])
 
     @property
     def largest_p_m(self) -> float:
-        """Return a bound on abs(p) at all times."""
+        """Return an upper bound on abs(p) at all times [m]."""
         return abs(self.steady_p) + float(np.abs(self.modes[:, Y] - self.modes[:, Z]).sum())
 
     @property
     def slowest_rate(self) -> float:
-        """Return the largest real part of a mode's rate [1/s], the decay of the transient; zero: no decay."""
+        """Return the largest real part of the eigenvalues [1/s]: the decay rate of the transient."""
         return float(self.rates.real.max())
 
     def state(self, time_s: float) -> Floats:
-        """Return x, y, z, vx, vy, vz at an instant, shape (6,)."""
-        # Whole turns are subtracted exactly; otherwise their rounding shifts the phase at late times.
+        """Return x, y, z, vx, vy, vz at a time, shape (6,)."""
+        # Subtract whole cycles exactly; otherwise their rounding shifts the phase at late times.
         part = float(Fraction(time_s) * Fraction(self.drive.frequency_hz) % 1)
         turn = 2.0 * math.pi * part + self.drive.phase_rad
         free = (self.modes * np.exp(self.rates * time_s)[:, None]).sum(axis=0)
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def share_left(self, time_s: float) -> float:
-        """Return the largest remaining transient relative to the steady part, in x or in p."""
+        """Return the transient that remains at a time over the steady part; the larger of x and p."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
         )
 
     def died_away_s(self, share: float) -> float:
-        """Return the time when the transient is below this share of the steady part; infinite if never."""
+        """Return the time at which the transient falls below a share of the steady part [s]; may be inf."""
         latest = 0.0
         for part, whole in self._parts:
             size = np.abs(part) * len(part) / (share * abs(whole))
@@ -90,7 +90,7 @@ class LinearMotion:
 
 
 def linear_motion(specimen: Specimen, drive: Harmonic, start: ArrayLike) -> LinearMotion:
-    """Return the motion from a start, shape (6,), until a stop is touched.
+    """Return the linear motion from a start, shape (6,); it is valid until a stop is touched.
 
     Raises ValueError when two modes coincide (critical damping) or numbers overflow.
     """
@@ -121,27 +121,27 @@ def never_touches(specimen: Specimen, motion: LinearMotion) -> bool:
 
 
 DECAYED_SHARE = 1e-9
-"""Largest transient, relative to the steady motion, that a closed form neglects."""
+"""Largest transient that the closed form neglects, over the steady motion."""
 
 CLOSED_FORM_S = 5e-4
-"""Planned time for a closed form [s]. The actual times of a machine are learnt from runs
+"""Planned time for a closed form [s]. Measured run times correct the planned times for each machine
 (`vibench.sim.scene.cost`)."""
 FLIGHT_S, PERIOD_S, IMPACT_S = 5e-5, 1e-7, 1e-6
-"""Planned time for a second of flight, for a drive period of flight, and for an impact [s]."""
+"""Planned time per second and per drive period of motion without contact, and per impact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
-"""Planned time for a second, and for a drive period, under a force that acts at every p [s]."""
+"""Planned time per second and per drive period of motion under a force that acts at every p [s]."""
 TANGENT = 1.5
-"""Time with a tangent vector over the time without."""
+"""Additional time for a tangent vector, over the time of the run without one."""
 SETTLING_S = 10.0
 """Planned length of an automatic duration [s]."""
 TOUCHING = 0.6
-"""Steady p without stops, over the gap, above which most motions depend sensitively on the start: 84 of 93
-random scenes above, 3 of 49 below (`benchmarks/planned_costs.py`)."""
+"""Ratio of the steady p without stops to the gap above which most motions depend sensitively on the start:
+84 of 93 random scenes above it, 3 of 49 below (`benchmarks/planned_costs.py`)."""
 SLOW = 0.9
-"""Drive frequency over the lowest natural one, below which a motion counts as slow."""
+"""Ratio of the drive frequency to the lowest natural frequency below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period where the linear p equals the gap; grows with the cube root of p over the gap."""
+"""Impacts per drive period if the linear p equals the gap; grows with the cube root of p over the gap."""
 MICROMETRES = 1e6
 
 
@@ -151,19 +151,19 @@ class ScenePlan:
 
     method: Method
     sentences: tuple[str, ...]
-    """Sentences on what is computed, what is not, and why."""
+    """Sentences that explain what is computed, what is not, and why."""
     planned_s: float
     """Estimated work [s] on a nominal reference machine."""
     longest_planned_s: float
-    """Estimated work if the motion never repeats and is followed to the end of an automatic duration."""
+    """Estimated work [s] if the motion never repeats and an automatic duration has its full length."""
     kind: str
-    """Kind for learning run times, with all its prefixes."""
+    """Kind of run in the cost ledger, ``a/b/c`` from general to special."""
     largest_p_m: float
-    """Bound on abs(p) while no stop is touched."""
+    """Upper bound on abs(p) without contact [m]."""
 
     @property
     def alike(self) -> tuple[str, ...]:
-        """Key of scenes that are solved in the same way, with any parameters."""
+        """Key that is equal for scenes solved in the same way, whatever their parameters."""
         return (self.method.value, *self.sentences[1:])
 
     @property
@@ -184,7 +184,7 @@ class ScenePlan:
 
 
 def plan_scene(scene: Scene) -> ScenePlan:
-    """Plan a scene without running it.
+    """Return the plan of a scene without running it.
 
     Raises ValueError when the specimen cannot be simulated.
     """
@@ -192,7 +192,7 @@ def plan_scene(scene: Scene) -> ScenePlan:
 
 
 def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
-    """Plan a scene whose motion is ``motion`` as long as no stop is touched."""
+    """Return the plan of a scene whose linear motion without contact is ``motion``."""
     method = _method(scene.specimen, motion, scene.duration)
     if method is Method.CLOSED_FORM:
         why = _reason_of_closed_form(scene.specimen, motion)
@@ -332,14 +332,14 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     return "/".join(
         (
             *(method.value, scene.specimen.contact.kind, contact, scene.accuracy.value, duration, observed),
-            # With sensitive dependence on the start, other starts use the whole budget.
+            # With sensitive dependence on the start, the other starts use the whole budget.
             f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target),
         )
     )
 
 
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
-    """Return the planned time for a second of motion [s]."""
+    """Return the planned time for one second of motion [s]."""
     share, frequency_hz = _share(scene, motion), scene.drive.frequency_hz
     per_period = IMPACTS_PER_PERIOD * math.cbrt(share) if share > TOUCHING else 0.0
     per_s = FLIGHT_S + (PERIOD_S + IMPACT_S * per_period) * frequency_hz
@@ -352,17 +352,17 @@ def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
 
 
 def _share(scene: Scene, motion: LinearMotion) -> float:
-    """Return steady p without stops over the narrower gap."""
+    """Return the ratio of the steady p without stops to the smaller gap, at most `MOST_SHARE`."""
     size_m = abs(motion.steady_p)
     return size_m / max(min(scene.specimen.gaps_m), size_m / MOST_SHARE) if size_m > 0.0 else 0.0
 
 
 def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
-    """Return the planned time for other starts, where sensitive dependence is probable [s]."""
+    """Return the planned time for other starts [s]; zero unless sensitive dependence is probable."""
     is_forgotten = _share(scene, motion) > TOUCHING and not _is_slow(scene, motion)
     return min(scene.budget_s, (FEWEST - 1) * run_s) if is_forgotten else 0.0
 
 
 def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
-    """Return whether the drive is far below all modes, where other starts are not planned."""
+    """Return whether the drive frequency is below all natural frequencies; no other starts are planned."""
     return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))

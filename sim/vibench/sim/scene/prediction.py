@@ -1,4 +1,4 @@
-"""Result of a scene: a flat, frozen value for tables, files and JSON. SI units."""
+"""Result of a scene: a flat, immutable record for tables, files and JSON. SI units."""
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
@@ -10,11 +10,11 @@ from ..specimen.state import Floats
 from .shares import EscapeRate, Share
 
 State = tuple[float, float, float, float, float, float]
-"""x, y, z, vx, vy, vz, absolute [m, m/s]."""
+"""x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""
 
 
 def state_of(values: Floats) -> State:
-    """Return a state of six numbers as a tuple."""
+    """Return a state, shape (6,), as a tuple."""
     x, y, z, vx, vy, vz = (float(value) for value in values)
     return (x, y, z, vx, vy, vz)
 
@@ -23,75 +23,75 @@ class MotionKind(StrEnum):
     """Kind of a motion, from its states once per drive period."""
 
     PERIODIC = "periodic"
-    """It repeats after `ScenePrediction.period` drive periods."""
+    """The motion repeats after `ScenePrediction.period` drive periods."""
     QUASI_PERIODIC = "quasi-periodic"
-    """It neither repeats nor depends sensitively on its start."""
+    """The motion neither repeats nor depends sensitively on its start."""
     CHAOTIC = "chaotic"
-    """It does not repeat, and depends sensitively on its start."""
+    """The motion does not repeat and depends sensitively on its start."""
     UNDECIDED = "undecided"
-    """Undecided: it was not followed for long enough."""
+    """The simulated time is too short to classify the motion."""
     CHAOTIC_SO_FAR = "chaotic so far"
-    """Chaotic as long as it was followed; it may not last: chaos from other starts died out, or all were
-    followed too briefly. `Ensemble.escape` contains its lifetime."""
+    """Chaotic during the simulated time, but possibly not for ever: chaos from other starts died out, or all
+    runs were too short. `Ensemble.escape` contains its lifetime."""
 
 
 class StartMemory(StrEnum):
     """Whether the start determines which motion is reached."""
 
     KEPT = "kept"
-    """A start a millionth of a gap away follows the same motion."""
+    """A start that differs by a millionth of the gap follows the same motion."""
     LOST = "lost"
-    """A small change of the start grew to the size of the motion: a repeated run, on another machine or at
-    another accuracy, may reach another motion."""
+    """A small perturbation of the start grew to the size of the motion. A repeated run, on another machine or
+    at another accuracy, may therefore reach another motion."""
     UNKNOWN = "unknown"
     """Not determined, because there was no budget."""
 
 
 @dataclass(frozen=True)
 class FoundMotion:
-    """One of the motions reached from indistinguishable starts.
+    """One of the motions reached from nearly equal starts.
 
-    Motions are the same if their kind and period are equal and all responses agree to a thousandth, or within
-    the scatter of chaos. Symmetric partners, whose responses are equal, are one motion.
+    Two motions are the same if their kinds and periods are equal and their responses agree to 0.1 %, or for
+    chaos within its scatter. Symmetric partners, whose responses are equal, count as one motion.
     """
 
     motion: MotionKind
     period: int | None
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude, from the first repeating start, else the mean over starts;
-    likewise the next three."""
+    """Largest abs(x) over the drive amplitude: from one start if the motion repeats, else the mean over its
+    starts. The next three responses are found in the same way."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None
     error_estimate: float | None
-    """Relative error of Response I of one more run that reaches this motion."""
+    """Expected relative difference of Response I in another run that reaches this motion."""
     starts: int
     """Number of starts that reached this motion."""
     share: Share
-    """Share of all starts. The intervals of all motions hold together in 19 cases of 20, also for longer
-    runs: starts that were chaotic, undecided, or on one of several chaotic motions may reach any other."""
+    """Share of all starts, with simultaneous 95 % intervals for all motions. They allow for longer runs, in
+    which starts that were undecided, chaotic, or on one of several chaotic motions may end elsewhere."""
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Motions from several starts a millionth of a gap apart, for sensitive dependence on the start."""
+    """Motions reached from several starts that differ by a millionth of the gap."""
 
     starts: int
     """Number of starts, including the requested one."""
     motions: tuple[FoundMotion, ...]
-    """Motions found, the largest share first."""
+    """Motions found, in the order of decreasing share."""
     requested_motion: int
-    """Index of the motion from the requested start; ``asked`` in JSON."""
+    """Index of the motion reached from the requested start; key ``asked`` in JSON."""
     unseen_share: float
-    """Upper 97.5 % confidence limit of the share of a motion that was not found; also for longer runs, in
-    which chaotic or undecided starts may reach it."""
+    """Upper 97.5 % confidence limit of the share of a motion that was not found. It includes longer runs, in
+    which chaotic or undecided starts may reach such a motion."""
     escape: EscapeRate | None
     """Rate at which chaos died out; None without chaos."""
     scatter: float | None
-    """Standard deviation of Response I over all starts, over its mean."""
+    """Relative standard deviation of Response I over all starts."""
     followed_s: float
-    """Total simulated time of all starts."""
+    """Total simulated time of all starts [s]."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +99,12 @@ class TargetReport:
     """Requested and reached error and time."""
 
     wanted_error: float | None
-    """Requested relative error; None if not requested. The same for the next."""
+    """Requested relative error; None if not requested, as ``wanted_time_s``."""
     wanted_time_s: float | None
     error: float | None
     """Largest of the four stated errors."""
     time_s: float
-    """Time since the request."""
+    """Time since the request [s]."""
     starts: int
     """Number of starts in the average; 1 without sensitive dependence on the start."""
     windows: int
@@ -112,8 +112,8 @@ class TargetReport:
     is_met: bool
     """Whether the error is at most the requested one."""
     needed_s: tuple[float, float, float] | None
-    """Time for the requested error: estimate and both ends of its interval. None if unknown, or if more time
-    does not reduce the error."""
+    """Time needed for the requested error [s]: estimate, lower and upper limit. None if unknown, or if more
+    time does not reduce the error."""
 
     @property
     def text(self) -> str:
@@ -148,18 +148,18 @@ class Method(StrEnum):
     """Method of solving a scene."""
 
     CLOSED_FORM = "closed form"
-    """A bound proves that no stop is ever touched: exact solution of the linear specimen."""
+    """Exact linear solution, where a bound proves that no stop is ever touched."""
     EVENT_DRIVEN = "event driven"
-    """Exact flight from contact to contact; contacts resolved to the tolerance."""
+    """Exact linear solution between contacts; time integration to the tolerance in contact."""
     POLYNOMIAL = "polynomial"
-    """For a force at every p: steps of eight Gauss points throughout."""
+    """Time integration throughout, with eight Gauss points per step, for a force that acts at every p."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ScenePrediction:
-    """Responses of one scene, with errors and details. None if not requested or not found.
+    """Responses of one scene, with errors and details. A field is None if not requested or not found.
 
-    Responses are divided by the drive amplitude; relative ones are of p = y - z.
+    Responses are divided by the drive amplitude. ``relative_i`` and ``relative_ii`` are those of p = y - z.
     """
 
     frequency_hz: float
@@ -180,15 +180,15 @@ class ScenePrediction:
     period: int | None = None
     """Period of a periodic motion, in drive periods."""
     duration_s: float
-    """Time for which the specimen was followed."""
+    """Simulated time [s]."""
     window_s: float
-    """Last part of that time, over which largest values were taken."""
+    """Length of the window at the end of the simulated time [s]."""
     settled_s: float | None = None
-    """Time when the motion was found to be settled; None if the duration was given."""
+    """Time at which the motion was found to be settled [s]; None if the duration was given."""
     ended: str
     """Reason for the end of the run."""
     integration_error: float | None = None
-    """Part of the error that a stricter accuracy would reduce."""
+    """Part of the error due to integration, which a stricter accuracy would reduce."""
     scatter: float | None = None
     """Relative standard deviation of Response I between windows, if the motion never repeats."""
     lyapunov_per_s: float | None = None
@@ -202,12 +202,12 @@ class ScenePrediction:
     method: Method
     accuracy: str
     response_i_error: float | None = None
-    """Relative error; see `vibench.sim.scene.solve.solve_scene`, also for the next three."""
+    """Relative error of ``response_i``; see `vibench.sim.scene.solve.solve_scene` for all four errors."""
     response_ii_error: float | None = None
     relative_i_error: float | None = None
     relative_ii_error: float | None = None
     error_estimate: float | None = None
-    """The largest of the four."""
+    """Largest of the four errors."""
     section: Floats | None = None
     """States once per drive period within the window, if a Poincaré section was requested, shape (n, 6)."""
     spectrum_hz: Floats | None = None
@@ -215,7 +215,7 @@ class ScenePrediction:
     spectrum: Floats | None = None
     """Amplitude of x at each frequency over the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
-    """Whether the start determined which motion was reached."""
+    """Whether the start determines which motion is reached."""
     ensemble: Ensemble | None = None
     """Motions from other starts; None if the start determined the motion, or without a budget."""
     target: TargetReport | None = None
@@ -227,7 +227,7 @@ class ScenePrediction:
         return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:
-        """Return plain values for JSON, None for NaN."""
+        """Return the fields as plain values for JSON, with None for NaN."""
         return _fields_of(self)
 
 

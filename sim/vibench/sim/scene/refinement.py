@@ -1,8 +1,8 @@
 """Solve a scene to a requested error or within a requested time. SI units.
 
-Each result has an error; better ones follow until the target is met. In order of cost: a closed form; a
-periodic motion, found by Newton's iteration once the motion approaches it; the motion in a stated window,
-checked by a stricter run; with sensitive dependence on the start, the mean over starts in a stated window.
+Results with errors follow each other until the target is met. The methods, from cheap to expensive: a closed
+form; Newton's iteration for a periodic motion that the run approaches; the responses in a stated window,
+checked by a stricter run; with sensitive dependence on the start, their mean over several starts.
 """
 
 import math
@@ -50,33 +50,33 @@ from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, wi
 LONGEST_S = 60.0
 """Default time limit of refinement [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
-"""Time of the first result, and the nominal cost that it may always use [s]."""
+"""Time at which a first result is due, and nominal cost that it may use even if time has run out [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal cost and largest processor time between two checks of the clock [s]."""
 FIRST_CYCLES = 1e4
-"""Most cycles of the fastest mode before the first check."""
+"""Most cycles of the fastest mode before the clock is first checked."""
 CLOSE = 3e-3
 """Relative change from one period to the next below which Newton's iteration is tried."""
 KNOWN = 0.03
-"""Relative distance from a known periodic motion below which that motion is tried."""
+"""Relative distance from a known periodic motion below which it is assumed to be approached."""
 MOST_PUSH = 1000.0
-"""Largest gap, in drive amplitudes, for drawing other starts."""
+"""Largest gap, over the drive amplitude, to which the differences of other starts are scaled."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
-"""The motion is checked after LOOK_PERIODS drive periods, then whenever its time has doubled, at most LOOK_S
-apart, and later after each LOOK_SHARE of its time."""
+"""Intervals between checks of the motion: at least LOOK_PERIODS drive periods; first as long as the time so
+far, up to LOOK_S; later LOOK_SHARE of the time so far."""
 LOOKS = 8
 """Number of checks of another start before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
-"""Relative tolerance of states for a motion that repeats."""
+"""Largest relative difference of states for a motion that repeats."""
 FIRST_STARTS, MOST_STARTS = 6, 1_000_000
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
-"""Cost of Newton's iteration over that of following the period once, and the share of the time that it may
-use."""
+"""Cost of Newton's iteration over the cost of one period of motion, and its largest share of the remaining
+time."""
 
 
 class _Clock:
-    """Clock for the requested time, and reports about the target."""
+    """Clock that limits the solution to the requested time and reports on the target."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -98,7 +98,7 @@ class _Clock:
         needed: tuple[float, float, float] | None = None,
         windows: int = 1,
     ) -> ScenePrediction:
-        """Add how the target is met so far."""
+        """Return the prediction with a report on how far the target is met."""
         error, target = found.error_estimate, self._target
         is_met = error is not None and (target.error is None or error <= target.error)
         taken_s = self.taken_s
@@ -114,11 +114,11 @@ class _Orbit:
     run: FollowedRun
     """Run on this motion."""
     section: Floats
-    """States once a drive period, shape (period, 6)."""
+    """States once per drive period, shape (period, 6)."""
     responses_m: Floats
-    """Shape (4,)."""
+    """Responses [m], shape (4,)."""
     errors: Floats
-    """Relative errors of the responses."""
+    """Relative errors of the responses, shape (4,)."""
     impacts: int
 
 
@@ -128,19 +128,19 @@ class _Path:
 
     run: FollowedRun
     recent: Floats
-    """States once a drive period, shape (n, 6)."""
+    """Recent states once per drive period, shape (n, 6)."""
     orbit: _Orbit | None = None
     distance: float = math.inf
-    """Relative distance from that motion at the last check."""
+    """Relative distance from the periodic motion at the last check."""
     closest: float = CLOSE
-    """Relative change per period below which Newton's iteration is tried next."""
+    """Relative change per period below which Newton's iteration is tried again."""
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     """Yield results of a scene with a target, each better than the previous one.
 
-    Raises ValueError when the scene has no target, the specimen cannot be simulated, or not even one
-    drive period could be followed in the requested time.
+    Raises ValueError when the scene has no target, when the specimen cannot be simulated, or when the
+    requested time is too short for one drive period.
 
     """
     if scene.target is None:
@@ -162,7 +162,7 @@ def refined(scene: Scene) -> ScenePrediction:
 
 
 class _Refinement:
-    """A scene whose motion is integrated in time."""
+    """Refinement of a scene whose motion is integrated in time."""
 
     def __init__(self, scene: Scene, motion: LinearMotion, clock: _Clock) -> None:
         assert scene.target is not None
@@ -182,22 +182,22 @@ class _Refinement:
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.apart(), self._twin.apart()
-        """Copies of both motions at their last check."""
+        """Copies of the motion and of the stricter second start at their last check."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
         """All periodic motions found."""
         self._size_m = self._spent_s = 0.0
         self._run_error: float | None = None
-        """Relative error of each start's responses by the tolerance of its run; None until it is measured."""
+        """Relative integration error of the responses of each start; None until it is measured."""
         self._kind: MotionKind | None = None
-        """Kind of the first start's motion if it does not repeat; None until a small change is followed."""
+        """Kind of the first start's motion if it does not repeat; None until it is determined."""
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
-        """Number of states that a path keeps."""
+        """Number of recent states that are stored."""
 
     def answers(self) -> Iterator[ScenePrediction]:
-        """Follow the motion from its start, then continue according to its kind."""
+        """Yield the results; raise ValueError if there was no time for any result."""
         for found in self._all():
             self._has_answered = True
             yield found
@@ -236,14 +236,14 @@ class _Refinement:
         return (made + math.ceil(look)) / self._frequency_hz
 
     def _drawn(self, count: int) -> Floats:
-        """Draw small changes of the start, shape (count, 6), far smaller than the motion."""
+        """Return random changes of the start, shape (count, 6), far smaller than the motion."""
         drawn = pushes(self._scene.specimen, self._scene.drive, count, SEED)
         gap_m, most_m = min(self._scene.specimen.gaps_m), MOST_PUSH * self._scene.drive.amplitude_m
         return np.asarray(drawn * (most_m / gap_m if most_m < gap_m < math.inf else 1.0))
 
     @property
     def _settle_s(self) -> float:
-        """Return the settling time of a motion that does not repeat."""
+        """Return the time after which a motion that does not repeat is observed [s]."""
         longest_s = self._scene.duration.longest_s
         if self._motion.slowest_rate >= 0.0:
             longest_s = min(longest_s, PAPER_DURATION_S)
@@ -257,7 +257,7 @@ class _Refinement:
     def _followed(
         self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[Stretch] | None:
-        """Follow a motion in short parts; None if time has run out, or the motion was lost."""
+        """Follow a motion in short parts and return them; None if time ran out or the motion was lost."""
         parts: list[Stretch] = []
         while run.time_s < until_s:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
@@ -268,19 +268,19 @@ class _Refinement:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # The nominal cost, equal on every machine, sets the length of parts unless it is far too low.
+            # The length of parts follows the nominal cost, equal on every machine, unless it is far too low.
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
     def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
-        """Observe a number of drive periods of a motion; None if time has run out."""
+        """Return the window of the next drive periods of a motion; None if time ran out or it was lost."""
         begins = run.apart()
         made = round(run.time_s * self._frequency_hz)
         parts = self._followed(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
         return None if parts is None else window_of(begins, parts)
 
     def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
-        """Return whether another start has diverged from this motion."""
+        """Return whether the motions from two starts have diverged."""
         mine, theirs = states_of(ours)[:, :3], states_of(other)[:, :3]
         self._size_m = max(self._size_m, float(np.abs(mine).max(initial=0.0)))
         gap_m = min(self._scene.specimen.gaps_m)
@@ -288,7 +288,7 @@ class _Refinement:
         return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
 
     def _approaches(self, path: _Path, seen: Sequence[Stretch]) -> bool:
-        """Return whether a motion, with newly seen states, approaches a stable periodic motion; store it."""
+        """Add new states to a path; return whether it approaches a stable periodic motion, and store that."""
         path.recent = recent = np.concatenate([path.recent, states_of(seen)])[-self._kept :]
         if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
             return False
@@ -302,7 +302,7 @@ class _Refinement:
         elif len(near) > 0 and not now < path.distance:
             path.closest = 0.3 * float(changes[near[0]])
             known = self._nearest(recent[-1], KNOWN * size)
-            # A motion that no longer approaches the nearest known one may be near its mirror image.
+            # A motion that stops approaching a known motion may be near another one, as its mirror image.
             is_new = known is not None and known is not path.orbit
             path.orbit = (known if is_new else self._newton(path.run, int(near[0]) + 1)) or path.orbit
             now = self._away_from(path.orbit, recent[-1], size)
@@ -316,18 +316,18 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion over a size; infinite without one."""
+        """Return the distance of a state from a periodic motion, divided by ``size``; inf without one."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
 
     def _nearest(self, state: Floats, within: float) -> _Orbit | None:
-        """Return the nearest known periodic motion within a distance; None without one."""
+        """Return the known periodic motion nearest to a state; None if the distance exceeds ``within``."""
         found = min(self._orbits, key=lambda each: self._away_from(each, state, 1.0), default=None)
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Find a stable motion of this many drive periods, or a divisor of them, near the present state."""
+        """Return a stable motion near a run, whose period is ``period`` drive periods or a divisor of it."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
@@ -346,7 +346,7 @@ class _Refinement:
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
                 return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        # Effect of rounding the state at the end of a period, amplified by the inverse of the map.
+        # Effect of rounding at the end of a period, amplified by the inverse in Newton's iteration.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
@@ -374,11 +374,11 @@ class _Refinement:
         return self._clock.report(found)
 
     def _section(self, states: Floats) -> Floats | None:
-        """Return states once per drive period if they are observed."""
+        """Return the states once per drive period if a Poincaré section was requested, otherwise None."""
         return states if Observable.POINCARE in self._scene.observe else None
 
     def _interim(self) -> Iterator[ScenePrediction]:
-        """Return the result for a window from the last check of both motions."""
+        """Yield the result for a window that begins at the last check of both motions."""
         self._spent_s = 0.0
         run, twin = (each.apart() for each in self._pair)
         periods = min(self._window_periods, max(1, round(run.time_s * self._frequency_hz) // 8))
@@ -390,7 +390,7 @@ class _Refinement:
 
     @property
     def _unsettled(self) -> float:
-        """Estimate the relative distance from the final motion, by the change in one forgetting time."""
+        """Return the estimated relative distance from the final motion, from its change in one decay time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -402,7 +402,7 @@ class _Refinement:
     def _in_window(
         self, window: ObservedWindow, other: ObservedWindow, run: FollowedRun, unsettled: float = 0.0
     ) -> ScenePrediction:
-        """Return the result for the motion of one start in a stated window, checked by a stricter run."""
+        """Return the result for one start in a stated window, with errors from a stricter run."""
         answer = window.responses_m
         off = np.abs(answer - other.responses_m) / answer
         is_parted = not float(off.max()) < PARTED
@@ -420,7 +420,7 @@ class _Refinement:
         return self._clock.report(found)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
-        """Return the result in a stated window for a non-repeating motion that its start determines."""
+        """Yield results in a stated window for a non-repeating motion that is not sensitive to its start."""
         main, twin, periods = self._main, self._twin, self._window_periods
         for tolerance in (None, TIGHTEST):
             if tolerance is not None:
@@ -445,7 +445,7 @@ class _Refinement:
                 return
 
     def _many_starts(self) -> Iterator[ScenePrediction]:
-        """Return the mean over indistinguishable starts in a stated window."""
+        """Yield the mean over nearly equal starts in a stated window, with more and more starts."""
         lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
         begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
         each_s = begins_s + self._window_periods / self._frequency_hz
@@ -473,7 +473,7 @@ class _Refinement:
                 wanted, windows = next_size(starts, self._target.error, lead)
 
     def _observe_more(self, starts: list[Start], wanted: int, windows: int, begins_s: float) -> bool:
-        """Observe one more window of a start, or a new start; return False if time has run out."""
+        """Observe one more window or one more start; return False if time ran out or the run was lost."""
         for each in starts:
             if each.repeats is None and len(each.windows) < windows:
                 window = self._observed(each.run, self._window_periods)
@@ -507,7 +507,7 @@ class _Refinement:
         return window is not None
 
     def _mean(self, starts: Sequence[Start], begins_s: float) -> ScenePrediction:
-        """Return the mean over the starts and windows so far."""
+        """Return the result for the mean over all starts and windows observed so far."""
         windows, window_s = windows_of(starts), self._window_periods / self._frequency_hz
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)
@@ -541,14 +541,14 @@ class _Refinement:
             part_s = len(starts) * windows * window_s
             if not windows_help(starts, begins_s / window_s):
                 part_s = sum(each.run.time_s for each in starts)
-            # The deviation of n draws has a relative uncertainty of 1 / sqrt(2 n).
+            # The standard deviation of n samples has a relative uncertainty of 1 / sqrt(2 n).
             off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
             about_s = max(0.0, self._clock.taken_s + more * per_s * part_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
         return self._clock.report(found, len(starts), needed, windows)
 
     def _kind_of_others(self, begin: FollowedRun) -> MotionKind:
-        """Return the kind of a motion that does not repeat, by the growth of a small change in one window."""
+        """Return the kind of a non-repeating motion, from the growth of a perturbation in one window."""
         run, seen = begin.apart(), list[Stretch]()
         run.follow_tangent()
         until_s = run.time_s + self._window_periods / self._frequency_hz
@@ -564,7 +564,7 @@ class _Refinement:
         return found if is_torus else MotionKind.UNDECIDED
 
     def _lost(self) -> ScenePrediction:
-        """Return the result for a motion that could not be followed."""
+        """Return the result for a motion that could not be integrated to the end."""
         run = self._main
         found = self._prediction(np.full(4, math.nan), np.full(4, math.nan), run.time_s, 0.0, 0)
         found = replace(found, ended=run.outcome.text, outcome=run.outcome)
@@ -573,7 +573,7 @@ class _Refinement:
     def _prediction(
         self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
     ) -> ScenePrediction:
-        """Return a prediction with responses and relative errors; callers replace the other fields."""
+        """Return a prediction with responses and relative errors; callers set the other fields."""
         amplitude_m = self._scene.drive.amplitude_m
         is_free = never_touches(self._scene.specimen, self._motion)
         response_i, response_ii, relative_i, relative_ii = (

@@ -1,8 +1,8 @@
-"""Classify a motion from its states once per drive period and the growth of a small change.
+"""Classify a motion from its states once per drive period and the growth of a small perturbation.
 
-The states alone show whether it repeats. A motion that does not repeat is chaotic if a small change keeps
-growing, quasi-periodic if it neither grows nor decays (Lichtenberg and Lieberman, Regular and Chaotic
-Dynamics (1992), section 5.3; growth is counted in natural logarithms).
+The states show whether the motion repeats. A motion that does not repeat is chaotic if a small perturbation
+keeps growing, and quasi-periodic if the perturbation neither grows nor decays (Lichtenberg and Lieberman,
+Regular and Chaotic Dynamics (1992), section 5.3). Growth is stated as a natural logarithm.
 """
 
 from collections.abc import Sequence
@@ -19,60 +19,60 @@ from .followed_run import Stretch, states_of
 from .prediction import MotionKind
 
 MOST_PERIODS = 32
-"""Longest period to search, in drive periods."""
+"""Longest period that is detected, in drive periods."""
 FEWEST_BETWEEN = 8
 """Fewest drive periods between compared states."""
 SLOWEST_RATIO = 0.99
-"""Largest assumed ratio of a change to the previous one, for the slowest settling."""
+"""Largest assumed ratio of a change to the previous change, for the slowest settling."""
 NEARLY = 0.01
 """Largest relative change of a settling motion from one of its periods to the next."""
 TINY = 1e-300
 """Size used for a motion at rest."""
 DISTINCT = 20.0
-"""Difference, in tolerances, between a motion of several periods and one of fewer; with a smaller difference
-it may still be settling."""
+"""Smallest change, in tolerances, after each number of drive periods below the period. With a smaller change
+the motion may still be settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
-"""Growth of a small change by e^12 = 160 000: more than shear of regular motions causes."""
+"""Growth that proves chaos: a factor of e^12 = 160 000, more than regular motions cause by shear."""
 NEUTRAL = 0.1
-"""Growth per forgetting time that counts as zero; the specimen's damping alone gives -1."""
+"""Growth per decay time of the slowest mode that counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
-"""Number of consecutive parts over which the changes of a drift grow or shrink: by chance in 2 cases of
-720."""
+"""Number of consecutive parts in which the changes of a drift steadily grow or shrink; this happens by chance
+in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Forgetting times without growth or decay that make a motion quasi-periodic."""
+"""Decay times without growth or decay of a perturbation after which a motion counts as quasi-periodic."""
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """Period of a repeating motion, with the remaining distance."""
+    """Period of a repeating motion, in drive periods, with its distance from exact repetition."""
 
     period: int
     distance: float
-    """Remaining distance relative to the size of the motion."""
+    """Estimated distance from the periodic motion, over the size of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """Growth of a small change over consecutive stretches of a motion."""
+    """Growth of a small perturbation over consecutive stretches of a motion."""
 
     logarithms: Floats
     """Natural logarithm of the growth over each stretch, shape (stretches,)."""
     duration_s: float
-    """Duration of all stretches together."""
+    """Total duration of the stretches [s]."""
 
     @property
     def total(self) -> float:
-        """Return the growth over all stretches."""
+        """Return the natural logarithm of the growth over all stretches."""
         return float(self.logarithms.sum())
 
     @property
     def is_certain(self) -> bool:
-        """Return whether a small change has certainly grown."""
+        """Return whether the growth is large enough to prove chaos."""
         return self.total > CERTAIN_GROWTH
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Return the growth over the earlier and the later stretches."""
+        """Return the growth over the first and the second half of the stretches."""
         middle = len(self.logarithms) // 2
         return float(self.logarithms[:middle].sum()), float(self.logarithms[middle:].sum())
 
@@ -82,25 +82,25 @@ class Sharpness:
     """Tolerances relative to the size of a motion."""
 
     tolerance: float
-    """Remaining distance that counts as settled."""
+    """Largest distance from the periodic motion that counts as settled."""
     noise: float
-    """Changes from one period to the next due to integration steps alone."""
+    """Changes from one period to the next caused by the integration steps."""
 
 
 def repetition(
     section: Floats, omega: float, forgetting_periods: float, sharpness: Sharpness
 ) -> Repetition | None:
-    """Find the fewest drive periods after which the end of a section repeats; None if it does not.
+    """Return the shortest period after which the end of a section repeats; None if it does not.
 
-    States one forgetting time apart are compared twice, because a small change per period may belong to a
-    slow drift over a long way. The ratio of the two changes gives the remaining distance.
+    States one decay time apart are compared twice, because a small change per period may belong to a slow
+    drift over a large distance. The ratio of the two changes gives the remaining distance.
 
     Parameters
     ----------
     section
-        States once a drive period, shape (n, 6); longer ones find longer periods.
+        States once per drive period, shape (n, 6); longer periods require longer sections.
     omega
-        Angular frequency of the drive [rad/s], which scales velocities to displacements.
+        Angular frequency of the drive [rad/s]; velocities are divided by it.
     forgetting_periods
         Drive periods in which the slowest mode without contact decays by a factor of e.
     sharpness
@@ -125,13 +125,13 @@ def repetition(
 
 
 def _returns_nowhere(points: Floats, tolerance: float) -> bool:
-    """Return whether the last state alone excludes repetition (a fast test for chaos)."""
+    """Return whether the last state alone excludes repetition (a fast test that detects most chaos)."""
     changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
     return bool(np.all(changes >= tolerance))
 
 
 def wandered_until(section: Floats, omega: float, period: int) -> int:
-    """Return how many states pass before a section nearly repeats after a period."""
+    """Return the index of the first state from which a section nearly repeats with this period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)
@@ -142,13 +142,13 @@ def wandered_until(section: Floats, omega: float, period: int) -> int:
 def is_drifting(section: Floats, omega: float) -> bool:
     """Return whether the changes of a motion from period to period shrink or grow steadily.
 
-    Near a bifurcation a motion settles so slowly that a small change neither grows nor decays in the watched
-    time, as on a torus. But on a torus the changes keep their size.
+    Near a bifurcation a motion settles so slowly that a perturbation neither grows nor decays measurably, as
+    on a torus. On a torus, however, the changes from period to period keep their size.
 
     Parameters
     ----------
     section
-        States once a drive period, shape (n, 6).
+        States once per drive period, shape (n, 6).
     omega
         Angular frequency of the drive [rad/s].
     """
@@ -163,7 +163,7 @@ def is_drifting(section: Floats, omega: float) -> bool:
 
 
 def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
-    """Return the remaining distance of a motion if its changes continue to shrink."""
+    """Return the distance from the periodic motion, extrapolated from the shrinking changes."""
     late = _change(points[-period:], points[-period - lag : -lag])
     if late < noise:
         return late
@@ -173,12 +173,12 @@ def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
 
 
 def longest_section(forgetting_periods: float) -> int:
-    """Return the number of states that are needed to find every period up to the longest."""
+    """Return the number of states needed to detect every period up to `MOST_PERIODS`."""
     return 2 * (int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN))) + MOST_PERIODS) + MOST_PERIODS
 
 
 def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
-    """Return the kind of a motion; undecided if it may still be settling, within eight times ``fading_s``."""
+    """Return the kind of a motion; undecided if the growth is unclear or was observed too briefly."""
     if repeats is not None:
         return MotionKind.PERIODIC
     times = growth.duration_s / fading_s
@@ -196,23 +196,23 @@ def _change(after: Floats, before: Floats) -> float:
 
 
 FORGETTING = 8.0
-"""Forgetting times after which a non-repeating motion counts as on its attractor."""
+"""Decay times of the slowest mode after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
-"""Forgetting times in the longest run; slower and undamped modes count as this slow."""
+"""Length of the longest run over the longest decay time; slower and undamped modes are given this time."""
 MOST_STATES = 2_000_000
-"""Most drive periods in a window: the states of two windows and a copy take 300 MB."""
+"""Most drive periods in a window; the states of two windows and a copy take 300 MB."""
 FEWEST_PERIODS = 32
 """Fewest drive periods after which a non-repeating motion counts as on its attractor."""
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
-"""Relative distance from the repeating motion at which a motion counts as settled."""
+"""Relative distance from the periodic motion below which a motion counts as settled."""
 ROUNDING = 1e-10
-"""Noise of exact flight, and of contacts with the same start and end as a period before."""
+"""Relative noise of exact flight, and of contacts that begin and end as one period before."""
 EXACTLY = 1e-9
-"""Distance at which the rest of a settling motion is skipped: smaller than the error of any accuracy
-level."""
+"""Relative distance from the periodic motion below which the rest of a run is skipped; smaller than the error
+of any accuracy level."""
 STEPPING = 100.0
-"""Noise over the tolerance for integration in steps, which differ from period to period. Measured: at most 70
-(p^7 at 130 Hz and 20 um)."""
+"""Noise of time integration over its tolerance, because steps differ from period to period. Measured: at most
+70 (p^7 at 130 Hz and 20 um)."""
 
 
 @dataclass(frozen=True)
@@ -221,57 +221,57 @@ class Pace:
 
     frequency_hz: float
     forgetting_s: float
-    """Time in which the slowest mode without contact decays by e, at most the longest waiting time."""
+    """Time in which the slowest mode without contact decays by e [s], limited to 1/40 of the longest run."""
     fading_s: float
-    """Time of this decay without the limit; for undamped modes, the limit."""
+    """The same decay time without the limit [s]; for undamped modes, the limit."""
     sharpness: Sharpness
     nearly: Sharpness
-    """Sharpness of the least accurate level."""
+    """Tolerances of the least accurate level."""
 
     @property
     def forgetting_periods(self) -> float:
-        """Return the forgetting time in drive periods."""
+        """Return the decay time ``forgetting_s`` in drive periods."""
         return self.forgetting_s * self.frequency_hz
 
     @property
     def attractor_s(self) -> float:
-        """Return the time after which a non-repeating motion counts as on its attractor."""
+        """Return the time after which a non-repeating motion counts as on its attractor [s]."""
         return max(FORGETTING * self.forgetting_s, FEWEST_PERIODS / self.frequency_hz)
 
     @property
     def section_s(self) -> float:
-        """Return the length of a section that shows every period."""
+        """Return the length of a section that is needed to detect every period [s]."""
         return (longest_section(self.forgetting_periods) + 1) / self.frequency_hz
 
     @property
     def settling_s(self) -> float:
-        """Return the time needed to detect that a motion repeats."""
+        """Return the run length that is needed to detect that a motion repeats [s]."""
         return self.attractor_s + self.section_s
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
-        """Return the repetition at the end of these consecutive stretches, if any."""
+        """Return the repetition at the end of consecutive stretches; None if the motion does not repeat."""
         return self.repeats_in(states_of(stretches))
 
     def drifts(self, stretches: Sequence[Stretch]) -> bool:
-        """Return whether the motion of these stretches still approaches or leaves another motion."""
+        """Return whether the motion still approaches or leaves another motion; see `is_drifting`."""
         return is_drifting(states_of(stretches), 2.0 * np.pi * self.frequency_hz)
 
     def cycle(self, stretches: Sequence[Stretch]) -> int:
-        """Return the drive periods over which lines are taken: the motion's own, if it has nearly settled.
+        """Return the period of a nearly settled motion, over which lines are taken; 1 if there is none.
 
-        The limit for "nearly" is equal at every accuracy level, so that lines are comparable.
+        The limit for "nearly settled" is the same at every accuracy level, so that lines are comparable.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period
 
     def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
-        """Return whether a small change grew enough in each half of these stretches to prove chaos."""
+        """Return whether a perturbation grew enough in each half of the stretches to prove chaos."""
         growth = growth_of(stretches)
         is_plenty = min(growth.halves) > CERTAIN_GROWTH
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC
 
     def repeats_in(self, section: Floats) -> Repetition | None:
-        """Return the repetition at the end of these states once per drive period, shape (n, 6), if any."""
+        """Return the repetition at the end of a section, shape (n, 6); None if it does not repeat."""
         omega = 2.0 * np.pi * self.frequency_hz
         return repetition(section, omega, self.forgetting_periods, self.sharpness)
 
@@ -279,7 +279,7 @@ class Pace:
 def pace_of(
     specimen: Specimen, frequency_hz: float, accuracy: Accuracy, slowest_rate: float, longest_s: float
 ) -> Pace:
-    """Return the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
+    """Return the time scales and tolerances, for a slowest mode with ``slowest_rate`` <= 0 [1/s]."""
     slowest_s = min(longest_s / FEWEST_TIMES, MOST_STATES / FEWEST_TIMES / frequency_hz)
     fading_s = -1.0 / slowest_rate if slowest_rate < 0.0 else slowest_s
     own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))
@@ -296,7 +296,7 @@ def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
 
 
 def growth_of(stretches: Sequence[Stretch]) -> Growth:
-    """Return the growth of a small change over the stretches that propagated one."""
+    """Return the growth of the tangent vector over the stretches that have one."""
     carried = [stretch for stretch in stretches if np.isfinite(stretch.growth)]
     logarithms = np.array([stretch.growth for stretch in carried])
     return Growth(logarithms, sum(stretch.length_s for stretch in carried))

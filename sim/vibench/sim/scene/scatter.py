@@ -1,8 +1,8 @@
 """Scatter of Response I between windows of a motion that never repeats. SI units.
 
-Response I is the largest value of a window, a draw from an extreme-value distribution: in chaos it scatters
-by a few per cent at any accuracy. The scatter follows from the extremes of blocks of one run, or directly
-from many runs with slightly different starts.
+Response I is the largest value in a window and has an extreme-value distribution: in chaos it scatters by a
+few per cent at any accuracy. The scatter is estimated from the largest values in blocks of one run, or from
+many runs with slightly different starts.
 """
 
 import math
@@ -17,9 +17,9 @@ from .followed_run import Block
 from .shares import student_quantile
 
 COVERED = 0.975
-"""Probability below the upper end of a symmetric interval for 19 cases of 20."""
+"""Probability below the upper end of a symmetric 95 % interval."""
 FEWEST_BLOCKS = 4
-"""Fewest extremes for an estimate."""
+"""Fewest blocks for an estimate."""
 
 
 @dataclass(frozen=True)
@@ -29,23 +29,23 @@ class WindowScatter:
     relative: float
     """Standard deviation over the mean."""
     blocks: int
-    """Number of extremes used."""
+    """Number of blocks from which the scatter is estimated."""
 
     @property
     def between_runs(self) -> float:
-        """Return the relative difference that two runs stay below in 19 cases of 20. It assumes normal
-        extremes: sqrt(2) deviations of Student's t for this many blocks. Measured for 40 runs each in seven
-        chaotic regimes of five laws at three durations: 85 to 99.7 % of the pairs.
+        """Return the relative difference that two runs stay below in 19 cases of 20.
+        It is sqrt(2) standard deviations times Student's t for the number of blocks. Measured coverage:
+        85 to 99.7 % of the pairs of 40 runs, in seven chaotic regimes of five laws at three durations.
         """
         return math.sqrt(2.0) * student_quantile(self.blocks - 1, COVERED) * self.relative
 
 
 def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatter | None:
-    """Find the scatter of the largest of ``blocks_in_window`` blocks; None for too few blocks.
+    """Return the scatter of the largest of ``blocks_in_window`` blocks; None for too few blocks.
 
-    The scatter is the geometric mean of two deviations. The deviation of the blocks is too large, because
-    extremes of longer windows deviate less (Coles, An Introduction to Statistical Modeling of Extreme Values
-    (2001), section 3.1). The bootstrap's is too small, because it never exceeds the largest observed value.
+    It is the geometric mean of two standard deviations. The one of block peaks is too large, because peaks of
+    longer windows scatter less (Coles, An Introduction to Statistical Modeling of Extreme Values (2001),
+    section 3.1). The bootstrap value is too small, because it never exceeds the largest observed peak.
     """
     peaks = np.sort(np.asarray(block_peaks, dtype=np.float64))
     if len(peaks) < FEWEST_BLOCKS:
@@ -57,7 +57,7 @@ def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatt
 def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
     """Return mean and standard deviation of the largest of ``drawn`` values, drawn with replacement.
 
-    Of N values, the k-th smallest is the largest drawn with the probability (k/N)^n - ((k-1)/N)^n.
+    Among n values drawn from N, the k-th smallest is the largest with probability (k/N)^n - ((k-1)/N)^n.
     """
     count = len(ascending)
     weights = np.diff((np.arange(count + 1) / count) ** drawn)
@@ -66,9 +66,9 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
 
 
 def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
-    """Return the relative difference of the responses of two windows in 19 cases of 20, shape (4,).
+    """Return the 95 % limit of the relative difference of the responses of two windows, shape (4,).
 
-    ``blocks`` are the blocks before a window, then those of the window. None for too few.
+    ``blocks`` are the blocks before a window, followed by those of the window. None for too few blocks.
     """
     lines = blocks[-blocks_in_window:]
     along = [window_scatter([block.peak_x_m for block in blocks], blocks_in_window)]
@@ -86,11 +86,11 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 
 
 def _lines_apart(parts: Complex) -> float:
-    """Return the relative difference of the amplitudes of two lines in 19 cases of 20.
+    """Return the 95 % limit of the relative difference between the amplitudes of two lines.
 
-    A line is the mean of its parts. Consecutive parts may be correlated: use the larger of the errors from
-    all parts and from means of pairs (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A deviation
-    perpendicular to the mean changes the amplitude only by its square over twice the amplitude.
+    A line is the mean of its complex parts. Consecutive parts may be correlated: the larger of the errors
+    from all parts and from means of pairs is used (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A
+    deviation perpendicular to the mean changes the amplitude by its square over twice the amplitude.
     """
     line = complex(parts.mean())
     found = []
@@ -106,9 +106,9 @@ def _lines_apart(parts: Complex) -> float:
 
 
 def draws_of_starts(answer: Floats, others: Sequence[Floats]) -> Floats:
-    """Return the relative difference of the responses of two starts in 19 cases of 20.
+    """Return the 95 % limit of the relative difference between the responses of two starts, shape (4,).
 
-    ``answer`` is one start and ``others`` are more, each of shape (4,). NaN if one was lost.
+    ``answer`` and ``others`` are the responses of the starts, shape (4,) each. NaN if a start was lost.
     """
     found = np.array([answer, *others])
     times = math.sqrt(2.0) * student_quantile(len(found) - 1, COVERED)

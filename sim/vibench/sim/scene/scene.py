@@ -1,4 +1,4 @@
-"""A scene: specimen, drive and observables. SI units."""
+"""A scene: request for one simulation, with specimen, drive and observables. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from ..specimen.stops import Strict, chosen, require_positive
 from .prediction import State
 
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
-"""Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed."""
+"""Run from rest and window at its end [s], from Gong et al. 2025, section 2."""
 BUDGET_S = 1.0
-"""Default budget of a scene in addition to its own run."""
+"""Default budget of a scene for following other starts and chaos [s]."""
 CLEAR, FEWEST, MOST = 8, 16, 64
-"""Number of starts, including the requested one: the first value if all settle on one motion or chaos
-certainly lasts; the last if they reach several motions and the budget allows; else the second."""
+"""Numbers of starts, including the requested one. `CLEAR`: all settle on one motion, or chaos certainly
+lasts. `MOST`: they reach several motions and the budget allows it. `FEWEST`: all other cases."""
 
 
 class Observable(StrEnum):
@@ -26,17 +26,17 @@ class Observable(StrEnum):
     RESPONSE = "response"
     """Responses I and II of m0 and of p."""
     LYAPUNOV = "lyapunov"
-    """Largest Lyapunov exponent; a tangent vector is propagated."""
+    """Largest Lyapunov exponent; requires a tangent vector."""
     SPECTRUM = "spectrum"
-    """Amplitudes of m0 over frequency; samples are stored."""
+    """Amplitude spectrum of m0; requires stored samples."""
     POINCARE = "poincare"
     """States once per drive period."""
     SCATTER = "scatter"
-    """Scatter of Response I between nearly equal starts; takes several more runs."""
+    """Scatter of Response I between nearly equal starts; requires several more runs."""
 
 
 MOST_PERIODS = 1e12
-"""Drive periods after which a double resolves time to a ten-thousandth of a period."""
+"""Most drive periods of a run: a double then resolves time to a ten-thousandth of a period."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class FixedDuration(Strict):
 
     @property
     def longest_s(self) -> float:
-        """Return the longest time for which the motion is followed."""
+        """Return the length of the run [s]."""
         return self.duration_s
 
     def __post_init__(self) -> None:
@@ -64,11 +64,11 @@ class FixedDuration(Strict):
 
 @dataclass(frozen=True)
 class AutomaticDuration(Strict):
-    """Follow the motion until it has settled, then observe one period, or a window if it never repeats."""
+    """Follow the motion until it settles, then observe one period, or a window if it never repeats."""
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
-    """Time after which the motion is observed at the latest."""
+    """Longest simulated time [s]."""
     kind: Literal["automatic"] = "automatic"
 
     def __post_init__(self) -> None:
@@ -81,9 +81,9 @@ class Target(Strict):
     """Requested error or time, or both."""
 
     error: float | None = None
-    """Relative error of each response; absent: as small as the time allows."""
+    """Largest relative error of each response; if absent, as small as the time allows."""
     time_s: float | None = None
-    """Time from the request to the last result [s]; absent: at most a minute."""
+    """Time from the request to the last result [s]; if absent, at most one minute."""
 
     def __post_init__(self) -> None:
         if self.error is None and self.time_s is None:
@@ -118,7 +118,7 @@ class Given(Strict):
     """Start from a given state."""
 
     state: State
-    """x, y, z, vx, vy, vz, absolute [m, m/s]."""
+    """x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""
     name: str = "given"
     """Name of the start in results."""
     kind: Literal["given"] = "given"
@@ -140,11 +140,11 @@ class Scene(Strict):
     duration: FixedDuration | AutomaticDuration = FixedDuration()
     start: Rest | Given = Rest()
     budget_s: float = BUDGET_S
-    """Processor time to find whether chaos lasts and, with sensitive dependence on the start, which motions
-    other starts reach. Counted as on the machine of docs/accuracy.md, so that results are the same on every
-    machine. Zero skips both."""
+    """Processor time [s] to find whether chaos lasts and, with sensitive dependence on the start, which
+    motions other starts reach. It is the nominal time on the machine of docs/accuracy.md, so that results are
+    the same on every machine. With zero, neither is determined."""
     target: Target | None = None
-    """Requested error and time; accuracy, duration and budget follow from it and must not be given."""
+    """Requested error and time; they replace accuracy, duration and budget, which must not be given."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:
@@ -175,7 +175,7 @@ class Scene(Strict):
             raise ValueError(msg)
 
     def _follow_target(self) -> None:
-        """Set the duration from the target; refuse contradictions."""
+        """Set an automatic duration; raise ValueError for settings that contradict the target."""
         if self.duration == FixedDuration():
             window_s = max(PAPER_WINDOW_S, 1.0 / self.drive.frequency_hz)
             object.__setattr__(self, "duration", AutomaticDuration(window_s))

@@ -1,8 +1,8 @@
-"""Motions of a scene from indistinguishable starts. SI units.
+"""Motions of a scene from nearly equal starts. SI units.
 
-After transient chaos, chance determines which motion is reached, and when: starts a millionth of a gap apart
-are random draws. They are followed in rounds until all have settled, chaos is known to last, or the budget is
-used up.
+After transient chaos, chance determines which motion is reached, and when: starts that differ by a millionth
+of the gap give random samples. They are followed in rounds until all have settled, chaos is known to last, or
+the budget is used up.
 """
 
 import math
@@ -28,21 +28,21 @@ from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile,
 from .states_alone import Follow, StatesAlone
 
 PUSH = 1e-6
-"""Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
+"""Largest change of the start: displacements over the gap, velocities over the gap times 2 pi f."""
 SEED = 2025
 PARTED = 0.01
-"""Relative distance of displacements at which two starts have diverged: ten thousand times their first
-distance."""
+"""Relative difference of displacements at which two starts have diverged: ten thousand times their initial
+difference."""
 TOUCHING = 0.999
-"""Share of the gap above which m1 may be in contact."""
+"""Ratio of abs(p) to the gap above which m1 may be in contact."""
 LEAST_SIZE = 1e-3
-"""Share of the gap: smallest size of a motion in the test for divergence."""
+"""Smallest size of a motion in the test for divergence, over the gap."""
 LEAST_S = 1e-3
-"""Smallest cost of following and observing a start."""
+"""Smallest assumed cost of following and observing a start [s]."""
 TOO_FEW = 4
 """Fewest useful starts."""
 LASTING_S = 300.0
-"""Mean lifetime above which chaos counts as lasting: ten times the paper's run."""
+"""Mean lifetime above which chaos counts as lasting [s]: ten times the length of the paper's runs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +54,17 @@ class ReachedMotion:
     motion: MotionKind
     period: int | None
     responses_m: Floats
-    """Largest x, line of x, largest p, line of p, shape (4,)."""
+    """Largest x, drive-frequency amplitude of x, and the same for p [m], shape (4,)."""
     scatter: WindowScatter | None
-    """Scatter of the largest x, if the motion does not repeat."""
+    """Scatter of the largest x between windows, if the motion does not repeat."""
     wandered_until_s: float
-    """Last time at which the motion changed from period to period."""
+    """Last time at which the motion changed from period to period [s]."""
     growth: Growth
-    """Growth of a propagated small change; over no time if the motion repeats."""
+    """Growth of a small perturbation; empty if the motion repeats."""
 
 
 def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats:
-    """Draw small changes of a start, shape (count, 6); relative to the drive amplitude without a gap."""
+    """Return random small changes of a start, shape (count, 6), in proportion to gap or drive amplitude."""
     gap_m = min(specimen.gaps_m)
     length_m = gap_m if 0.0 < gap_m < math.inf else drive.amplitude_m
     scale = PUSH * length_m * np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
@@ -72,14 +72,14 @@ def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats
 
 
 def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
-    """Return whether a slightly displaced start diverged from the path of a motion.
+    """Return whether a run from a slightly different start diverges from a motion.
 
     Parameters
     ----------
     begin
         The motion at its start.
     path
-        Stretches from its start until it had settled.
+        Stretches of the motion from its start until it settled.
     """
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
@@ -95,7 +95,7 @@ def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
 
 
 def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
-    """Return for each state, shape (n, 6), whether m1 is at a stop, where batches extrapolate states."""
+    """Return whether m1 may touch a stop in each state, shape (n, 6); batches extrapolate such states."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
     return np.asarray((p >= upper_m) | (p <= -lower_m))
@@ -103,28 +103,28 @@ def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Draw:
-    """Number and cost of starts."""
+    """Number, seed and cost limit of the starts."""
 
     clear: int = CLEAR
-    """Number of starts, including the requested one, in clear cases."""
+    """Number of starts, including the requested one, if they all settle on one motion or chaos lasts."""
     fewest: int = FEWEST
     """Number of starts in other cases."""
     most: int = MOST
-    """Number of starts if they reached more than one motion."""
+    """Number of starts if they reach several motions."""
     seed: int = SEED
     budget_s: float = math.inf
-    """Limit of the nominal cost of all starts."""
+    """Limit of the nominal cost of all starts [s]."""
 
 
 NOT_CARRIED = Growth(np.empty(0), 0.0)
 MORE_S = 1.0
-"""Margin that is added to the remaining total time of all starts [s]."""
+"""Margin added to the remaining total time of all starts [s]."""
 
 
 class SeveralStarts:
     """Additional starts and their motions.
 
-    They are followed as far as the requested one.
+    Each start is followed at most as long as the scene's duration allows.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # Additional time with a propagated small change, to classify non-repeating motions.
+        # Additional time with a tangent vector, to classify non-repeating motions.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
@@ -156,16 +156,16 @@ class SeveralStarts:
 
     @property
     def followed_s(self) -> float:
-        """Return the total time that all starts were followed."""
+        """Return the total simulated time of all starts [s]."""
         return sum(each.run.time_s for each in self.reached)
 
     @property
     def escape(self) -> EscapeRate | None:
         """Return the rate at which chaos dies out; None if no motion was irregular for long enough.
 
-        A motion that is irregular when it should be on its attractor counts as chaotic from then on, until it
-        has settled or a small change stops growing. Any other may have left chaos already, before its
-        repetition could be detected.
+        A motion that is still irregular after the expected transient counts as chaotic from then on, until it
+        settles. If it has neither settled nor been found chaotic, the time needed to detect repetition is
+        subtracted, because it may have left chaos already.
         """
         known = [
             (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
@@ -183,7 +183,7 @@ class SeveralStarts:
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
     def follow(self) -> None:
-        """Follow as many starts as the budget allows, as long as needed, and observe them."""
+        """Follow and observe as many starts as needed, within the budget."""
         run, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = run.cost_s * min(1.0, self._first_s / run.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
@@ -200,12 +200,12 @@ class SeveralStarts:
 
     @property
     def _is_clear(self) -> bool:
-        """Return whether all starts reached one motion permanently."""
+        """Return whether all starts reached one motion that is periodic or lasting chaos."""
         settled = all(each.period is not None for each in self._reached)
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
     def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
-        """Follow as many more starts as a budget allows, and observe them; return the cost."""
+        """Follow and observe up to ``wanted`` more starts within a budget; return their cost [s]."""
         count = math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
@@ -221,7 +221,7 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """Return whether chaos certainly lasts, because no start has settled for long enough."""
+        """Return whether chaos lasts: no start has settled, and the bound on its lifetime is long enough."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
@@ -249,7 +249,7 @@ class SeveralStarts:
 
     @property
     def _lasting_after_s(self) -> float:
-        """Return the remaining time of all starts until chaos certainly lasts, if none settles."""
+        """Return the simulated time still needed to prove that chaos lasts, if no start settles [s]."""
         escape = self.escape
         if escape is None or self._has_settled:
             return math.inf
@@ -273,17 +273,17 @@ class SeveralStarts:
 
 
 SAME = 1e-3
-"""Relative difference of responses up to which two motions are the same."""
+"""Largest relative difference of responses between runs of the same motion."""
 APART = 2.0
-"""Windows of chaos belong to two motions if they differ by this multiple of the limit for 19 cases of 20."""
+"""Chaotic motions are different if their windows differ by this multiple of the 95 % limit of the scatter."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
-"""Kinds of motion, best first: the best start represents a motion."""
+"""Kinds of motion in the order of preference for the start that represents a motion."""
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Group the starts by motion, each with its best start first."""
+    """Return the starts grouped by motion; the start that represents a motion is first in its group."""
     groups: list[list[ReachedMotion]] = []
     order = {kind: place for place, kind in enumerate(CLEAREST)}
     for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
@@ -298,8 +298,8 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
 def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
     """Return the kind of a motion reached from several starts.
 
-    In weak or bursting chaos, most starts stay calm while they are watched. If a small change has certainly
-    grown from one start, the total growth of all starts decides.
+    In weak or bursting chaos, perturbations of most starts do not grow during the observation. If one start
+    proves growth, the total growth of all starts decides.
     """
     kinds = [each.motion for each in group if each.motion in CLEAREST]
     if group[0].period is None and any(each.growth.is_certain for each in group):
@@ -315,10 +315,10 @@ def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKin
 def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
     """Return whether two starts reached the same motion or its symmetric partner.
 
-    Motions are compared by period and all four responses; by responses alone if one start arrived too late to
-    be classified. For motions that do not repeat, only the largest value is compared, within the scatter of
-    windows: two chaotic motions that differ by less count as one. Some starts on weak chaos appear undecided
-    or quasi-periodic, but scatter equally: for two kinds, the smaller scatter is used.
+    Motions are compared by period and all four responses; by responses alone if one start settled too late to
+    be classified. For non-repeating motions only Response I is compared, within the scatter between windows;
+    chaotic motions that differ by less count as one. Weak chaos may appear undecided or quasi-periodic from
+    some starts: if the kinds of two motions differ, the smaller scatter is used.
     """
     if one.period is not None and other.period is not None and one.period != other.period:
         return False
@@ -337,29 +337,29 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 
 
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
-"""Kinds of motions that may still change to another."""
+"""Kinds of motion that may still change to another motion."""
 FEWEST_DRAWS = 3
-"""Fewest draws of a motion from which its scatter is estimated."""
+"""Fewest starts on a motion for an estimate of its scatter."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
-"""Function that returns the relative error of the responses of a motion."""
+"""Function that returns the relative error of the responses of a motion; None if unknown."""
 
 
 def ensemble_of(
     several: SeveralStarts, amplitude_m: float, forgetting_s: float, error_of: ErrorOf
 ) -> Ensemble:
-    """Group the starts by motion and count them.
+    """Return the motions reached from all starts, with their shares.
 
     Parameters
     ----------
     several
-        Starts that were followed to their end.
+        Starts that have been followed and observed.
     amplitude_m
         Drive amplitude.
     forgetting_s
         Time in which the slowest mode without contact decays by e.
     error_of
-        Called once for each motion.
+        Function for the relative error of the responses of a start.
     """
     reached, escape = several.reached, several.escape
     groups = motions_among(reached)
@@ -391,10 +391,10 @@ def ensemble_of(
 
 
 def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
-    """Count the starts of each motion, and mark those that may still change to another.
+    """Return the number of starts of each motion, and whether the motion is final.
 
-    Even lasting chaos may change if there are several chaotic motions: one can suddenly become another, and
-    the escape rate only counts changes to periodic motions.
+    If there are several chaotic motions, even lasting chaos is not final: one chaotic motion can change to
+    another, and the escape rate counts only changes to periodic motions.
     """
     is_one_chaos = kinds.count(MotionKind.CHAOTIC) == 1
     return [
@@ -404,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Return the kind of a motion; chaotic only if no chaos died out and it certainly lasts."""
+    """Return the kind of a motion; chaos is "chaotic so far" if it died out from a start or may not last."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
@@ -412,7 +412,7 @@ def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
 
 
 def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
-    """Return the responses of the best start for a repeating motion, else the mean."""
+    """Return the responses of the first start if the motion repeats, otherwise the mean over starts."""
     shown = group[:1] if group[0].period is not None else group
     means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
     return dict(
@@ -421,11 +421,11 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the relative difference of one more draw from the mean of a group in 19 cases of 20."""
+    """Return the 95 % limit of the relative difference between one more run and the mean of a group."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
-        # Calm starts of bursting chaos do not contain the bursts.
+        # The largest error is used, because some starts of bursting chaos contain no burst.
         known = [each for each in map(error_of, group) if each is not None]
         return max(known, default=None)
     widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
@@ -438,11 +438,11 @@ def _deviation(values: Sequence[float]) -> float | None:
 
 
 ALONE = 0.5
-"""Share of a budget for following chaos further; other starts use the rest."""
+"""Share of the budget for following chaos further; the rest is for other starts."""
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
-    """Return whether the start determined which motion was reached.
+    """Return whether the start determines which motion is reached.
 
     Parameters
     ----------
@@ -451,9 +451,9 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
     begin
         The motion at its start.
     seen
-        End of the motion, and findings.
+        Findings at the end of the run.
     motion
-        Motion without stops.
+        Linear motion without stops.
     """
     if never_touches(scene.specimen, motion):
         return StartMemory.KEPT

@@ -1,15 +1,15 @@
-"""Intervals of counted shares and rates, valid in 19 cases of 20."""
+"""Confidence intervals (95 %) of shares and rates that are estimated from counts."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-# Quantiles of Student's, the normal and Poisson's distribution, in closed form.
-# They equal those of scipy.special, whose import (0.2 s) takes longer than most predictions.
+# Quantiles of Student's t, the normal and the Poisson distribution, in closed form. They equal those of
+# scipy.special, which is not used because its import (0.2 s) takes longer than most predictions.
 
 
 def student_quantile(freedom: int, probability: float) -> float:
-    """Return the quantile of Student's t above its median, for a whole number of degrees of freedom.
+    """Return a quantile of Student's t above its median, for a whole number of degrees of freedom.
 
     Source: Abramowitz and Stegun, Handbook of Mathematical Functions (1964), eqs. 26.7.3 and 26.7.4.
     """
@@ -27,12 +27,12 @@ def student_quantile(freedom: int, probability: float) -> float:
 
 
 def normal_quantile(tail: float) -> float:
-    """Return the standard normal value that is exceeded with the probability ``tail``, at most one half."""
+    """Return the standard normal value that is exceeded with the probability ``tail`` (at most 0.5)."""
     return math.sqrt(2.0) * _root(math.erfc, 2.0 * tail, 30.0)
 
 
 def poisson_mean(fewer_than: int, probability: float) -> float:
-    """Return the mean of a Poisson count that is below ``fewer_than`` with this probability."""
+    """Return the mean of a Poisson count that is below ``fewer_than`` with the given probability."""
 
     def below(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
@@ -42,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Find where a function takes a value, between 0 and ``high``, to the last digit by bisection."""
+    """Return the argument between 0 and ``high`` at which a function has a value, by bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)
@@ -55,7 +55,7 @@ UNSURE = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """A share of starts with its interval."""
+    """A share of starts with its confidence limits."""
 
     share: float
     low: float
@@ -63,18 +63,18 @@ class Share:
 
 
 def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
-    """Return the share for ``count`` of ``trials`` with Wilson's interval.
+    """Return the share of successes, ``count`` of ``trials``, with Wilson's interval.
 
-    It is valid for few trials, also if none or all count (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
-    Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101). Raises ValueError for no trials, a count above the
-    trials, or an invalid probability.
+    The interval is valid for few trials, even with no failure or no success (Wilson, J. Am. Stat. Assoc. 22
+    (1927) 209; Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101). Raises ValueError for no trials, more
+    successes than trials, or an invalid probability.
 
     Parameters
     ----------
     count, trials
         Number of successes, and of trials.
     unsure
-        Probability that the interval misses the share.
+        Probability that the interval does not contain the true share.
     """
     if not (0.0 <= count <= trials < math.inf and trials > 0.0 and 0.0 < unsure < 1.0):
         msg = (
@@ -86,7 +86,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     share, weight = count / trials, deviations**2 / trials
     middle = (share + 0.5 * weight) / (1.0 + weight)
     half = math.sqrt(weight * (share * (1.0 - share) + 0.25 * weight)) / (1.0 + weight)
-    # At 0 and 1 the interval is exact; rounding would miss them.
+    # Set limits of 0 and 1 exactly, without rounding.
     return Share(
         share=share,
         low=0.0 if count == 0 else middle - half,
@@ -99,17 +99,17 @@ class Count:
     """Trials with one outcome."""
 
     trials: float
-    """Not a whole number if dependent trials count for fewer."""
+    """Number of trials; fractional if dependent trials count as fewer."""
     is_final: bool
-    """False if the trials were not followed to their end and may have any outcome."""
+    """False if the trials were not followed to their end and may still have any outcome."""
 
 
 def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
-    """Return the shares of several outcomes, whose intervals all hold together in 19 cases of 20.
+    """Return the shares of several outcomes with simultaneous 95 % confidence intervals.
 
-    For two outcomes one interval is enough. For more, each interval is widened so that together they fail as
-    rarely as a single one (Goodman, Technometrics 7 (1965) 247). Intervals also hold for the final outcomes
-    of trials that are not final.
+    For two outcomes the ordinary interval is used. For more outcomes each interval is widened, so that all
+    are valid at the same time (Goodman, Technometrics 7 (1965) 247). The intervals include any final outcome
+    of the trials that are not final.
     """
     trials = sum(each.trials for each in counts)
     pending = sum(each.trials for each in counts if not each.is_final)
@@ -125,18 +125,18 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """Rate at which chaos dies out (one over its mean lifetime), from several starts."""
+    """Rate at which chaos dies out, estimated from several starts; the inverse of its mean lifetime."""
 
     rate_per_s: float
     """Number of escapes over the total time in chaos [1/s]."""
     low_per_s: float
-    """Lower 97.5 % confidence limit of the rate; zero without escapes."""
+    """One-sided lower 97.5 % confidence limit of the rate; zero without escapes."""
     high_per_s: float
-    """Upper 97.5 % confidence limit of the rate; 95 % without escapes."""
+    """One-sided upper 97.5 % confidence limit of the rate; the 95 % limit without escapes."""
     escapes: int
     """Number of starts whose chaos died out."""
     chaotic_s: float
-    """Total time that all starts were followed in chaos."""
+    """Total time of all starts in chaos [s]."""
 
     @property
     def lifetime_above_s(self) -> float:
@@ -150,11 +150,11 @@ class EscapeRate:
 
 
 def escape_rate(escapes: int, chaotic_s: float) -> EscapeRate:
-    """Return the rate at which chaos dies out, from the number of escapes in the total time of all starts.
+    """Return the rate at which chaos dies out, from the number of escapes and the total time in chaos.
 
     Lifetimes of transient chaos are exponentially distributed (Grebogi, Ott and Yorke, Physica D 7 (1983)
-    181); unfinished ones count as far as they were followed. The interval is for a Poisson process
-    (Garwood, Biometrika 28 (1936) 437).
+    181). A lifetime that has not ended counts up to the end of its run. The confidence interval is that of a
+    Poisson process (Garwood, Biometrika 28 (1936) 437).
     """
     tail = UNSURE if escapes == 0 else 0.5 * UNSURE
     low = 0.0 if escapes == 0 else poisson_mean(escapes, 1.0 - tail) / chaotic_s

@@ -1,4 +1,4 @@
-"""Solve scenes, with error estimates. SI units."""
+"""Solve scenes and estimate the errors of their responses. SI units."""
 
 import math
 import time
@@ -48,16 +48,16 @@ if TYPE_CHECKING:
 EXPONENT_S = 25.0
 """Longest averaging time of an exponent [s]."""
 EXPONENT_PRECISION = 0.2, 0.01
-"""Required absolute [1/s] and relative standard error of an exponent."""
+"""Required standard error of an exponent: absolute [1/s], and relative."""
 
 
 class Question(StrEnum):
-    """Kind of question about a scene."""
+    """Extent of the requested solution."""
 
     ANSWER = "answer"
-    """Responses with errors, and motions from other starts if they depend sensitively on the start."""
+    """Responses with errors; with sensitive dependence on the start, also motions from other starts."""
     MOTION = "motion"
-    """Only the motion and its responses, for maps, where neighbouring points show more than errors."""
+    """Only the motion and its responses, without errors: for maps, where neighbouring points show more."""
 
 
 QuestionWord = Literal["answer", "motion"]
@@ -65,7 +65,7 @@ QuestionWord = Literal["answer", "motion"]
 
 @dataclass(frozen=True)
 class InBatches:
-    """Solver that uses `solve_scenes`."""
+    """Marker for a solver that calls `solve_scenes`."""
 
     question: Question = Question.ANSWER
 
@@ -77,12 +77,11 @@ Solver = Callable[[Scene], ScenePrediction] | InBatches
 def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWER) -> ScenePrediction:
     """Solve a scene as planned, with error estimates.
 
-    Each response has an error: its largest relative difference from a repeated run at a far stricter
-    accuracy. ``error_estimate`` is the largest of the four. Errors are measured (docs/accuracy.md). For a
-    settled motion, the error is twice the difference from a run with a far smaller tolerance, continued from
-    the end until the transient has decayed; otherwise, twice the difference from such a run from the start.
-    If the two runs diverge, a repeated run is another random draw: the error is then the difference of two
-    draws in 19 cases of 20.
+    Each of the four responses has a relative error; ``error_estimate`` is the largest. It is twice the
+    measured difference from a run with a far smaller tolerance (docs/accuracy.md). For a settled motion, that
+    run continues from the end until the transient has decayed; otherwise it begins at the start. If the two
+    runs diverge, a repeated run is a new random sample: the error is then the difference that two samples
+    stay below in 19 cases of 20.
 
     Raises ValueError when the specimen cannot be simulated, or not from this start.
     """
@@ -106,8 +105,8 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 def settle_scene(scene: Scene) -> ScenePrediction:
     """Solve a scene as planned, without errors and other starts.
 
-    The motion is that of `solve_scene`, and takes a third of the time or less. Chaos is followed as long
-    as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
+    It finds the same motion as `solve_scene` in a third of the time or less. Chaos is followed as long as
+    the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
     Raises ValueError when the specimen cannot be simulated, or not from this start.
     """
@@ -115,24 +114,24 @@ def settle_scene(scene: Scene) -> ScenePrediction:
 
 
 MOST_HELD = 2e7
-"""Approximate number of states in a batch of scenes: a gigabyte."""
+"""Approximate number of states that a batch of scenes may store: one gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Result of a scene that was solved together with others."""
+    """Result of one scene of a batch."""
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for the scene [s], with its share of batches. NaN if the time includes
-    loading of modules."""
+    """Processor time of this thread for the scene [s], including its share of the batch. NaN if the time
+    includes loading of modules."""
 
 
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[Solved]:
-    """Solve several scenes like `solve_scene`, in batches where states alone are enough.
+    """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
 
-    The result of each does not depend on the others. In chaos it is another draw than that of `solve_scene`.
-    Raises ValueError when one of them cannot be simulated, or not from its start.
+    The result of a scene does not depend on the others. In chaos it is a different random sample from that of
+    `solve_scene`. Raises ValueError when a scene cannot be simulated, or not from its start.
     """
     found: list[Solved] = []
     together: list[Scene] = []
@@ -177,7 +176,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]
 
 @contextmanager
 def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
-    """Add the processor time of the block to these scenes, in equal parts."""
+    """Divide the processor time of the block equally among these scenes, and add it to ``taken_s``."""
     began_s = time.thread_time()
     yield
     part_s = (time.thread_time() - began_s) / max(1, len(places))
@@ -188,26 +187,26 @@ def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]
 def solve_ensemble(
     scene: Scene, starts: int = FEWEST, seed: int = SEED, budget_s: float = math.inf
 ) -> Ensemble | None:
-    """Solve a scene from this many starts a millionth of the gap apart.
+    """Solve a scene from several starts that differ by a millionth of the gap.
 
-    If the motion depends sensitively on the start, `solve_scene` does the same with few starts. More starts
-    give narrower intervals; another seed gives another draw. Raises ValueError for fewer than 4 starts, or
-    when the specimen cannot be simulated.
+    `solve_scene` does the same with few starts if the motion depends sensitively on the start. More starts
+    give narrower intervals; another seed gives another random sample. Raises ValueError for fewer than 4
+    starts, or when the specimen cannot be simulated.
 
     Parameters
     ----------
     scene
         Scene whose start is the first.
     starts
-        Number of starts including that one, at least 4.
+        Number of starts including the scene's own, at least 4.
     seed
-        Seed of the small changes of the start.
+        Seed of the random differences between the starts.
     budget_s
-        Processor time for all starts, counted as the budget of a scene; infinite for no limit.
+        Nominal processor time for all starts, as defined for `Scene`; infinite for no limit.
 
     Returns
     -------
-    Motions of all starts. None if the motion is known in closed form, was lost, or the budget is too small.
+    Motions of all starts. None if the motion has a closed form or was lost, or if the budget is too small.
     """
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
@@ -233,7 +232,7 @@ def _plan(scene: Scene) -> tuple[Method, LinearMotion]:
 
 
 def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
-    """Return the steady motion without contact."""
+    """Return the prediction for a scene without contact from the exact linear solution."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
     match scene.duration:
@@ -279,7 +278,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
     if Observable.SPECTRUM in scene.observe:
         found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
     if question is Question.MOTION:
-        # As in integrated motions, the drive phase at the end equals that at the start.
+        # End after whole drive periods, as integrated motions do.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         found = replace(found, duration_s=duration_s, final_state=state_of(motion.state(duration_s)))
     return found
@@ -291,9 +290,9 @@ class _Begun:
     Parameters
     ----------
     scene, question
-        Scene, and kind of question.
+        Scene, and extent of the requested solution.
     method, motion
-        Planned method, and the motion until a stop is touched.
+        Planned method, and the linear motion until a stop is touched.
     """
 
     def __init__(self, scene: Scene, method: Method, motion: LinearMotion, question: Question) -> None:
@@ -324,7 +323,7 @@ class _Begun:
                 )
 
     def answer(self, follow: Follow) -> ScenePrediction:
-        """Return the result of the motion; ``follow`` follows other starts."""
+        """Return the prediction for the scene; ``follow`` is called to follow other starts."""
         scene, seen = self._scene, self.course.seen()
         if self._question is Question.MOTION:
             return self._found(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
@@ -337,14 +336,14 @@ class _Begun:
         return self._found(seen, errors, memory, ensemble)
 
     def errors(self, seen: SceneRun, follow: Follow) -> StatedErrors:
-        """Return the errors of a motion that reached its end."""
+        """Return the errors of the responses; the run must have reached its end."""
         rate = self._motion.slowest_rate
         return stated_errors(self._scene, self._begin, self.run, seen, self._pace, rate, follow)
 
     def ensemble(
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
-        """Follow other starts, as many as the scene's budget or ``draw`` allows; None if too few."""
+        """Return the motions from as many other starts as the budget or ``draw`` allows; None if too few."""
         scene, pace = self._scene, self._pace
         requested = ReachedMotion(
             self.run,
@@ -425,14 +424,14 @@ class _Begun:
 
 
 def _between_windows(seen: SceneRun) -> WindowScatter | None:
-    """Return the scatter of Response I from blocks, if the motion does not repeat."""
+    """Return the scatter of Response I between windows, from blocks; None for a periodic motion."""
     if seen.motion is MotionKind.PERIODIC:
         return None
     return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Return the kind; with an automatic duration, chaotic only if chaos lasts."""
+    """Return the kind of the motion; with an automatic duration, chaotic only if the chaos lasts."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:
@@ -442,7 +441,7 @@ def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionK
 
 
 def _supported(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
-    """Return a chaotic prediction with the exponent of its chaos; undecided if that is not above zero."""
+    """Return the prediction, with a chaotic motion corrected if its exponent is not above zero."""
     from ..exponents.lyapunov import ExponentVerdict  # noqa: PLC0415 - as above
 
     is_chaotic = found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}
@@ -471,7 +470,7 @@ def _ending(seen: SceneRun, ensemble: Ensemble | None) -> str:
 
 
 def _exponent(scene: Scene, run: FollowedRun) -> "LyapunovEstimate":
-    """Return the largest exponent of the final motion of a run."""
+    """Return the largest Lyapunov exponent of the motion at the end of a run."""
     from ..exponents.lyapunov import Precision, lyapunov_exponent  # noqa: PLC0415 - most scenes ask for none
 
     drive = scene.drive

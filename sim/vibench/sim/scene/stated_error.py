@@ -1,10 +1,10 @@
 """Measured errors of the responses of a scene. SI units.
 
-In a settled motion the errors of earlier steps decay. The motion is continued from its end with a far smaller
-tolerance until they have decayed, and compared. A motion that has not settled accumulates errors. It is
-repeated from its start with the smaller tolerance and observed in the same window. If the two runs diverge, a
-repeated run is another random draw. The difference of two draws is then estimated from the parts of the
-window if the motion is stationary, else from a few indistinguishable starts.
+In a settled motion, integration errors decay. The motion is continued from its end with a far smaller
+tolerance until the errors have decayed, and the responses are compared. A motion that has not settled
+accumulates errors: it is repeated from its start with the smaller tolerance and compared in the same window.
+If the two runs diverge, a repeated run is a new random sample. The difference of two samples is estimated
+from the blocks of the window if the motion is stationary, otherwise from a few nearly equal starts.
 """
 
 import math
@@ -26,33 +26,33 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the comparison. A hundredth of the tolerance of *quick* is too large: a closed-form collision
-is more accurate."""
+"""Tolerance of the stricter run. For *quick*, a hundredth of its tolerance would not be enough, because
+closed-form collisions are more accurate than that."""
 FORGETTING = 4.0
-"""Forgetting times before a repeating motion is compared."""
+"""Decay times of the slowest mode before a repeating motion is compared."""
 SHORTER = 4
-"""Number of shorter windows to compare with one; their leakage is that many times larger."""
+"""Length of a window over that of the shorter windows compared with it; also the ratio of their leakage."""
 LOOKS = 8
-"""Number of compared periods; of drive periods if the motion does not repeat."""
+"""Number of periods compared: periods of the motion, or drive periods if it does not repeat."""
 SAFETY = 2.0
 """Ratio of the stated to the measured error."""
 ROUNDING = 1e-11
-"""Relative error of an exact result, by rounding."""
+"""Relative error of an exact result due to rounding."""
 ROUNDED = 1e-13
-"""Displacement of the start of a compared run, over the drive amplitude: several times the accumulated
-rounding of a run, because its effect is one draw of many."""
+"""Offset of the start of the stricter run, over the drive amplitude. It is several times the accumulated
+rounding of a run, because one offset is only one sample of the effect of rounding."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-"""y and z are displaced equally, because p may have no clearance."""
+"""Signs of the offset; y and z have the same sign so that p keeps its value, in case the gap is zero."""
 SLOWEST_RATIO = 0.9
-"""Largest assumed ratio of a difference to that of the check before, for the slowest settling."""
+"""Largest assumed ratio of a change to the change before, for the slowest settling."""
 FIRST_LOOK = 16
-"""Drive periods before two runs from one start are first compared; then each time the time has doubled."""
+"""Drive periods before two runs are first compared; they are compared again whenever the time doubles."""
 PARTED = 0.05
 """Share of the gap, or relative difference of responses, at which two runs have diverged."""
 MEMORIES = 8.0
-"""Forgetting times of the slowest mode after which a chaotic motion is stationary."""
+"""Decay times of the slowest mode after which a chaotic motion counts as stationary."""
 MEMBERS = 5
-"""Number of additional starts if one window does not show the difference between draws."""
+"""Number of additional starts if the window itself does not show the difference between samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class StatedErrors:
     stated: Floats
     """Error of each response, shape (4,)."""
     integration: float
-    """Largest measured error that a stricter accuracy would reduce."""
+    """Largest measured integration error, which a stricter accuracy would reduce."""
 
 
 UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
@@ -78,7 +78,7 @@ def stated_errors(
     slowest_rate: float,
     follow: Follow,
 ) -> StatedErrors:
-    """Return the errors of a result.
+    """Return the errors of the four responses of a scene.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def stated_errors(
     begin, run
         Motion at time zero, and at its end.
     seen, pace
-        Its findings, and its time scales and tolerances.
+        Findings of the run, and time scales and tolerances of the motion.
     slowest_rate
         Rate of the slowest mode without contact [1/s], zero or negative.
     follow
-        Method for following other starts.
+        Function that follows other starts.
     """
     answer = seen.window.responses_m
-    # At a stricter accuracy the motion may not repeat yet; its lines then use another length.
+    # A stricter run may not repeat yet; its lines are then taken over another length.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
@@ -118,8 +118,8 @@ def stated_errors(
 def _by_window(seen: SceneRun) -> Floats:
     """Estimate the relative errors due to the position of the window, shape (4,).
 
-    They are the largest differences from shorter windows with other starts. A slowly settling motion is
-    compared with its state long before, because it may settle further.
+    The errors are the largest differences from shorter windows at other positions. These include early
+    windows, because a slowly settling motion may settle further.
     """
     answer = seen.window.responses_m
     lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
@@ -133,7 +133,7 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Return relative errors of exact responses: rounding is relative to the peaks, also for lines."""
+    """Return the rounding errors of exact responses; those of lines are also relative to the peaks."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
@@ -142,19 +142,19 @@ class _StrictRun:
     """Motion followed from its start at a stricter accuracy."""
 
     run: FollowedRun
-    """Run where it diverged from the result's run, else at the end of the window."""
+    """Run at the time when it diverged from the original run, otherwise at the end of the window."""
     responses_m: Floats | None
-    """Responses in the window, shape (4,), if reached."""
+    """Responses in the window, shape (4,); None if the run diverged before."""
     is_together: bool
-    """Whether it never diverged from the result's run."""
+    """Whether this run never diverged from the original run."""
 
 
 def _more_starts(
     begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace, follow: Follow
 ) -> list[Floats]:
-    """Follow a few more starts, and observe the same window of them; NaN where one is lost.
+    """Return the responses of a few more starts in the same window, shape (4,) each; NaN for a lost start.
 
-    The stricter run is one of them, because all others share the step errors made before starts diverge.
+    The stricter run is included, because all other starts share the step errors before they diverge.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.pushed(push) for push in pushed[1:]]
@@ -177,8 +177,8 @@ def error_of_settled(
 ) -> Floats:
     """Return the relative errors of the responses of a repeating motion; NaN if the comparison failed.
 
-    The responses of this and the next periods (with other steps) are compared with a stricter run. That run
-    is followed twice as long, because a motion may settle more slowly than its modes.
+    The responses in this and the next periods, whose steps differ, are compared with a stricter run. The
+    stricter run is observed a second time later, because the motion may settle more slowly than its modes.
     """
     cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
@@ -198,7 +198,7 @@ def error_of_settled(
 
 
 def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
-    """Return the largest relative error that one drive period adds to a motion's responses; NaN if lost."""
+    """Return the largest relative error of the responses added by one drive period; NaN if lost."""
     cycle_s = 1.0 / run.drive.frequency_hz
     on = run.apart(accuracy.tolerance)
     seen, missed = [], []
@@ -212,8 +212,8 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
 def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> _StrictRun:
     """Follow a motion from its start at a stricter accuracy until it diverges, else through the window.
 
-    The start is displaced by rounding. Otherwise an exact flight would be compared with itself, and a motion
-    in which rounding grows would appear exact.
+    The start is offset by a rounding error. Otherwise exact flights would be compared with themselves, and a
+    motion that amplifies rounding would appear exact.
     """
     loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
     strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
@@ -224,18 +224,18 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return _StrictRun(strict, None, is_together=False)
-    # Take lines over the same number of periods.
+    # Take the lines over the same number of drive periods as in the original run.
     window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
     return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
 
 
 def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
-    """Return the responses of a window that ends at the run's time, shape (4,); NaN if it was lost."""
+    """Return the responses of a window of a run, shape (4,); NaN if the run was lost."""
     return window.responses_m if run.outcome is Outcome.REACHED_END else np.full(4, np.nan)
 
 
 def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
-    """Return whether two runs have the same state within a share of the gap."""
+    """Return whether the states of two runs agree within `PARTED` times the gap."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
     apart = np.abs(one.state - other.state) / _places_and_speeds(scene)
@@ -243,12 +243,12 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
 
 
 def _places_and_speeds(scene: Scene) -> Floats:
-    """Return the scales of differences of a state: one, and the angular frequency of the drive."""
+    """Return the scale of each state: 1 for displacements, 2 pi f for velocities, shape (6,)."""
     return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
 
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
-    """Return responses over a stretch of whole drive periods, shape (4,); NaN if the run was lost."""
+    """Follow a run for whole drive periods; return its responses, shape (4,), NaN if it was lost."""
     seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
     if run.outcome is not Outcome.REACHED_END:
         return np.full(4, np.nan)
@@ -257,7 +257,7 @@ def _responses(run: FollowedRun, length_s: float) -> Floats:
 
 
 def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
-    """Add the errors of the responses, and the largest of them."""
+    """Return the prediction with the errors of its four responses, and the largest of them."""
     response_i, response_ii, relative_i, relative_ii = (finite_or_none(float(error)) for error in stated)
     return replace(
         found,

@@ -1,7 +1,7 @@
-"""Motions followed by their states alone until they repeat: leads, lasting chaos, other starts.
+"""Motions integrated without a tangent vector until they repeat: transients, lasting chaos, other starts.
 
-SI units. Each is followed by itself (`StatesAlone.follow`), or several in SIMD batches of the native engine
-(`in_batches`). The states of a motion do not depend on the others in its batch.
+A motion is integrated alone (`StatesAlone.follow`), or with others in SIMD batches of the native engine
+(`in_batches`). Its states do not depend on the other motions in the batch. SI units.
 """
 
 import math
@@ -29,13 +29,13 @@ from .scene import AutomaticDuration, FixedDuration
 SLICE_S = 0.5
 """Shortest time between two checks [s]."""
 PARTS = 4
-"""Number of parts of a stretch, to see whether a small change keeps growing."""
+"""Number of parts of a stretch, to see whether a small perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Forgetting times whose states are kept; to settle, a motion needs ten at *standard*."""
+"""Decay times of the slowest mode for which states are kept; settling takes ten at *standard*."""
 
 
 class StatesAlone:
-    """A run without a tangent, checked for repetition at intervals.
+    """A run without a tangent vector, checked for repetition at intervals.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ class StatesAlone:
     every
         Keep every n-th state in `path`; None keeps none.
     by_itself_s
-        Time before which the motion is not followed in a batch [s], because errors persist on the way to
-        the attractor. A whole number of drive periods, where batches begin.
+        The motion joins a batch only after this time [s], because errors persist during the transient.
+        It is a whole number of drive periods, because batches begin at the end of a period.
     """
 
     def __init__(
@@ -66,9 +66,9 @@ class StatesAlone:
         self.until_s = self.cost_s = math.inf
         self.by_itself_s = by_itself_s
         self.path: list[Stretch] = []
-        """Followed stretch, with the kept states."""
+        """Stretches followed so far, with their kept states."""
         self.repeats: Repetition | None = None
-        """Repetition, once found; then the motion is followed no further."""
+        """Repetition of the motion; None until it is found, which ends the run."""
         self.recent = np.empty((0, 6)) if recent is None else recent
         """States once per drive period, up to now."""
         self._settled_s: float | None = None
@@ -86,16 +86,16 @@ class StatesAlone:
 
     @property
     def wandered_until_s(self) -> float:
-        """Return the last time at which the motion changed between periods; now if it does not repeat."""
+        """Return the last time at which two periods differed; the current time if it does not repeat."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
-        """Set the end: an instant or a cost since the start."""
+        """End the run at this time or at this nominal cost, both counted from the start."""
         self.until_s, self.cost_s = until_s, cost_s
         return self
 
     def follow(self, at_most_s: float = math.inf) -> None:
-        """Follow the motion until it repeats or reaches its end, at most to ``at_most_s``."""
+        """Follow the motion until it repeats or the run ends, at the latest until ``at_most_s``."""
         run, frequency_hz, until_s = self.run, self._pace.frequency_hz, min(self.until_s, at_most_s)
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
@@ -110,7 +110,7 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Return the number of drive periods of the next batch round; 0 within a period or in contact."""
+        """Return the drive periods of the next batch round; 0 in mid-period, in contact, or at the end."""
         run = self.run
         if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
             return 0
@@ -119,7 +119,7 @@ class StatesAlone:
         return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
 
     def follow_to_flight(self) -> None:
-        """Follow a motion in contact until a drive period ends in flight, if one does soon."""
+        """Follow a motion in contact until a drive period ends in flight, for at most `TRIES` periods."""
         run = self.run
         for _ in range(TRIES):
             if run.is_in_flight or run.periods is None:
@@ -127,14 +127,14 @@ class StatesAlone:
             self.follow((run.periods + 1) / run.drive.frequency_hz)
 
     def note(self, stretch: Stretch) -> Repetition | None:
-        """Keep the states of a stretch; return the repetition, which `follow` checks after a batch."""
+        """Store the states of a stretch; return the repetition of the motion, or None."""
         if self._every is not None:
             self.path.append(stretch.thinned(self._every))
         self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
         return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
-        """Follow the motion further; return the growth of a small change (none over zero time)."""
+        """Follow the motion for ``length_s``; return the growth of a small perturbation, empty for zero."""
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
@@ -144,42 +144,42 @@ class StatesAlone:
 
 
 Follow = Callable[[Sequence[StatesAlone]], None]
-"""Function that follows motions to their ends: `one_by_one` or `in_batches`."""
+"""Function that follows motions to the end of their runs: `one_by_one` or `in_batches`."""
 
 
 def one_by_one(several: Sequence[StatesAlone]) -> None:
-    """Follow each motion by itself."""
+    """Follow each motion in turn, without batches."""
     for each in several:
         each.follow()
 
 
 WORTH_A_FIT_S = 3000.0
-"""Total time of motion of one specimen above which a fit of its collisions (one second) saves time [s]."""
+"""Total simulated time of one specimen above which batches pay for their collision fit of one second [s]."""
 AUTOMATIC_S = 10.0
-"""Assumed length of an automatic duration in this comparison [s]."""
+"""Assumed length of a run with an automatic duration in this comparison [s]."""
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
     """Return whether batches are faster for this many motions of one specimen.
 
-    It depends on request and processor only, not on previous run times, so that results are reproducible.
+    The choice depends only on the request and the processor, not on measured times: results are reproducible.
     """
     each_s = duration.duration_s if isinstance(duration, FixedDuration) else AUTOMATIC_S
     return motions * each_s >= WORTH_A_FIT_S and batches_pay()
 
 
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Time and most drive periods between two checks of a batch: their states are kept in memory."""
+"""Longest time [s] and most drive periods between two checks of a batch, whose states fill memory."""
 HELD_STATES, FULL = 1 << 20, 16
 """Most states of all motions in a batch, and the number of motions that fill the SIMD registers."""
 TRIES = 8
-"""Most drive periods followed without a batch until one ends in flight, where batches begin."""
+"""Most drive periods to wait for one that ends without contact, where a batch can begin."""
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:
     """Follow motions in SIMD batches if the specimen allows, else one by one.
 
-    Batches only compute states; repetition is found as without them.
+    A batch only computes states. Repetition is detected in the same way as without batches.
     """
     alike = defaultdict[tuple[Specimen, float], list[StatesAlone]](list)
     for each in several:
@@ -205,9 +205,9 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Follow motions in a batch, each for this many drive periods; return those to follow further."""
+    """Follow each motion in a batch for its number of periods; return the motions to follow further."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
-    # A motion lost by the batch stays where it was and is followed without a batch.
+    # A motion that the batch cannot follow keeps its state and is followed without a batch.
     return [
         each
         for (each, _), stretch in zip(ready, found, strict=True)
