@@ -16,7 +16,7 @@ LEVELS = ("ramp", "abort", "off")
 
 
 class RunningProgram:
-    """Program that has announced itself by a file, whose name holds process id and start time."""
+    """Program announced by a file whose name contains process id and start time."""
 
     def __init__(self, path: str, pid: str, start: str, *, is_alive: bool) -> None:
         self.path = path
@@ -25,7 +25,7 @@ class RunningProgram:
         self.is_alive = is_alive
         try:
             with open(path, "rb") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
-                self._facts = file.read()  # now, because the program may remove the file
+                self._facts = file.read()  # read now, because the program may remove the file
         except OSError:
             self._facts = b""
 
@@ -120,7 +120,7 @@ def _own_place() -> tuple[str, str]:
 
 
 def _start_of(pid: str) -> str:
-    """Return the start time of a process, as proc(5) states it; empty if the process does not run."""
+    """Return the start time of a process in the format of proc(5); empty if the process does not run."""
     try:
         with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
             state, *others = file.read().rpartition(")")[2].split()
@@ -130,7 +130,7 @@ def _start_of(pid: str) -> str:
 
 
 def _is_locked(path: str) -> bool:
-    """Return whether the program that made the file runs; if so, it holds a lock on the file."""
+    """Return whether the file is locked: the program that created it keeps a lock while it runs."""
     import fcntl
 
     try:

@@ -59,7 +59,7 @@ class Place:
     panel: Panel
     function: str
     extras: tuple[str, ...] = ()
-    """Optional dependencies (extras) that the command needs; one that includes the others comes first."""
+    """Optional dependencies (extras) that the command needs; an extra that includes others comes first."""
     space_mb: int = 300
     """Address space that the libraries and threads of the command need [MB]."""
     advice: str = ""
@@ -87,13 +87,13 @@ class Place:
 
 
 class LateCommand(TyperCommand):
-    """A placeholder in the list of commands; the real command is imported when it is called."""
+    """Placeholder in the list of commands; the command itself is imported when it is called."""
 
     def __init__(self, name: str, place: Place) -> None:
         super().__init__(name, rich_help_panel=place.panel)
         self._place = place
 
-    def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the whole line, as it is
+    def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the line is not shortened
         """Return the description in the list of commands."""
         return self._place.summary
 
@@ -112,7 +112,7 @@ class LateCommand(TyperCommand):
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
-"""Base class of usage errors, which is in click or, with newer typer, in its own copy of click."""
+"""Base class of usage errors: from click, or from the copy of click inside newer versions of typer."""
 
 
 @contextmanager
@@ -177,7 +177,7 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
-"""Address space needed to simulate or analyse (measured: 775), and to open a bench (1807) [MB]."""
+"""Address space [MB] to simulate or analyse (775 measured), and to open a bench (1807 measured)."""
 COMMANDS = {
     "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
     "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
@@ -262,7 +262,7 @@ class LogBeside(logging.StreamHandler[TextIO]):
         self._beside.do(lambda: super(LogBeside, self).emit(record))
 
     def close(self) -> None:
-        """Allow one second to write the remaining lines."""
+        """Wait at most 1 s until the remaining lines are written, then close the log."""
         self._beside.wait(1.0)
         super().close()
 
@@ -296,7 +296,7 @@ def vibench(
 
 
 def main() -> None:
-    """Run the command line; an error that a user can fix gives one sentence and a non-zero exit code."""
+    """Run the command line; for an error that a user can fix, print one sentence and exit with its code."""
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; suppresses gRPC's log of ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
@@ -307,12 +307,12 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # caused by a path, because files contain valid text
+    except UnicodeEncodeError as error:  # a path is the cause, because all files contain valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # Any command may meet an unusable path first, so such errors are handled here for all commands.
+        # An unusable path may appear in any command, so such errors are handled here for all commands.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise
@@ -328,7 +328,7 @@ def _disk_trouble(error: Exception) -> str:
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Return a sentence if lack of memory or too many files caused an error, even indirectly; else empty."""
+    """Return the message if lack of memory or too many open files caused the error, also indirectly."""
     if error is None:
         return ""
     text = str(error)
@@ -352,7 +352,7 @@ DISK_ERRORS = {
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
 }
-"""System errors that a user can fix."""
+"""Messages by number of the system error, for the errors that a user can fix."""
 _NO_MEMORY = (
     os.strerror(errno.ENOMEM),
     "can't start new thread",
@@ -364,7 +364,7 @@ _NO_MEMORY = (
 
 
 NAME_SHOWN = 80
-"""Number of letters shown of a name that is too long."""
+"""Number of characters shown of a name that is too long."""
 
 
 def complain(error: BaseException) -> None:

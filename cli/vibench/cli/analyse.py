@@ -260,7 +260,7 @@ def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_js
 def hidden_motions(
     results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
-    """Yield the hidden motion of each recording with a result; print an error if it cannot be estimated."""
+    """Yield the estimated, unmeasured motion of m1 for each analysed recording; print an error if none."""
     for facts in results.facts if hidden is not _Hidden.OMITTED else ():
         with open_recording(facts.path) as recording:
             try:

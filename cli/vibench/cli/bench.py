@@ -75,7 +75,7 @@ def check(
 ) -> None:
     """Check the bench with a small sine: identities, noise, gains, signs, clocks, disk, and changes.
 
-    The result is stored, because arming a real bench requires a recent passed check. Exit code 1 if it fails.
+    The result is stored, because arming a real bench needs a recent passed check. Exit code 1 after a FAIL.
     """
     if last and (knobs is not None or new_reference):
         raise ConfigurationError(
@@ -102,9 +102,9 @@ def new(
     ] = "lab_rig",
     answers: Annotated[Path | None, option("Answers, in place of questions.", "FILE.toml")] = None,
 ) -> None:
-    """Set up a bench: ask, write its file, check wires, noise floor, a first 5 mV, gains and signs.
+    """Set up a bench: ask questions, write its file, check wiring, noise, a first 5 mV, gains and signs.
 
-    The report is kept beside the file. Exit code 1 if a finding forbids to energise.
+    The report is stored beside the file. Exit code 1 if a finding forbids energising the bench.
     """
     page = new_bench(target, named(template, "hardware_configs"), answers)
     if page.verdict is Verdict.FAIL:

@@ -61,7 +61,7 @@ class Answers:
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
     def ask(self, question: Question, choices: Sequence[str], held: str) -> str:
-        """Return the answer to a question of the configuration; empty keeps the template's value."""
+        """Return the answer to a question of the configuration; an empty one keeps the template's value."""
         answer = self.given.get(question.key, "")
         if choices:
             console.print(f"seen: {', '.join(choices)}")
@@ -90,7 +90,7 @@ class Answers:
 
 
 def _name_in_a_comment(answer: str) -> str:
-    """Remove unprintable characters such as line ends, because the name is written in a comment."""
+    """Return the name without unprintable characters such as line ends, because a comment contains it."""
     return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 

@@ -115,7 +115,7 @@ def branches(
 def _drive(
     amplitude: str | None, frequency: str | None, like: Path | None
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return the curves to overlay, and the fields of the request for range and level."""
+    """Return the measured curves to overlay, and the request's fields for range and level."""
     if like is not None:
         if amplitude is not None:
             raise InvalidRequest(
@@ -145,7 +145,7 @@ def _drive(
 def _resonance(
     amplitude: str | None, frequency: str | None, like: Path | None, resonance: str
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return no curves, and the fields of the request for the levels of a phase resonance."""
+    """Return no curves, and the request's fields to follow a phase resonance over the amplitude."""
     if amplitude is None or frequency is not None or like is not None:
         raise InvalidRequest(
             f"--resonance {resonance} follows the amplitude; give --amplitude START:STOP too, and neither "

@@ -1,4 +1,4 @@
-"""`vibench chain`: waves, band gaps, transmission, energy, impacts and exponents of a row of cells."""
+"""`vibench chain`: waves, band gaps, transmission, energy, impacts and exponents of a chain of cells."""
 
 import math
 from pathlib import Path
@@ -57,7 +57,7 @@ def chain(
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate a row of cells: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""
+    """Simulate a chain of cells: band gaps, transmission, energy, impacts and exponents of each cell."""
     first, *others = specimen or (USUAL_SPECIMEN,)
     request = specimen_request(
         options,
@@ -102,7 +102,7 @@ def _lengths(text: str) -> tuple[int, ...]:
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
-    """Return the fields of the request for the base motion; no drive if no motion is given."""
+    """Return the request's fields for the base motion; without a motion, the drive is NONE."""
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(

@@ -43,7 +43,7 @@ def docs(
 
 
 def build(target: Path, extent: str) -> None:
-    """Build the site with warnings as errors; raises MissingLibrary without Sphinx or its extensions."""
+    """Build the site, with warnings as errors; raises MissingLibrary if Sphinx or an extension is missing."""
     for library in ("sphinx", "myst_nb", "furo"):
         if find_spec(library) is None:
             raise MissingLibrary(

@@ -37,7 +37,7 @@ VARIABLES: Mapping[str, str] = {
     "QT_QPA_PLATFORM": "Qt's platform plug-in; 'offscreen' without a display",
     "PYQTGRAPH_QT_LIB": "Qt binding of the plots; default PySide6",
 }
-"""The environment variables of vibench and their meaning: docs/installation.md."""
+"""The environment variables of vibench and their meaning, as in docs/installation.md."""
 SECRET = frozenset({TOKEN_VARIABLE})
 
 
@@ -78,7 +78,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield each library with its version, or with the extra that installs it if it is missing."""
+    """Yield each library with its version; for a missing library, the extra that installs it."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]

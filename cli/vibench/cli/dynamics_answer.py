@@ -25,7 +25,7 @@ SHOWN = 24
 
 
 def room_for(file: str, out: Path | None) -> None:
-    """Before computing, refuse a folder that is not writable or already holds a result."""
+    """Check before computing that the folder is writable and contains no result yet."""
     if out is None:
         return
     room_for_folder(out)
@@ -36,9 +36,9 @@ def room_for(file: str, out: Path | None) -> None:
 def compute_parts(
     parts: Iterator[Part], tell: Callable[[int, Part], None]
 ) -> tuple[tuple[Part, ...], float, bool]:
-    """Compute all parts and report each with its number; Ctrl-C ends after the current part.
+    """Compute all parts and report each with its number; Ctrl-C stops after the current part.
 
-    Returns the parts, the elapsed seconds, and whether all parts are computed.
+    Returns the parts, the elapsed time [s], and whether all parts are computed.
     """
     found: list[Part] = []
     began = time.perf_counter()
@@ -79,7 +79,7 @@ def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
 
 
 def leave(*, is_complete: bool) -> None:
-    """Exit with the code for a complete or an incomplete result."""
+    """Exit with code STOPPED if the result is incomplete; otherwise do nothing."""
     if not is_complete:
         errors.print("stopped: the result contains what was computed until then")
         raise typer.Exit(ExitCode.STOPPED)

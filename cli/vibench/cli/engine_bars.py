@@ -103,7 +103,7 @@ def sentence(message: EngineMessage) -> str:
 
 
 class Watching:
-    """Display of the newest status from a separate thread, so that only it waits for a blocked terminal.
+    """Display of the newest status in a separate thread; a blocked terminal delays only that thread.
 
     After a stop, it prints on standard error who stopped the engine, and whether the output is off.
     """

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Numbers of the figures of the experiment, which need recordings."""
+"""Numbers of the figures that show the experiment and need recordings."""
 
 
 def figure(

@@ -20,7 +20,7 @@ def gui(
     bench: BenchPath = None,
     screenshots: Annotated[Path | None, option("Save a picture of each page, and exit.", "DIR")] = None,
 ) -> None:
-    """Open the window: connect, check, choose, preview, run, watch, compare."""
+    """Open the window, to check a bench, plan and run tests, watch them, and compare results."""
     command = [sys.executable, "-m", WINDOW]
     if bench is not None:
         command += ["--bench", str(named(bench, "hardware_configs"))]

@@ -114,7 +114,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Print the result."""
+    """Print the caption, the motions, and for a basin map its boundary and the effect of kicks."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(motion)}")

@@ -158,7 +158,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the messengers for command and mail; raises ConfigurationError if one is not usable."""
+    """Return the messengers for the command and for mail; raises ConfigurationError if one is not usable."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))

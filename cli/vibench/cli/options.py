@@ -68,7 +68,7 @@ class RequestOptions(Generic[Request]):
 
 
 def validated(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request with these values by field; raises InvalidRequest that names the first invalid one."""
+    """Return a request with these field values; raises InvalidRequest, naming the first invalid value."""
     from pydantic import ValidationError
 
     try:
@@ -125,7 +125,7 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return a type without limits and ``| None``; for a union return str, which the model parses."""
+    """Return the type without limits or ``| None``; str for a union, because the model parses the text."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
@@ -135,7 +135,7 @@ def _plain(annotation: Any) -> Any:
 
 
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command's function with a signature for typer that has an option for every field.
+    """Return a command's function with a signature for typer, in which every field is an option.
 
     A switch takes no value, and has no ``--no-name`` unless that is declared.
     """
@@ -222,7 +222,7 @@ class SectionedCommand(TyperCommand):
 
 
 _WHOLE = 1000
-"""Length limit of a command's description in a list; so large that none is shortened."""
+"""Length limit of a command's description in a list [characters]; larger than any description."""
 
 
 class SectionedGroup(TyperGroup):

@@ -55,13 +55,13 @@ def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
 
 
 def room_for_folder(path: Path) -> None:
-    """Before computing, refuse a folder that cannot be written; nothing is left in it.
+    """Check before computing that a folder can be created and written to; leave no file in it.
 
     Raises ConfigurationError when the folder or its parent is a file or not writable.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     try:
-        # Test by writing: permissions do not bind administrators, and /proc accepts no folders.
+        # Test by writing: permissions do not restrict administrators, and /proc accepts no folders.
         with tempfile.TemporaryDirectory(dir=standing):
             return
     except OSError as error:
@@ -74,7 +74,7 @@ def room_for_folder(path: Path) -> None:
 
 
 def room_for_page(path: Path) -> None:
-    """Before computing, refuse a page that cannot be written.
+    """Check before computing that a page can be written.
 
     Raises ConfigurationError when the path is a folder, or its folder cannot be created.
     """

@@ -192,7 +192,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on adjacent points solved in the same way; details are of that with the largest p.
+    """Return a paragraph on adjacent points solved in the same way; details are for the largest p.
 
     Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes the start-up of the
     process.
@@ -248,7 +248,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return the number of starts that reached a point's motion; empty if all starts reach it."""
+    """Return how many starts reach the point's motion, as 5/8; "lost" or empty if none were simulated."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"

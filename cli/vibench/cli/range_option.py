@@ -19,7 +19,7 @@ _EXAMPLES = {
         3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
     },
 }
-"""Descriptions of the allowed forms, by number of parts."""
+"""Descriptions of the allowed forms, by parameter and number of parts."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Range:
 
 
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: str | None = None) -> Range:
-    """Parse ``260``, ``50:600`` or ``50:600:1``; ``parts`` holds the allowed numbers of parts.
+    """Parse ``260``, ``50:600`` or ``50:600:1``; ``parts`` gives the allowed numbers of parts.
 
-    ``option`` is the name of the option if it differs from that of the parameter.
+    ``option`` is the name of the option if it differs from the parameter's name.
     Raises InvalidRequest for other text.
     """
     try:
@@ -53,7 +53,7 @@ def _rising(text: str, parts: tuple[int, ...]) -> list[float]:
     if min(numbers) <= 0.0:
         raise ValueError(f"{min(numbers):g} is not above 0")
     start, *others = numbers
-    if others and (start > others[0] or others == [start]):  # a range with a step may hold one value
+    if others and (start > others[0] or others == [start]):  # a range with a step may contain one value
         raise ValueError(f"{start:g} is not below {others[0]:g}")
     return numbers
 

@@ -21,7 +21,7 @@ Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
 def read_specimen(specimen: str | None) -> SpecimenTable:
-    """Return the specimen of this name or file, by default that of the paper; raises InvalidRequest."""
+    """Return the specimen of this name or file, by default the paper's; raises InvalidRequest if unknown."""
     if specimen is None:
         return usual_specimen()
     try:
@@ -35,7 +35,7 @@ def specimen_request(
 ) -> Choice:
     """Return a request with a specimen; warn about implausible amplitudes and gaps.
 
-    ``amplitude`` is the text of a valid option. Raises InvalidRequest, which names an invalid option.
+    ``amplitude`` is the text of the option, already checked. Raises InvalidRequest for an invalid option.
     """
     request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])

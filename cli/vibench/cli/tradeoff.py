@@ -20,7 +20,7 @@ from .paths import AsJson, room_for_folder
 from .specimen_option import AXES, SPECIMEN, read_specimen
 
 _PAPER_HZ = 260.0
-"""Drive frequency of the paper's four cases [Hz]: without contact, twice chaotic, strongly driven."""
+"""Drive frequency of the paper's four cases [Hz]: no contact, two chaotic motions, and a strong drive."""
 
 
 def tradeoff(
@@ -33,7 +33,7 @@ def tradeoff(
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
 ) -> None:
-    """Measure error over time of every method: for your scene, or the paper's four cases at 260 Hz."""
+    """Measure error over computing time of each method, for your scene or the paper's cases at 260 Hz."""
     given = {"error": error, "time_s": time_limit}
     target = {name: value for name, value in given.items() if value is not None}
     scenes = {"amplitude": amplitude, "frequency": frequency}

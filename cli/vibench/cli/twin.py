@@ -113,7 +113,7 @@ class _Following:
         self.client.tell_twin(self._status(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
-        """Store parameters and usual level when they are known, as a baseline for checking later values."""
+        """Store the parameters and the usual level, once known, as a baseline to check later runs."""
         live, watch = self.live, self.live.watch
         if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
             return
@@ -126,7 +126,7 @@ class _Following:
             levels = {**before.levels, self.plan: watch.usual}
             try:
                 keep_baseline(before.model_copy(update={"levels": levels}), path)
-            except OSError as error:  # for example a full disk; the twin continues without it
+            except OSError as error:  # such as a full disk; the twin continues without a stored baseline
                 reason = f"{path} could not be written ({error.strerror})"
                 print_warnings([f"{reason}: the usual level of this run is not stored; make room"])
 
@@ -156,7 +156,7 @@ class _Following:
 
 
 def _shows_m0(status: EngineStatus) -> bool:
-    """Return whether the vibrometer is on m0; a scan moves it."""
+    """Return whether the vibrometer measures m0; during a scan it measures other points."""
     return status.bench is not None and "m0_velocity" in [each.role for each in status.bench.channels]
 
 

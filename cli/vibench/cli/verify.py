@@ -28,7 +28,7 @@ def verify(
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check every recording of a folder against its seal, including samples, and against journals."""
+    """Check every recording of a folder against its seal, including all samples, and the journals."""
     with external_data(allow_external):
         found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
     counts = Counter(each.verdict for each in found)
