@@ -36,12 +36,12 @@ ELSEWHERE = "or run it without a window: QT_QPA_PLATFORM=offscreen"
 
 
 def display_trouble() -> str:
-    """Return in one sentence why no window can be shown, and what to do; empty if one can."""
+    """Return one sentence: why no window can be shown, and what to do; empty if a window can be shown."""
     try:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - whether it loads is the question
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    # A variable, because type checkers run for another system would report the rest as unreachable.
+    # A variable, because a type checker for another system would report the rest as unreachable.
     system: str = sys.platform
     if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""

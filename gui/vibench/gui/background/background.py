@@ -59,7 +59,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Queue for one question; a newer one replaces it, and it is submitted after a short pause."""
+    """Queue of one question, which is submitted after a short pause; a newer question replaces it."""
 
     def __init__(
         self,

@@ -179,14 +179,14 @@ class EngineLine:
 
 
 def _ignore(_: object) -> None:
-    """Ignore an answer; the next status shows what an order did."""
+    """Ignore an answer; the next status shows the effect of an order."""
 
 
 CATCH_UP_S = 2.0
 """Longest part fetched after a pause [s]; older samples are only in the file, not in the display."""
 
 PIECE_S = 0.2
-"""Duration of the samples processed in one step [s]; a real instrument delivers a quarter of it per frame."""
+"""Duration of the samples processed in one step [s], four times what an instrument delivers per frame."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
@@ -195,7 +195,7 @@ Snapshot = tuple[EngineStatus, SampleSlice | None]
 class Bridge(QObject):
     """The only connection between the window and the engine.
 
-    All stored values are those that the engine reported last. The window's timer calls `tick`, which fetches
+    It stores only values that the engine reported last. The window's timer calls `tick`, which fetches
     answers and sends new requests. The engine takes these requests as the sign that the window is alive.
     """
 
@@ -269,7 +269,7 @@ class Bridge(QObject):
         self._order(lambda client: _open(client, rig, confirmations))
 
     def adopt(self, announcement: Announcement | None) -> None:
-        """Take over an engine that another window left, if any, with its campaign; `adopted` follows."""
+        """Take over an engine that another window left running, and its campaign; then emit `adopted`."""
         if announcement is None or self._line is not None:
             return
         self._line = EngineLine(lambda: AdoptedEngine(announcement))
@@ -289,7 +289,7 @@ class Bridge(QObject):
         self._order(lambda client: verb(client, *args, **kwargs))
 
     def arm(self, request: CampaignRequest) -> None:
-        """Arm a campaign; `armed` or a notice follows."""
+        """Arm a campaign; when the engine answers, emit `armed` or a notice."""
 
         def keep(plan: ArmedPlan) -> None:
             self.campaign, self._attendance = request.campaign, plan.attendance
@@ -299,7 +299,7 @@ class Bridge(QObject):
         self._order(lambda client: client.arm_request(request), keep)
 
     def stop(self, level: StopLevel, reason: str) -> None:
-        """Pause or end the run; this request precedes all others that wait."""
+        """Hold or end the run; this request is sent before all waiting requests."""
         if self._line is not None:
             self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._refused)
 

@@ -18,7 +18,7 @@ from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, q
 
 
 class Editor(Protocol):
-    """A widget that edits one value of a plan; the value has the plain type that a file would hold."""
+    """A widget that edits one value of a plan; the value has the plain type used in a plan file."""
 
     @property
     def widget(self) -> QWidget:
@@ -29,7 +29,7 @@ class Editor(Protocol):
         """Why the text cannot be read; empty when it can."""
 
     def content(self) -> Any:
-        """Return the value as a file would hold it; None for an empty field."""
+        """Return the value as stored in a plan file; None for an empty field."""
 
     def show_content(self, content: Any) -> None:
         """Show a value from a file."""
@@ -120,7 +120,7 @@ class _LineOnEach(QStyledItemDelegate):
 
 
 class ChoiceEditor:
-    """Editor of a choice; it needs no validation."""
+    """Editor of a choice from given values; it needs no validation."""
 
     complaint = ""
 
@@ -143,7 +143,7 @@ class ChoiceEditor:
             self._box.setCurrentIndex(place)
 
     def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
-        """List the values below headings; ``lines`` holds the heading and the description of each value."""
+        """List the values below headings; ``lines`` gives the heading and the description of each value."""
         blocked, chosen = self._box.blockSignals(True), self.content()
         self._box.clear()
         model = self._box.model()

@@ -89,7 +89,7 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    """Return the bounds as text; the unit follows each bound if it can be chosen, otherwise the last."""
+    """Return the bounds as text; a selectable unit follows each bound, another unit only the last bound."""
     each = f" {unit}" if unit in CHOICES else ""
     texts = ", ".join(_limit_texts(field, each))
     return texts if each or not texts else f"{texts} {unit}".strip()

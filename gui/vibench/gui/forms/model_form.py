@@ -46,7 +46,7 @@ def complaints_of(error: ValidationError) -> dict[Loc, str]:
 
 
 class ModelForm(QWidget):
-    """Form of a plan; its content has the plain types of a file, and the plan model validates it."""
+    """Form of a plan; its content has the plain types used in a file, and the plan's model validates it."""
 
     changed = Signal()
 
@@ -77,7 +77,7 @@ class ModelForm(QWidget):
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Return the content as a file would hold it; omit empty fields, except where None has a meaning."""
+        """Return the content as stored in a file; omit empty fields, except where None has a meaning."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
         values = {
             name: value
@@ -193,7 +193,7 @@ class GroupEditor:
         return ""
 
     def content(self) -> Any:
-        """Return the content as a file would hold it."""
+        """Return the content as stored in a file."""
         return self.form.content()
 
     def show_content(self, content: Any) -> None:
@@ -215,9 +215,9 @@ class GroupEditor:
     ) -> None:
         """Set starting values for the fields of a new kind, and describe the kinds in the list.
 
-        ``usual`` fills empty fields of any kind. ``fresh`` holds values by kind,
-        which replace those typed for another kind.
-        ``lines`` holds the heading and the description of each kind.
+        ``usual`` fills empty fields of any kind. ``fresh`` gives values by kind,
+        which replace values typed for another kind.
+        ``lines`` gives the heading and the description of each kind.
         """
         self._usual, self._fresh = usual, fresh
         assert self._kind is not None
@@ -267,7 +267,7 @@ class OptionalGroupEditor(GroupEditor):
         self.form.hide()
 
     def content(self) -> Any:
-        """Return the content as a file would hold it; None when absent."""
+        """Return the content as stored in a file; None when absent."""
         return super().content() if self._there.isChecked() else None
 
     def show_content(self, content: Any) -> None:

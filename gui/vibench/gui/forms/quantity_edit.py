@@ -94,7 +94,7 @@ def _scale(number: str, prefix: str) -> float:
 
 _LONGEST_SHOWN = 40
 _SMALL = 1e-2
-"""Value from which a quantity is written without a prefix."""
+"""SI value from which a quantity is shown without a unit prefix."""
 _DIGITS = 6
 """Displayed digits of a long number; the stored value keeps all."""
 MOST_WHOLE = 1 << 53

@@ -213,7 +213,7 @@ class AppContext(QObject):
         self.settings.keep_text(SettingKey.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
 
     def say(self, notice: Notice) -> None:
-        """Show a message on the strip."""
+        """Show a message in the message strip."""
         self.noticed.emit(notice)
 
     def warn(self, what: str, done: str = "", next_step: str = "", details: str = "") -> None:

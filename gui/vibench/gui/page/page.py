@@ -134,7 +134,7 @@ class Page(QWidget):
 
 
 class PageParts(QSplitter):
-    """Two parts of a page; the division of the space is stored when they are hidden."""
+    """Two parts of a page with a movable divider; its position is stored when the parts are hidden."""
 
     def __init__(self, context: AppContext, page: str, orientation: Qt.Orientation) -> None:
         super().__init__(orientation)
@@ -143,7 +143,7 @@ class PageParts(QSplitter):
         self.setChildrenCollapsible(False)
 
     def show_parts(self, first: QWidget, second: QWidget, sizes: tuple[int, int] = (0, 0)) -> None:
-        """Add the parts, divided as the user left them, else by ``sizes``; zeros for natural sizes."""
+        """Add the parts with the user's last sizes, otherwise ``sizes``; zeros mean natural sizes."""
         self.addWidget(first)
         self.addWidget(second)
         if any(sizes):
@@ -221,7 +221,7 @@ MOST_KEPT = 200
 
 
 class History(Generic[State]):
-    """Undo history: the states of a plan and the current position; ``show`` shows a state again."""
+    """Undo history: the states of a plan and the current position; ``show`` is called with a state."""
 
     def __init__(self, show: Callable[[State], None]) -> None:
         self._show = show
@@ -236,11 +236,11 @@ class History(Generic[State]):
         self._now = len(self._states) - 1
 
     def undo(self) -> None:
-        """Show the state before, if there is one."""
+        """Show the previous state, if there is one."""
         self._go(-1)
 
     def redo(self) -> None:
-        """Show the state after, if there is one."""
+        """Show the next state, if there is one."""
         self._go(1)
 
     def _go(self, step: int) -> None:

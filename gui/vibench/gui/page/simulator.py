@@ -16,10 +16,10 @@ from .app_context import AppContext
 
 
 class Simulator(QObject):
-    """Process that computes the newest request of a page, and lives as long as the page.
+    """Process that computes the newest request of a page, and runs until the page is deleted.
 
-    ``grown`` receives partial results, ``ended`` is called after the last one, and ``said`` receives what
-    else happens, in words.
+    ``grown`` receives partial results, ``ended`` is called after the last one, and ``said`` receives
+    messages about all other events.
     """
 
     def __init__(

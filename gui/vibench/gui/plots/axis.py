@@ -24,11 +24,11 @@ class Scale(Enum):
     LOGARITHMIC = auto()
 
     def drawn(self, value: float) -> float:
-        """Return where a plot draws a value."""
+        """Return the position at which a plot draws a value."""
         return log10(value) if self is Scale.LOGARITHMIC else value
 
     def value_at(self, drawn: float) -> float:
-        """Return the value that is drawn at a place."""
+        """Return the value that a plot draws at a position."""
         return float(10.0 ** min(max(drawn, -300.0), 300.0)) if self is Scale.LOGARITHMIC else drawn
 
 
@@ -128,7 +128,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
-        """Hide numbers and label, because the plot below shows them for both."""
+        """Hide numbers and label, because the plot below shows them for both plots."""
         self.setStyle(showValues=False)
         self.showLabel(False)
 
@@ -201,7 +201,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
 
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
-    """Remove ticks between multiples of a larger step, until at most ``most`` are left.
+    """Return a larger step and the ticks at its multiples, so that at most ``most`` are left.
 
     A scale needs two numbers; if fewer would be left, keep the outermost two of the previous step.
     """

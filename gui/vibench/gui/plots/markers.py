@@ -31,7 +31,7 @@ class Markers(QObject):
         return tuple(sorted(self._values)) if self._are_shown else ()
 
     def draw_in(self, plots: Iterable[Plot]) -> None:
-        """Draw the markers in plots, which no longer hold the lines of an earlier call."""
+        """Draw the markers in plots, from which the lines of an earlier call were removed."""
         self._plots = tuple(plots)
         self.lines = [[plot.upright(_MARKER, value) for plot in self._plots] for value in self._values]
         for number, lines in enumerate(self.lines):

@@ -24,7 +24,7 @@ from .upright_marks import Rules, Stripes
 ROOM = 0.15
 """Empty margin at both ends after a change of the range, as a share of the data's range."""
 LEAST_USED = 0.5
-"""Share of the range below which the data are too small, so that the range is reduced."""
+"""If the data fill less than this share of the range, the range is reduced."""
 
 Range = tuple[float, float]
 

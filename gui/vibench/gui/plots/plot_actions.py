@@ -59,7 +59,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
     """
     if path.exists():
         raise FileExistsError(0, "it exists already")
-    memory = QBuffer()  # Qt does not report every disk error
+    memory = QBuffer()  # not a file, because Qt does not report every disk error
     match path.suffix.lower():
         case ".csv":
             memory.setData(numbers_of(plot, ",").encode())

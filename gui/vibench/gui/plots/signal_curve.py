@@ -59,7 +59,7 @@ class SignalCurve:
 
 
 SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
-"""Item role that holds the length of the bar, 0 to 1 or more."""
+"""Item role of the bar's length, 0 to 1 or more."""
 OVER = "#b3261e"
 NEAR = "#a06a00"
 WELL = "#00694d"

@@ -165,7 +165,7 @@ def keep_space(widget: QWidget) -> None:
 
 
 def set_tone(widget: QWidget, tone: str) -> None:
-    """Give a widget the colours of a tone; an empty text for none."""
+    """Give a widget the colours of a tone; an empty text removes them."""
     if (widget.property("tone") or "") != tone:
         widget.setProperty("tone", tone)
         widget.style().polish(widget)

@@ -97,7 +97,7 @@ THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 def palette(theme: Theme) -> QPalette:
-    """Return the palette of Qt's widgets; a palette works on every desktop, colour schemes do not."""
+    """Return the palette of Qt's widgets; unlike a colour scheme, it works on every desktop."""
     role = QPalette.ColorRole
     colours = QPalette()
     for where, colour in (

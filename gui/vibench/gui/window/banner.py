@@ -274,8 +274,8 @@ _DETAIL_LINES = 14
 class MessageStrip(QFrame):
     """Strip with the newest message: what happened, what was done, what to do next.
 
-    Its height is constant, so that nothing below moves. Without a message it shows the next step. Details
-    lists earlier messages and overlaps the page.
+    Its height is constant, so that nothing below moves. Without a message it shows the next step. The
+    Details button opens a list of earlier messages over the page.
     """
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ from vibench.sim.operating_system.this import read_at
 
 EVERY_MS = 20
 BOUND_S = 0.1
-"""Delay above which it is logged, because users notice it [s]."""
+"""Delay that users notice; longer delays are logged [s]."""
 SPAN_S = 10.0
 """Time range over which the longest delay is reported [s]."""
 MOST_NOTED = 20

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def whole_path(folder: str) -> str:
-    """Return an absolute path; refuse a relative one, which depends on the working directory."""
+    """Return an absolute path; raises ValueError for a path relative to the working directory."""
     if not Path(folder).expanduser().is_absolute():
         raise ValueError(f"{folder!r} is not a whole path; give one such as {Path.home() / 'vibench'}")
     return folder
@@ -52,7 +52,7 @@ class Preferences(FrozenModel):
     font_pt: Annotated[int, Field(ge=7, le=24)]
     """Font size."""
     displacements_in: Literal["automatic", "µm", "mm", "m"]
-    """Unit of displacements in the window; files and reports keep theirs. Fields accept any unit."""
+    """Unit of displacements in the window, not in files and reports. Fields accept any unit."""
     velocities_in: Literal["mm/s", "m/s"]
     """Unit of velocities on axes, in tables and sentences."""
     accelerations_in: Literal["m/s²", "g"]

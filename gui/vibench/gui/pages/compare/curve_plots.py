@@ -177,7 +177,7 @@ _SWATCH = (28, 12)
 
 
 class CurveList(QListWidget):
-    """Curves with a check box each; colours stand for sources, dashes for kinds."""
+    """List of curves with check boxes; the colour shows the source of a curve, the dashes its kind."""
 
     changed = Signal()
 
@@ -230,7 +230,7 @@ class CurveList(QListWidget):
         )
 
     def remove_chosen(self) -> tuple[str, ...]:
-        """Remove the selected curves; return the sources that have none left."""
+        """Remove the selected curves; return the sources without remaining curves."""
         before = {each.source for each in self._curves}
         ticked = {each.name for each, _ in self.ticked()}
         rows = {index.row() for index in self.selectedIndexes()}
@@ -343,7 +343,7 @@ class PairBox(QGroupBox):
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:
-        """Return the difference and show it in words; None without a comparison."""
+        """Return the difference and show it in words; None if the curves cannot be compared."""
         pair = self.pair()
         self._summary.setText("")
         if pair is None:

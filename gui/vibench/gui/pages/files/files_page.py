@@ -250,7 +250,7 @@ class FilesPage(Page):
             self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:
-        """List another folder; the menu sets the folder of new recordings."""
+        """List another folder; the folder of new recordings stays as set in the menu."""
         self._folder = folder
         self.table.recordings.show_entries(())
         self._count.setText("◌ reading…")

@@ -48,7 +48,7 @@ from ...widgets.theme import Theme
 Levels = dict[str, tuple[OverviewLevel, ...]]
 
 NOTE = "note"
-"""Name of a result that holds a note; later notes are numbered."""
+"""Name of a result that contains a note; later notes are numbered."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class ListedRecording:
 
     @property
     def name(self) -> str:
-        """Path below the folder without suffix, so that attempts of one measurement differ."""
+        """Path relative to the folder, without suffix; different for each attempt of a measurement."""
         return self.catalogue_entry.path.removesuffix(".part").removesuffix(".h5")
 
     @property
@@ -175,7 +175,7 @@ _STATE_SYMBOLS: dict[str, str] = {
 
 
 def state_text(state: str) -> str:
-    """Return symbol and word of a state; colour alone is never used."""
+    """Return symbol and word of a state, so that it can be read without colour."""
     return f"{_symbol(state)} {state}"
 
 
@@ -208,7 +208,7 @@ def whole_check(path: Path) -> VerifiedRecording:
 
 
 def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
-    """Describe a recording in one line; ``found`` is the result of `whole_check`, None until that ends."""
+    """Return a line about a recording; ``found`` is the result of `whole_check`, None until it ends."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -308,7 +308,7 @@ class RecordingModel(QAbstractTableModel):
         self.endResetModel()
 
     def missing_pictures(self) -> tuple[Path, ...]:
-        """Files without a thumbnail."""
+        """Return the readable files without a thumbnail."""
         return tuple(e.path for e in self.entries if e.is_readable and e.path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
@@ -380,7 +380,7 @@ class _ChosenRows(QSortFilterProxyModel):
         self.endFilterChange()
 
     def filterAcceptsRow(self, row: int, parent: Index) -> bool:
-        """Combine both filters."""
+        """Return whether the row passes both the search and the campaign filter."""
         if not super().filterAcceptsRow(row, parent):
             return False
         return self._only is None or self.sourceModel().index(row, NAME).data(PATH_ROLE) in self._only
@@ -436,7 +436,7 @@ class RecordingTable(QTableView):
         self._sorted.show_only(paths)
 
     def chosen_paths(self) -> tuple[Path, ...]:
-        """Files of the selected rows, from top to bottom."""
+        """Return the files of the selected rows, from top to bottom."""
         rows = sorted(self.selectionModel().selectedRows(NAME), key=lambda index: index.row())
         return tuple(index.data(PATH_ROLE) for index in rows)
 

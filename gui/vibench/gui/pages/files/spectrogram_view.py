@@ -45,7 +45,7 @@ Found = TypeVar("Found", bound=HiddenView | DensityPicture)
 class _RangePicture(QWidget, Generic[Request, Found]):
     """A picture of the visible range, computed while its tab is visible.
 
-    A subclass names the request for a time range, or why there is none, draws a picture, and erases it.
+    A subclass defines `_request_for`, `_draw` and `_erase`.
     """
 
     plot: Plot
@@ -80,7 +80,7 @@ class _RangePicture(QWidget, Generic[Request, Found]):
         self._clear(hint)
 
     def show_view(self, low_s: float, high_s: float) -> None:
-        """Compute the visible range if this tab is visible."""
+        """Compute the picture of a time range [s] if this tab is visible."""
         self._view_s = (low_s, high_s)
         self._ask()
 
@@ -197,7 +197,7 @@ _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Widths of the spectral lines [Hz]; with None, the width follows from the visible range."""
 _BAR_EM = 4
-"""Width of the colour scale with its label."""
+"""Width of the colour scale with its label, in font heights."""
 _SHOWN_DB = 80.0
 """Range of colours below the strongest line [dB]."""
 
@@ -336,7 +336,7 @@ class _Image:
         return f"{self.item.image[row, column]:.1f} {self.bar.axis.labelText}"
 
     def show_picture(self, found: DensityPicture) -> None:
-        """Draw a picture; colours range from the strongest line downwards."""
+        """Draw a picture; the colours cover a fixed range below the strongest line."""
         bottom, top = map(self._plot.scales[1].drawn, found.frequency_hz)
         left, right = found.time_s
         self.item.setImage(found.decibel, autoLevels=False)

@@ -29,7 +29,7 @@ _MOST_KEPT = 12
 _LABEL_AT = 0.1
 """Height of segment names, as a share of the plot; low, because the channel name is at the top."""
 _NAMED_SHARE = 0.08
-"""Share of the recording that a segment must exceed for its name to be drawn."""
+"""Smallest share of the recording at which the name of a segment is drawn."""
 
 
 @dataclass(eq=False)

@@ -90,7 +90,7 @@ class MapPlot(QWidget):
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
     def clear(self) -> None:
-        """Remove the map; the axes will be set to show the whole next map."""
+        """Remove the map; the next map sets the axes to its whole range."""
         self._range = None
         self.image.clear()
         self.plot.with_hint(HINT)
@@ -123,7 +123,7 @@ def _class_colours(picture: MapPicture) -> NDArray[np.uint8]:
 
 
 def _spread(values: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return colour indices, scaled between a low and a high quantile."""
+    """Return RGBA colours of values, scaled between a low and a high quantile."""
     known = values[np.isfinite(values)]
     low, high = np.quantile(known, [1.0 - SHARPEST, SHARPEST]) if known.size else (0.0, 1.0)
     share = np.clip((values - low) / max(float(high - low), 1e-12), 0.0, 1.0)
@@ -291,7 +291,7 @@ class MapsPage(Page):
         )
 
     def add_recordings(self, paths: object) -> None:
-        """Draw the levels of recordings over the map, where they depend on frequency."""
+        """Draw the levels of recordings over the map, if a recording has a level over frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
             self.context.background.ask(recorded_response, self._show_level, _ignore, Path(path))
 

@@ -26,7 +26,7 @@ USUAL_NAME = "queue"
 
 
 def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Campaign:
-    """Add a test at the end, under an unused name."""
+    """Return the campaign with a test added at the end, under an unused name."""
     if campaign is None:
         return Campaign(name=USUAL_NAME, measurements=(measurement,))
     taken = {name.lower() for name in campaign.recording_names()}
@@ -37,7 +37,7 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
 def with_sweep(
     campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range, rig: Rig | None
 ) -> Campaign:
-    """Add a sweep of a test along an axis.
+    """Return the campaign with a sweep of a test along an axis.
 
     Raises ConfigurationError when a point of the sweep is not allowed. Limits that need a simulation (loads
     of shaker and specimen) are checked when the campaign is armed.
@@ -59,7 +59,7 @@ def with_sweep(
 
 
 def without(campaign: Campaign, number: int) -> Campaign | None:
-    """Remove one entry; return None when no entry is left."""
+    """Return the campaign without one entry; None when no entry is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
@@ -70,7 +70,7 @@ def without(campaign: Campaign, number: int) -> Campaign | None:
 
 
 def move_up(campaign: Campaign, number: int) -> Campaign:
-    """Move one entry up by one place; tests stay before sweeps."""
+    """Return the campaign with one entry moved up by one place; tests stay before sweeps."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     kind, place = (
         (measurements, number) if number < len(measurements) else (sweeps, number - len(measurements))

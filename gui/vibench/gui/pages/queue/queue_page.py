@@ -131,7 +131,7 @@ class QueuePage(Page):
         self.edits = History(context.selection.choose_campaign)
         self._preview: CampaignPreview | None = None
         self._of: tuple[Campaign, Rig | None] | None = None
-        """Campaign and rig of the displayed summary; None without one."""
+        """Campaign and rig of the displayed summary; None without a summary."""
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",

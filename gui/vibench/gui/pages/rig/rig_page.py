@@ -58,7 +58,7 @@ class RigChoice(QWidget):
         self._paths: list[Path] = []
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
-        """Why the selected file cannot be used, and what to check in it; each empty if there is nothing."""
+        """Error and warnings about the selected file; each text is empty if there is none."""
         self._box, self.pace = Choice(), Choice(items=PACES.values())
         self._box.setToolTip("Instruments connected to this computer; a simulated rig runs anywhere")
         self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
@@ -178,7 +178,7 @@ def finding_name(finding: Finding) -> str:
 
 
 def measured_text(finding: Finding) -> str:
-    """Return the measured value with a prefix: ``"20 µV"`` for 1.997e-05 V."""
+    """Return the measured value with a unit prefix: ``"20 µV"`` for 1.997e-05 V."""
     number = finding.number
     if number is None or not isfinite(number):
         return finding.value

@@ -23,7 +23,7 @@ from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
 
 Curves = Mapping[str, pg.PlotDataItem]
-"""Curves by the name of the field that they show."""
+"""Curves, by the name of the result field that each curve shows."""
 
 
 def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
@@ -118,9 +118,9 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""Time axis; it is fixed, because a scrolling one would be repainted in every frame."""
+"""Time axis; it is fixed, because a scrolling axis would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Limits of the number of columns of a plot; one per column of pixels leaves no gap."""
+"""Limits of the number of columns of a plot; one column per pixel leaves no gap."""
 UP_EM = 4.0
 USUAL_SPAN_S = 2.0
 """Time range shown at first [s]."""
@@ -343,7 +343,7 @@ def _faded(number: int, theme: Theme) -> Colour:
 
 
 class HiddenMotionPlot(QWidget):
-    """The newest 50 ms of hidden motion, the forecast, and the estimated parameters."""
+    """Plot of the newest 50 ms of the estimated p, with its forecast and the estimated parameters."""
 
     title = "Hidden motion: m1 between its stops"
     tab = "Hidden motion"

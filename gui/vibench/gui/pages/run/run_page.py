@@ -71,7 +71,7 @@ class LivePicture(Enum):
 
 @dataclass(frozen=True)
 class KindView:
-    """The two pictures shown when a run of a kind starts."""
+    """The two pictures shown when a run with one kind of excitation starts."""
 
     left: LivePicture
     right: LivePicture

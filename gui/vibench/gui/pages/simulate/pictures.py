@@ -104,7 +104,7 @@ class SpectrumPicture(_PairPicture):
         super().__init__(theme, titles, (EXPONENT, DIMENSION), hint)
 
     def show_answer(self, answer: ExponentSpectrum) -> None:
-        """Draw the spectra found so far."""
+        """Draw the exponents and dimensions found so far."""
         along = answer.request.along
         upper, lower = self.cleared(along)
         if not answer.points:
@@ -230,7 +230,7 @@ _SMALLEST_DIFFERENCE = 1e-6
 
 
 class AnswerPlots(QWidget):
-    """Four plots of a simulation, redrawn as it grows."""
+    """Four plots of a simulation, redrawn as results arrive."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

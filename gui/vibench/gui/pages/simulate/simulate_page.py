@@ -91,7 +91,7 @@ class SimulatePage(Page):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """The tabs, each of which is as large as another page."""
+        """The tabs; each tab has as many widgets as a page."""
         return (self._parts, *self._views)
 
     def begin(self) -> None:

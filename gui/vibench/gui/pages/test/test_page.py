@@ -194,7 +194,7 @@ class PredictionPlot(Plot):
 _FLOOR = 1e-5
 """Relative level below which spectral lines are rounding errors."""
 _LEAST_HZ = 1.0
-"""Lower end of the spectrum; no shaker moves below it."""
+"""Lower end of the displayed spectrum [Hz]; shakers do not move at lower frequencies."""
 _LEAST_LINES = 9
 """Smallest useful height of a plot, in lines of text."""
 
@@ -283,7 +283,7 @@ _SHOWN = {
 
 
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
-    """Return excitation, loads beside their limits, time and size in words.
+    """Return a summary in words: excitation, loads and their limits, duration and file size.
 
     ``refusal`` is the reason why feedback control would not hold the motion, or empty.
     """
