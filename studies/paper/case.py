@@ -16,10 +16,10 @@ from .options import LOWEST_HZ, FigureOptions
 
 AS_CHOSEN = "the defaults"
 FIT_M = 1e-6
-"""Indentation at which continuous models have the force of the stops: p = 46 um (section 2)."""
+"""Indentation [m] at which continuous models are fitted to the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Displacements of starts other than rest, over the gap; velocities are those at this frequency [Hz]."""
+"""Starts other than rest: largest displacement over the gap, and the frequency that sets velocities [Hz]."""
 
 
 class ExponentsBy(StrEnum):
@@ -45,7 +45,7 @@ class Case(FigureOptions):
     sweep_amplitude_m: float = 5e-6
     """Base amplitude at 266 Hz: the value that the paper gives for 1.5 V."""
     sweep_falls: float = 0.0
-    """k of a base amplitude proportional to f^-k: 0 constant displacement, 1 velocity, 2 acceleration."""
+    """Exponent k of a base amplitude ~ f^-k; 0, 1, 2 for constant displacement, velocity, acceleration."""
     sweep_goes: Direction = Direction.UP
     fit_m: float = FIT_M
     sum_model: str = "power:3+5+7"
@@ -232,7 +232,7 @@ def parse_option(text: str) -> Alternative:
 
 
 SCORED_S = (1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5, 4e-5, 5e-5)
-"""c_i / k_i: 1e-5 s is the literal reading in mm, g and ms; the paper's chaos ends at larger values."""
+"""Values of c_i / k_i [s]: 1e-5 s is the paper's value read in mm, g and ms; larger ones end its chaos."""
 ALIKE = change("zeta", 0.0165)
 BY_ODE45 = change("exponents", ExponentsBy.ODE45)
 DAMPINGS = (*(damping(value) for value in SCORED_S if value != FigureOptions.damping_time_s), ALIKE)

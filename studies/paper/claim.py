@@ -20,7 +20,7 @@ class Expectation:
 
     name: str
     unit: str
-    """Empty for ratios and counts; ``"%"`` for shares, which are kept as fractions."""
+    """Empty for ratios and counts; ``"%"`` for shares, which are stored as fractions."""
     low: float
     high: float
 
@@ -48,22 +48,22 @@ class Expectation:
 
 
 def about(name: str, unit: str, value: float, within: float) -> Expectation:
-    """Require a number within a tolerance in its unit."""
+    """Return the requirement of a value within a tolerance, both in ``unit``."""
     return Expectation(name, unit, value - within, value + within)
 
 
 def at_least(name: str, unit: str, low: float) -> Expectation:
-    """Require a lower bound."""
+    """Return the requirement of a lower bound."""
     return Expectation(name, unit, low, math.inf)
 
 
 def at_most(name: str, unit: str, high: float) -> Expectation:
-    """Require an upper bound."""
+    """Return the requirement of an upper bound."""
     return Expectation(name, unit, -math.inf, high)
 
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
-    """Require a peak near each frequency."""
+    """Return the requirements of a peak near each frequency."""
     return tuple(about(f"peak at {each:g} Hz", "Hz", each, within_hz) for each in wanted_hz)
 
 
@@ -89,7 +89,7 @@ class Claim:
     draws: int
     """Number of starts: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool
-    """Whether it is measured again at every damping of the score."""
+    """Whether the claim is also measured at every damping of the score."""
 
     def is_met_by(self, values: Values) -> bool:
         """Return whether every number lies within its bounds; NaN does not."""
@@ -118,7 +118,7 @@ def claim(
 
 
 costly_claim = partial(claim, tried=(), is_scored=False)
-"""A claim that takes too long to be measured at every damping."""
+"""Decorator for a claim that takes too long to be measured at every damping."""
 
 
 class Verdict(StrEnum):
@@ -126,7 +126,7 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """Holds under the defaults for some of the starts, which is a matter of chance."""
+    """The claim holds under the defaults for some starts only, which depends on chance."""
     HOLDS_UNDER = "holds under"
     FAILS = "does not hold"
 
@@ -206,7 +206,7 @@ def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 
 def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
-    """Measure a claim under a case; if it fails, under its alternatives until it holds for one."""
+    """Measure a claim under a case; if it fails, under its alternatives until it holds under one of them."""
     findings = [finding(claim, evidence, case)]
     for alternative in claim.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:

@@ -15,10 +15,10 @@ _HIGHER_M = 7e-6
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_S = 150.0, 350.0, 200.0
 """Sweep of the paper's section 5."""
 _SAMPLED_HZ = 8192.0
-"""Sample rate of the drive, over 20 samples per cycle, so that its spline is accurate to 1e-4."""
+"""Sample rate of the drive [Hz]: over 20 samples per cycle, so that its spline is accurate to 1e-4."""
 _AMPLITUDE_AT_HZ = 266.0
 _SWEEP_COLLIDES_HZ = (240.0, 290.0)
-"""Ends of the colliding region; section 5 of the paper says "about"."""
+"""Ends of the colliding region [Hz]; section 5 of the paper gives them as "about"."""
 _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
 """Tolerances of a sweep, and of a region on a grid of 5 Hz."""
 
@@ -150,7 +150,7 @@ def sweep(r: Reading) -> Values:
 
 
 def sweep_of(case: Case) -> tuple[LinearSweep, LinearSweep | Sampled]:
-    """Return the sweep of Fig. 13(d), and the same with an amplitude proportional to a power of frequency."""
+    """Return the sweep of Fig. 13(d) at constant amplitude, and with the case's amplitude ~ f^-k."""
     ends_hz = (SWEEP_START_HZ, SWEEP_STOP_HZ)
     start_hz, stop_hz = ends_hz if case.sweep_goes is Direction.UP else ends_hz[::-1]
     even = LinearSweep(start_hz, stop_hz, SWEEP_S, case.sweep_amplitude_m)

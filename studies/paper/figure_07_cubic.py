@@ -1,4 +1,4 @@
-"""Fig. 7: n = 3 and the stops at four amplitudes, similar frequencies shaded."""
+"""Fig. 7: the cubic and the piece-wise model at four amplitudes, with similar frequencies shaded."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ _STYLES = {
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Return the study of n = 3 and the stops."""
+    """Return the study of the cubic and the piece-wise model."""
     return (similarity_study(options, (_MODEL,)),)
 
 

@@ -10,7 +10,7 @@ _MODELS = ("power:3", "power:5", "power:7", "power:3+5+7")
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Return the study of the four models and the stops."""
+    """Return the study of the four models and the piece-wise model."""
     return (similarity_study(options, _MODELS),)
 
 

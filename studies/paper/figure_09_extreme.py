@@ -10,7 +10,7 @@ MODELS = ("power:29", "power:35", "power:47")
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Return the study of the three models and the stops."""
+    """Return the study of the three models and the piece-wise model."""
     return (similarity_study(options, MODELS),)
 
 

@@ -1,4 +1,4 @@
-"""Fig. 11: influence of the gap if A0 equals it; two resonances remain at any gap."""
+"""Fig. 11: influence of the gap, with A0 equal to the gap; two resonances remain at any gap."""
 
 from vibench.analysis import report
 from vibench.sim.study import Study, StudyResults
@@ -7,7 +7,7 @@ from .options import FigureOptions
 from .responses import finish, responses
 
 GAPS_M = (5e-6, 15e-6, 30e-6, 45e-6, 60e-6)
-"""Our choice of gaps; the copy of the paper's text does not give them."""
+"""Gaps, our choice [m]; our copy of the paper's text does not give them."""
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:

@@ -10,5 +10,5 @@ FILES = {
 
 
 def paper_figure(number: int) -> ModuleType:
-    """Return the module of a figure: `studies(options)` and `draw(options, *results)`."""
+    """Return the module of a figure, with functions `studies(options)` and `draw(options, *results)`."""
     return import_module(f".{FILES[number]}", __package__)

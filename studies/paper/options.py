@@ -15,7 +15,7 @@ LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
 """Largest damping time, more than fifteen times critical damping in the paper's third mode."""
 _LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
-"""Limits of the gap: a thousandth of the weakest drive, and two hundred times the strongest."""
+"""Limits of the gap [m]: a thousandth of the weakest drive, and two hundred times the strongest drive."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 
@@ -47,14 +47,14 @@ class FigureOptions:
     grid: FrequencyGrid = FrequencyGrid.COARSE
     highest_hz: float = 600.0
     similarity_highest_hz: float = 500.0
-    """Upper end of the grid for the comparison of models, on which the rates depend."""
+    """Upper end of the frequency grid for comparing models; similarity rates depend on this limit."""
     logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES
     threshold: float = SIMILARITY_THRESHOLD
     duration_s: float = 30.0
     window_s: float = 5.0
     """The paper's window: the last 5 s of 30 s from rest."""
     budget_s: float = 0.0
-    """No time for further starts, because a point of the paper is one run."""
+    """Time for further starts; zero, because a point of the paper is one run."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:

@@ -27,7 +27,7 @@ def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
-    """Return the frequencies of the same peaks with m1 fixed to m2, to 0.01 Hz, shape (peaks,)."""
+    """Return the peak frequencies of m0 over the base with m1 fixed to m2, to 0.01 Hz, shape (peaks,)."""
     mass, damping, stiffness = bound_matrices(specimen)
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
     omega = 2.0 * np.pi * fine[:, None, None]

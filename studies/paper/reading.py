@@ -17,7 +17,7 @@ from .textbook_methods import ode45, textbook_exponents
 PIECE_WISE, CONTINUOUS = "hertz", "power:5"
 WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
 SECOND_REGION_HZ = (220.0, 320.0)
-"""Range around the second linear resonance, between the two terminal ones."""
+"""Range around the second linear resonance, between the two terminal resonances [Hz]."""
 Computed = TypeVar("Computed")
 Values = tuple[float | np.floating[Any], ...]
 """The numbers of a claim: one per requirement; NaN for a missing value."""
@@ -25,10 +25,10 @@ Values = tuple[float | np.floating[Any], ...]
 
 @dataclass(frozen=True)
 class Evidence:
-    """Computes studies and other results, and caches them for all claims."""
+    """Cache of studies and other results, which computes missing results; shared by all claims."""
 
     solve: Callable[[Study], StudyResults]
-    """Solves a study or reads its file; raises an error if it is incomplete."""
+    """Function that solves a study or reads its file; raises an error if the study is incomplete."""
     _remembered: dict[object, object] = field(default_factory=dict)
 
     def study(self, study: Study) -> StudyResults:
@@ -41,7 +41,7 @@ class Evidence:
         return tuple(each for each in self._remembered.values() if isinstance(each, StudyResults))
 
     def remembered(self, key: object, compute: Callable[[], Computed]) -> Computed:
-        """Return a cached result; the key must name all its inputs."""
+        """Return a result, computed at the first call; ``key`` must contain all inputs of the computation."""
         if key not in self._remembered:
             self._remembered[key] = compute()
         return self._remembered[key]  # type: ignore[return-value]

@@ -20,7 +20,7 @@ _HIGH_RATE = 0.8
 """High similarity rate; section 4 of the paper says "more than 80 %"."""
 _CURVE_POINTS = 200
 _DRAWS = 4
-"""Starts: the rates depend on the chaotic motion of every model, which differs from start to start."""
+"""Number of starts; the rates depend on the chaotic motion of each model, which differs between starts."""
 FITTED = (
     COMPARED_LOWER,
     change("compared", 600.0),

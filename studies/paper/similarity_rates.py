@@ -25,7 +25,7 @@ def similarity_study(options: FigureOptions, models: tuple[str, ...]) -> Study:
 def compare_model(
     options: FigureOptions, results: StudyResults, model: str, amplitude_m: float, what: str
 ) -> Similarity:
-    """Compare one continuous model with the piece-wise one at one amplitude."""
+    """Return the similarity of a continuous model and the piece-wise model at one amplitude."""
     stops, continuous = (
         SimilarityCurve(curve.frequency_hz, getattr(curve, what), amplitude_m)
         for curve in (responses(results, model=each, amplitude=amplitude_m) for each in ("hertz", model))

@@ -1,7 +1,7 @@
 """The paper's equations and explicit Runge-Kutta methods in textbook form, for comparison. SI units.
 
-The equations share nothing with the engine: no modes, no special unknowns in contact, and no polynomial
-instead of a sine. The methods do not detect contacts.
+The equations share nothing with the engine: they use no modes, no special unknowns in contact, and no
+polynomial instead of a sine. The methods do not detect contacts.
 Their steps cross a contact at arbitrary points; the error changes the energy of every impact, and the
 exponent of chaos. Dormand and Prince's pair is controlled like MATLAB's `ode45` (Shampine and Reichelt, The
 MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
@@ -21,13 +21,13 @@ from vibench.sim import Harmonic, NoContact, PowerLaw, RigidStops, Specimen
 from .responses import Reals
 
 APART_M = 1e-11
-"""Distance of the neighbour for an exponent; far below any indentation, far above rounding errors."""
+"""Distance of the neighbour for an exponent [m]; far below any indentation, far above rounding errors."""
 READING_S = 1e-3
-"""Interval between measurements of that distance."""
+"""Interval at which the distance of the neighbour is measured and reset [s]."""
 LOST_M = 1.0
-"""Displacement beyond which a motion has diverged."""
+"""Displacement beyond which a motion has diverged [m]."""
 SLOWEST_PER_S = 1e-9
-"""Reference speed of a state initially at rest."""
+"""Smallest relative rate of change for the first step, needed for a state at rest [1/s]."""
 
 
 class Place(IntEnum):
@@ -37,11 +37,11 @@ class Place(IntEnum):
     FLIGHT = 0
     ON_UPPER = 1
     ANYWHERE = 2
-    """Determined by p."""
+    """The position is determined by p."""
 
 
 class Law(NamedTuple):
-    """A law as numbers: (k d^exponent + beside d) (1 + loss dd/dt) at the depth d; powers of p at every p."""
+    """Contact law: (k d^exponent + beside d) (1 + loss dd/dt) at the depth d, and powers of p at every p."""
 
     lower: float
     upper: float
@@ -81,7 +81,7 @@ def _stop_force(depth: Reals, rate: Reals, law: Law) -> Reals:
 
 
 def rates(time_s: float | Reals, state: Reals, place: Place, law: Law, numbers: Reals) -> Reals:
-    """Return d/dt of x, y, z, vx, vy, vz. On a stop the force is zero below depth 0; in flight there is none.
+    """Return the time derivative of x, y, z, vx, vy, vz; without forces of the stops in flight.
 
     ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
     """
@@ -133,7 +133,7 @@ _DORMAND_PRINCE = Tableau(
 
 
 def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0) -> TextbookMethod:
-    """Return Dormand and Prince's pair, controlled as in MATLAB; the defaults are MATLAB's for 30 s.
+    """Return Dormand and Prince's pair, controlled as in MATLAB; defaults as MATLAB's for a run of 30 s.
 
     Raises ValueError when a tolerance or the longest step is not positive and finite.
     """
@@ -155,9 +155,9 @@ def textbook_exponents(
 ) -> Reals:
     """Return the largest Lyapunov exponents of a method for motions from rest [1/s]; NaN after divergence.
 
-    Mean divergence rate of a neighbour with the same steps, over ``duration_s`` after ``settle_s``. The
-    resolution for regular motions is about 1 / ``duration_s``. Shape (n,), one per drive; all motions are
-    integrated together.
+    An exponent is the mean divergence rate of a neighbour that takes the same steps, over ``duration_s``
+    after ``settle_s``. The resolution for regular motions is about 1 / ``duration_s``. Shape (n,), one per
+    drive; all motions are integrated together.
     Raises ValueError for rigid stops.
     """
     states = np.zeros((6, 2, len(drives)))
@@ -195,7 +195,7 @@ def march(
     drives: Sequence[Harmonic],
     method: TextbookMethod,
 ) -> tuple[Reals, Reals]:
-    """Integrate states, and optional neighbours, to a time; return them and the divergence rates.
+    """Integrate states, and optional neighbours, to a time; return the states and divergence rates [1/s].
 
     ``states`` has shape (6, 1 or 2, motions); the second entry is the neighbour.
     """
