@@ -185,14 +185,14 @@ class TestCalibration:
         today = rig.vibrometer.calibrated + timedelta(days=age_days)
         assert calibrations(rig, today)[0].is_valid is is_valid
 
-    def test_every_sensor_and_input_is_checked(self, rig):
+    def test_the_calibration_of_every_sensor_and_input_is_checked(self, rig):
         today = rig.vibrometer.calibrated + timedelta(days=10_000)
         with pytest.raises(CheckFailed) as caught:
             check_calibrations(rig, today)
         for what in ("PSV-500", "IEPE", *(channel.physical for channel in rig.daq.channels)):
             assert what in str(caught.value)
 
-    def test_only_the_sensor_of_each_input_is_checked(self, rig):
+    def test_a_sensor_that_no_input_uses_needs_no_calibration(self, rig):
         left = tuple(each for each in rig.daq.channels if each.role.value != "base_acceleration")
         bare = changed(rig, daq={"channels": left})
         named = [each.what for each in calibrations(bare, rig.vibrometer.calibrated)]
@@ -207,14 +207,14 @@ class TestCalibration:
 
 
 class TestKnobs:
-    def test_every_knob_is_requested_once(self, rig):
+    def test_the_operator_is_asked_once_about_every_knob(self, rig):
         asked = []
         sheet = confirm_by_asking(lambda question: asked.append(question) or "y", "B. Kjaer")(rig.knobs)
         assert len(asked) == len(rig.knobs)
         assert "2706: is the gain at 10 dB?" in asked[0]
         assert (sheet.operator, sheet.knobs) == ("B. Kjaer", rig.knobs)
 
-    def test_a_saved_knob_sheet_confirms_the_knobs(self, rig, tmp_path):
+    def test_a_saved_knob_sheet_confirms_its_knobs(self, rig, tmp_path):
         path = tmp_path / "knobs.toml"
         sheet = confirm_by_asking(lambda _: "yes", 'O. "Quote" \\ Back\nslash')(rig.knobs)
         save_knob_sheet(sheet, path)

@@ -31,5 +31,5 @@ def test_a_computer_without_the_driver_lists_the_rest_and_reports_it(virtual):
     assert any("no NI-DAQmx driver" in remark for remark in found.remarks)
 
 
-def test_a_server_that_does_not_answer_is_named(virtual):
+def test_a_server_that_does_not_answer_is_named_in_the_remarks(virtual):
     assert any("127.0.0.1:9" in remark for remark in list_instruments(server="127.0.0.1:9").remarks)

@@ -92,7 +92,7 @@ def test_one_generator_under_two_names_has_one_lock(user, resource):
         BenchLock.of(second)
 
 
-def test_two_benches_of_one_computer_are_distinguished():
+def test_two_benches_of_one_computer_have_separate_locks():
     other = generator(resource="USB0::0x0699::0x0353::C999999::INSTR")
     other = other.model_copy(update={"daq": other.daq.model_copy(update={"device": "Dev2"})})
     with closing(BenchLock.of(RIG)), closing(BenchLock.of(other)):
