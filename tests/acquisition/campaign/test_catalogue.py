@@ -93,7 +93,7 @@ def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
-def test_the_verdict_shows_what_needs_attention(bench, folder):
+def test_the_verdict_of_a_recording_names_its_end_and_overload(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
 
@@ -120,7 +120,7 @@ def test_running_recordings_are_listed_and_abandoned_ones_are_interrupted(bench,
     assert "now.h5.part" not in [entry.path for entry in list_recordings(folder)]
 
 
-def test_a_file_that_is_no_recording_is_listed_with_its_fault(folder):
+def test_a_file_that_is_not_a_recording_is_listed_as_unreadable(folder):
     (folder / "junk.h5").write_bytes(b"no HDF5")
     entry = next(entry for entry in list_recordings(folder) if entry.path == "junk.h5")
     assert entry.state == "unreadable"
@@ -141,19 +141,19 @@ def test_a_read_only_folder_can_be_listed(folder, monkeypatch):
     assert len(list_recordings(folder)) == 2
 
 
-def test_a_missing_folder_gives_one_sentence(tmp_path):
+def test_a_missing_folder_is_refused_with_advice(tmp_path):
     with pytest.raises(RecordingError, match="give the folder that the recordings are in"):
         list_recordings(tmp_path / "nowhere")
 
 
-def test_a_copy_is_listed_as_one(folder):
+def test_a_copy_of_a_recording_is_listed_as_a_copy(folder):
     shutil.copy(folder / "monday" / "dwell.h5", folder / "again.h5")
     by_path = {each.path: each.verdict for each in list_recordings(folder)}
     assert by_path["monday/dwell.h5"] == "samples not checked; has the same samples as again.h5"
     assert by_path["again.h5"] == by_path["tuesday/late/sweep.h5"] == "samples not checked"
 
 
-def test_two_recordings_without_samples_are_no_copies(tmp_path):
+def test_recordings_without_samples_are_not_reported_as_copies(tmp_path):
     for name in "ab":
         channels = (ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 1.0, 10.0),)
         header = RecordingHeader(

@@ -50,7 +50,7 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
     assert "resting for 12 s before two" in told
 
 
-def test_rests_are_part_of_plan_and_estimate(rig, tmp_path):
+def test_cooling_pauses_are_part_of_plan_and_estimate(rig, tmp_path):
     with_rest, without = campaign("one", "two", "three", rest_s=REST_S), campaign("one", "two", "three")
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
@@ -61,7 +61,7 @@ def test_rests_are_part_of_plan_and_estimate(rig, tmp_path):
     )
 
 
-def test_a_stop_ends_a_rest(bench, tmp_path):
+def test_a_stop_ends_a_cooling_pause(bench, tmp_path):
     switch = StopSwitch()
     idle = bench.idle
 
@@ -77,7 +77,7 @@ def test_a_stop_ends_a_rest(bench, tmp_path):
     assert states(tmp_path) == ["done", "queued"]
 
 
-def test_a_hold_extends_a_rest_until_it_is_released(bench, tmp_path):
+def test_a_hold_extends_a_cooling_pause_until_the_hold_is_released(bench, tmp_path):
     switch = StopSwitch()
     idle = bench.idle
 
@@ -91,7 +91,7 @@ def test_a_hold_extends_a_rest_until_it_is_released(bench, tmp_path):
     assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
 
 
-def test_a_campaign_killed_in_a_rest_continues_at_the_next_point(bench, new_bench, rig, tmp_path):
+def test_a_campaign_killed_in_a_cooling_pause_continues_at_the_next_point(bench, new_bench, rig, tmp_path):
     def as_left_by_a_kill(event):
         if event.kind is CampaignEventKind.RESTING:
             # What a process leaves that is killed now: the files as they are, the journal's log included.
@@ -107,7 +107,7 @@ def test_a_campaign_killed_in_a_rest_continues_at_the_next_point(bench, new_benc
     assert fresh.idled_s == 0.0  # nothing has been played in this session
 
 
-def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
+def test_a_second_attempt_also_waits_for_the_cooling_pause(bench, tmp_path):
     fault = failing_once(bench, DataLost("a hole"))
     point_results = run_campaign(
         bench, campaign("one", rest_s=REST_S, attempts=2), tmp_path, on_progress=fault
@@ -116,7 +116,7 @@ def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
     assert bench.idled_s == pytest.approx(LOOK_EVERY_S + REST_S)
 
 
-def test_an_invalid_rest_is_refused():
+def test_an_invalid_cooling_pause_is_refused():
     longest = timedelta(days=1).total_seconds()
     for given in (-1.0, longest + 1):
         with pytest.raises(ConfigurationError, match="rest_s"):

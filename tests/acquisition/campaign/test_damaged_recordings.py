@@ -176,7 +176,7 @@ def test_the_catalogue_detects_a_change_with_restored_file_time(folder):
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
-def test_the_journal_keeps_every_seal(folder):
+def test_the_journal_stores_the_seal_of_every_recording(folder):
     for point in read_journal(folder / "c.campaign.sqlite"):
         with open_recording(folder / point.file) as recording:
             assert point.seal == recording.seal != ""
@@ -186,7 +186,7 @@ def test_the_journal_keeps_every_seal(folder):
     assert len({seal for (seal,) in seals}) == 3
 
 
-def test_a_journal_of_a_version_without_seals_can_be_resumed(bench, folder):
+def test_a_campaign_with_an_older_journal_without_seals_can_be_resumed(bench, folder):
     connection = sqlite3.connect(folder / "c.campaign.sqlite")
     for table in ("points", "attempts"):
         connection.execute(f"ALTER TABLE {table} DROP COLUMN seal")
@@ -205,7 +205,7 @@ def test_a_journal_of_a_version_without_seals_can_be_resumed(bench, folder):
     assert (one.seal, len(three.seal)) == ("", 64)
 
 
-def test_recordings_of_a_version_without_seals_are_kept_and_reported(bench, folder):
+def test_unsealed_recordings_of_an_older_version_are_kept_and_reported(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
         with h5py.File(path, "r+") as file:
@@ -255,7 +255,7 @@ def said_by(statement):
 @pytest.mark.thorough
 @pytest.mark.parametrize("table", ["points", "attempts"])
 @pytest.mark.parametrize("seal", ["hex(zeroblob(32))", "(SELECT seal FROM points WHERE name = 'one')", "''"])
-def test_a_journal_whose_tables_state_two_seals_confirms_no_recording(folder, table, seal):
+def test_two_seals_of_one_recording_in_the_journal_are_reported_as_damage(folder, table, seal):
     list_recordings(folder)
     said_by(f"UPDATE {table} SET seal = {seal} WHERE name = 'two'")(folder)
     if (table, seal) == ("attempts", "''"):  # as in a journal from before seals
@@ -271,14 +271,14 @@ def test_a_journal_whose_tables_state_two_seals_confirms_no_recording(folder, ta
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
-def test_a_forger_who_notes_another_recording_in_one_table_is_found(folder):
+def test_a_forged_seal_in_one_table_of_the_journal_is_detected(folder):
     exchanged_for_an_older_one(folder)
     with open_recording(folder / "two.h5") as recording:
         said_by(f"UPDATE points SET seal = '{recording.seal}' WHERE name = 'two'")(folder)
         assert recording.check_seal(SealDepth.WHOLE).state is SealState.DAMAGED
 
 
-def test_a_repeated_point_is_intact_and_its_deleted_predecessor_is_not(bench, folder):
+def test_a_restored_recording_of_a_repeated_point_is_reported_as_damaged(bench, folder):
     former = (folder / "two.h5").read_bytes()
     (folder / "two.h5").unlink()
     run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)

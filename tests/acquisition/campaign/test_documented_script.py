@@ -33,7 +33,7 @@ def script():
 
 
 @pytest.mark.thorough
-def test_the_script_refines_the_jump_and_can_be_repeated(script, tmp_path, monkeypatch):
+def test_the_documented_script_refines_a_jump_and_can_be_repeated(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
     # With seed 1 the motion at 207.5 Hz leaves its collisions while it is recorded.

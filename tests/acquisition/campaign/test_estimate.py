@@ -37,7 +37,7 @@ def test_estimated_bytes_match_the_samples(rig, tmp_path):
     assert expected.fits
 
 
-def test_existing_recordings_are_not_counted(bench, rig, tmp_path):
+def test_an_estimate_excludes_existing_recordings(bench, rig, tmp_path):
     point_results = run_campaign(bench, CAMPAIGN, tmp_path)
     with pytest.raises(RecordingError, match="exist already"):
         estimate_campaign(CAMPAIGN, rig, tmp_path)

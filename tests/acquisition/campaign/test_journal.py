@@ -37,7 +37,7 @@ def test_the_journal_keeps_plan_and_bench(journal, bench):
         assert {point.state for point in again.points()} == {JournalPointState.QUEUED}
 
 
-def test_attempts_are_counted_and_keep_their_files_and_reasons(journal):
+def test_each_attempt_is_stored_with_its_number_file_and_reason(journal):
     journal.start("two", "two.h5")
     assert states(journal.points())[1] == ("two", JournalPointState.RUNNING)
     journal.end("two", JournalPointState.FAILED, ReasonCode.DATA_LOST, "a hole")
@@ -96,7 +96,7 @@ def test_a_process_killed_in_a_transaction_keeps_the_previous_one(journal):
     ]
 
 
-def test_the_journal_can_be_read_during_writing_without_leftovers(journal, tmp_path):
+def test_reading_the_journal_during_writing_leaves_no_extra_files(journal, tmp_path):
     journal.start("one", "one.h5")
     assert read_journal(journal.path)[0].state is JournalPointState.RUNNING
     journal.end("one", JournalPointState.DONE, ReasonCode.CARRIED_OUT, "")

@@ -64,7 +64,7 @@ def test_control_characters_do_not_break_a_message(server, tmp_path):
     assert r"folder: \udcff" in server.heard
 
 
-def test_a_notice_becomes_one_message(server, tmp_path):
+def test_a_notice_is_sent_as_one_mail(server, tmp_path):
     said = MailMessenger(settings(tmp_path, server.server_address[1])).send(NOTICE)
     assert said == "mail sent to me@lab.example"
     assert "Subject: vibench: c: ended" in server.heard

@@ -31,7 +31,7 @@ def test_a_file_in_place_of_the_folder_is_refused_before_output(bench, tmp_path)
     assert not any(name == "start" for name, _, _ in bench.world.calls)
 
 
-def test_points_with_equal_excitation_are_checked_against_limits_once(bench, tmp_path, monkeypatch):
+def test_limits_are_checked_once_for_points_with_equal_excitation(bench, tmp_path, monkeypatch):
     checked = []
     monkeypatch.setattr(
         _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement)
@@ -42,7 +42,7 @@ def test_points_with_equal_excitation_are_checked_against_limits_once(bench, tmp
     assert [each.name for each in checked] == ["one", "louder"]
 
 
-def test_a_complete_recording_can_be_moved_at_once(bench, tmp_path, monkeypatch):
+def test_a_complete_recording_can_be_moved_during_the_campaign(bench, tmp_path, monkeypatch):
     def measured_and_moved(*arguments, **named):
         outcome = run_measurement(*arguments, **named)
         if outcome.path.name == "two.h5":
@@ -80,7 +80,7 @@ def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(ben
 
 
 @pytest.mark.thorough
-def test_resuming_keeps_complete_points_and_repeats_the_others(bench, tmp_path):
+def test_resuming_keeps_complete_points_and_records_the_remaining_points(bench, tmp_path):
     with pytest.raises(DataLost):
         run_campaign(bench, CAMPAIGN, tmp_path, on_progress=failing_once(bench, DataLost("a hole"), "two"))
     point_results = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)

@@ -70,7 +70,7 @@ def outcomes(point_results):
 ALL = [(f"dwell-{name}", PointOutcome.RECORDED) for name in PLACES]
 
 
-def test_each_recording_shows_its_mass_and_keeps_its_point(kept, tmp_path):
+def test_each_recording_contains_its_own_mass_and_scan_point(kept, tmp_path):
     world = kept._power._virtual.world
     world.keep_truth()
     velocities = {}
@@ -155,7 +155,7 @@ class Watched(CommandMessenger):
         return super().run(document, longest_s)
 
 
-def test_a_command_moves_the_beam_in_silence_and_may_refuse_a_point(kept, tmp_path):
+def test_the_move_command_runs_with_the_drive_off_and_may_refuse_a_point(kept, tmp_path):
     script, log = tmp_path / "move.py", tmp_path / "moves.jsonl"
     script.write_text(MOVER)
     command = Watched.of(shlex.join([sys.executable, str(script), str(log), "$HOME; no shell"]))
@@ -196,7 +196,7 @@ def test_a_command_moves_the_beam_in_silence_and_may_refuse_a_point(kept, tmp_pa
     assert len(log.read_text().splitlines()) == 1
 
 
-def test_without_a_command_a_real_rig_is_held_for_the_operator(coarse, tmp_path):
+def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
     """Another program serves the rig, so nothing here can move its beam."""
     asked, switch = [], StopSwitch()
     with VirtualRig(coarse) as virtual:

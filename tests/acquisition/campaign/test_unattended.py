@@ -108,14 +108,14 @@ class TestAnotherBench:
             run_campaign(bench, campaign("one", "two"), tmp_path, on_progress=fault)
         return tmp_path
 
-    def test_another_bench_is_refused_with_the_differences(self, begun, new_bench, rig):
+    def test_a_resume_on_a_changed_bench_is_refused_with_the_differences(self, begun, new_bench, rig):
         heavier = rig.model_copy(update={"shaker": rig.shaker.model_copy(update={"fixture_mass_kg": 0.2})})
         bench = new_bench(heavier)
         with pytest.raises(CheckFailed, match=r"rig\.shaker\.fixture_mass_kg was 0\.07 and is 0\.2"):
             run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
-    def test_an_accepted_bench_becomes_the_bench_of_the_campaign(self, begun, new_bench, rig):
+    def test_a_changed_bench_becomes_the_bench_of_the_campaign_once_accepted(self, begun, new_bench, rig):
         bench = new_bench(rig)
         bench.identities = {**bench.identities, "generator": other_serial(bench.identities["generator"])}
         point_results = run_campaign(
@@ -126,7 +126,7 @@ class TestAnotherBench:
 
 
 class TestFurtherMeasurements:
-    def test_further_measurements_come_next_and_are_requested_once(self, bench, tmp_path):
+    def test_follow_up_measurements_run_next_and_are_requested_once(self, bench, tmp_path):
         asked = []
 
         def after(finished, recording):
@@ -152,7 +152,7 @@ class TestFurtherMeasurements:
             ("two", ["one", "more", "two"], True),
         ]
 
-    def test_a_result_is_analysed_again_if_its_answer_was_not_stored(self, bench, tmp_path):
+    def test_a_resume_repeats_a_follow_up_analysis_that_was_not_stored(self, bench, tmp_path):
         def broken(finished, recording):
             raise ZeroDivisionError
 
@@ -186,7 +186,7 @@ class TestResuming:
         run_campaign(bench, campaign("one"), tmp_path, on_progress=second)
         assert states(tmp_path) == ["done"]
 
-    def test_a_stop_between_two_points_leaves_the_rest_queued(self, bench, tmp_path):
+    def test_a_stop_between_two_points_leaves_the_remaining_points_queued(self, bench, tmp_path):
         stop = StopSwitch()
         point_results = run_campaign(
             bench,
@@ -201,7 +201,7 @@ class TestResuming:
 
 
 class TestWatching:
-    def test_log_and_status_line_show_the_story(self, bench, tmp_path):
+    def test_log_and_status_line_show_the_events_of_a_campaign(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         of_points = ["point_begun", "point_done"]
         assert [line["event"] for line in log(tmp_path)] == ["begun", *of_points, *of_points, "ended"]
@@ -222,7 +222,7 @@ class TestWatching:
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
         assert json.loads(lines[1])["event"] == "begun"
 
-    def test_a_notification_command_gets_faults_and_the_end_and_may_fail(self, bench, tmp_path):
+    def test_a_notification_command_receives_faults_and_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (
