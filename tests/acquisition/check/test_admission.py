@@ -196,7 +196,7 @@ class TestKeeping:
         archive_path(rig.name).write_bytes(content.encode("latin-1"))
         assert last_check(rig.name) is None
 
-    def test_an_unwritable_folder_gives_one_sentence(self, rig, state_folder):
+    def test_an_unwritable_folder_gives_a_one_sentence_error(self, rig, state_folder):
         state_folder.write_text("a file in the way")
         with pytest.raises(RecordingError, match="VIBENCH_STATE_DIR"):
             kept_result(rig)

@@ -162,7 +162,7 @@ def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
-def test_a_wrong_load_setting_is_named(checked, rig, tmp_path):
+def test_a_wrong_load_setting_is_found_with_advice(checked, rig, tmp_path):
     # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
     report = checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
     assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
