@@ -90,7 +90,7 @@ def test_a_failing_import_of_a_plug_in_is_reported(tmp_path, monkeypatch):
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
-def test_an_exception_while_importing_a_plug_in_gives_one_sentence(tmp_path, monkeypatch):
+def test_an_exception_while_importing_a_plug_in_gives_a_one_sentence_error(tmp_path, monkeypatch):
     (tmp_path / "raises_at_once.py").write_text('raise RuntimeError("the firmware is too old")')
     offer(tmp_path, monkeypatch, "broken", "raises_at_once:Driver")
     said = r"raises_at_once:Driver, which cannot be loaded \(RuntimeError: the firmware is too old\)"
@@ -193,7 +193,7 @@ def test_a_wrong_contract_command_gives_one_message(tmp_path, options, sentence)
     assert "no tests ran" in done.stdout
 
 
-def test_contract_options_may_have_the_names_of_project_options(tmp_path):
+def test_contract_options_do_not_clash_with_options_of_a_project(tmp_path):
     (tmp_path / "conftest.py").write_text(
         "def pytest_addoption(parser):\n"
         "    for name in ('--bench', '--instrument', '--rig'):\n"
@@ -213,7 +213,7 @@ OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcar
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", OUR_INSTRUMENTS)
-def test_own_instruments_keep_the_contract(name):
+def test_the_built_in_drivers_pass_the_contract_tests(name):
     done = contract(name)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout
