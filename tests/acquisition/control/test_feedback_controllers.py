@@ -227,7 +227,7 @@ def test_an_unsettled_motion_gives_no_resonance(
     assert (found["motion"], found["lock"], found["frequency_hz"]) == ("unsettled", "not met", None)
 
 
-def test_without_a_level_the_planned_setting_is_played_throughout(new_control_bench):
+def test_a_plan_without_a_level_plays_its_setting_throughout(new_control_bench):
     bench = new_control_bench()
     plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)
     bench.carry_out(Measurement(name="open", excitation=plan, ramp_s=0.2))

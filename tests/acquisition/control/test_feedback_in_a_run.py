@@ -67,7 +67,7 @@ def test_a_feedback_run_is_not_longer_than_its_header_states(bench, tmp_path):
 
 @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
 @pytest.mark.parametrize("cause", [Cause.OPERATOR, Cause.EMERGENCY])
-def test_a_stop_in_any_state_silences_it(bench, tmp_path, state, cause):
+def test_a_stop_in_any_state_silences_a_feedback_run(bench, tmp_path, state, cause):
     run = run_of(bench, tmp_path)
     for progress in run:
         if progress.state is state:
@@ -77,7 +77,7 @@ def test_a_stop_in_any_state_silences_it(bench, tmp_path, state, cause):
     assert bench.recorder.ending == (RecordingState.STOPPED, "enough")
 
 
-def test_a_hold_during_settling_keeps_the_output(bench, tmp_path):
+def test_a_hold_during_settling_does_not_change_the_level(bench, tmp_path):
     run = run_of(bench, tmp_path)
     held = 0
     for progress in run:

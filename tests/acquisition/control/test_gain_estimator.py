@@ -35,7 +35,7 @@ def test_a_steady_trend_of_the_gain_is_extrapolated():
     np.testing.assert_allclose(achieved[5:], 1.0, atol=1e-9)
 
 
-def test_random_errors_are_averaged():
+def test_random_errors_of_the_gain_are_averaged():
     achieved, _ = tracked(lambda time_s: 1.0, steps=600, noise=0.05)
     # Six answers in the memory, 5 % in phase with the level: 2 %, seldom more when a line is drawn.
     assert np.std(achieved[10:]) < 0.035

@@ -52,7 +52,7 @@ def test_a_narrow_enough_bracket_needs_no_measurement():
 
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
-def test_branches_are_separated_at_half_the_factor_in_decibels(response, expected):
+def test_points_lie_on_one_branch_within_half_the_factor_in_decibels(response, expected):
     assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 
@@ -60,7 +60,7 @@ def test_branches_are_separated_at_half_the_factor_in_decibels(response, expecte
     ("response", "expected"),
     [(3.6, JumpSide.BEFORE), (4.1, JumpSide.BEFORE), (5.0, JumpSide.AFTER), (1.6, JumpSide.AFTER)],
 )
-def test_a_third_branch_lies_after_the_jump(response, expected):
+def test_a_response_on_a_third_branch_counts_as_after_the_jump(response, expected):
     assert side(SettledPoint(177, response), SettledPoint(175, 3.6), SettledPoint(180, 5.4)) is expected
 
 

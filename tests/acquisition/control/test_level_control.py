@@ -28,7 +28,7 @@ def test_level_control_never_exceeds_the_planned_setting():
     assert CONTROL.next_vpp(2.1e-3, MeasuredLevel(100.0, 0.0), 10.0) == 2e-3
 
 
-def test_an_insignificant_level_error_changes_nothing():
+def test_an_insignificant_level_error_does_not_change_the_setting():
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.3), 10.0) == 1.0
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.1), 10.0) > 1.0
 
@@ -46,6 +46,6 @@ def test_the_level_uncertainty_matches_repetitions_with_correlated_periods():
     assert np.sqrt(np.mean(np.square(stated))) == pytest.approx(np.std(means), rel=0.2)
 
 
-def test_too_few_periods_give_no_level():
+def test_the_level_of_too_few_periods_is_fully_uncertain():
     few = measured_level(np.full(10, 3.0 + 0j))
     assert few.uncertainty == few.amplitude == 3.0

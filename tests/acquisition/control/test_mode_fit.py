@@ -43,11 +43,11 @@ def test_the_stated_mode_uncertainty_matches_repetitions(natural_hz, damping):
     assert stated == pytest.approx(spread, rel=0.25)
 
 
-def test_four_points_are_too_few():
+def test_four_points_are_too_few_for_a_mode_fit():
     assert fit_mode(*points(*MODES[1], count=4)) is None
 
 
-def test_scattered_points_give_no_undamped_mode():
+def test_a_fit_to_scattered_points_never_gives_a_mode_without_damping():
     """A vibrometer without light led to "natural frequency 476.54 +- 0.12 Hz, damping ratio -1e-06"."""
     random = np.random.default_rng(3)
     frequency_hz, answers = points(*MODES[1])

@@ -64,7 +64,7 @@ def random_spectrum(seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("spectrum", [corners((40, 0.01)), random_spectrum(3), random_spectrum(8)])
-def test_the_base_has_the_spectrum_that_was_requested(recorded, spectrum):
+def test_the_base_reaches_the_requested_spectrum(recorded, spectrum):
     with recorded(noise(spectrum=spectrum)) as recording:
         frequency_hz, density = densities(recording, "base_acceleration")
         off_db = 10 * np.log10(density / density_at(spectrum, frequency_hz))
@@ -106,7 +106,7 @@ def test_an_unreachable_spectrum_ends_with_a_ramp_down(recorded):
         recorded(noise(amplitude_vpp=0.1))
 
 
-def test_a_density_above_its_abort_line_ramps_the_run_down(recorded):
+def test_a_density_above_its_abort_limit_ramps_down_the_run(recorded):
     # No equalisation below the spectrum, and a limit of m0 far below what the first realisation makes.
     limits = corners((40, 1e-10))
     with pytest.raises(LimitExceeded, match=r"velocity of m0 has .* dB above 1e-10; abort_db = 6"):

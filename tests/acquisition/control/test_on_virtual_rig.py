@@ -271,7 +271,7 @@ def test_a_superharmonic_resonance_matches_harmonic_balance(carried_out):
 @pytest.mark.parametrize(
     ("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), pytest.param((30e-6, 60e-6), 90, marks=pytest.mark.slow)]
 )
-def test_the_phase_of_a_second_superharmonic_depends_on_the_nearer_bumper(carried_out, gap_m, phase_deg):
+def test_the_second_superharmonic_is_tracked_with_either_bumper_nearer(carried_out, gap_m, phase_deg):
     """Beside harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
     plan = other_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
     found = said(carried_out(plan, **bumpers(*gap_m)), "resonance")
@@ -293,7 +293,7 @@ def test_the_phase_of_a_second_superharmonic_depends_on_the_nearer_bumper(carrie
         pytest.param((30e-6, 60e-6), 90, 193.175, 2.075e-6, marks=pytest.mark.slow),
     ],
 )
-def test_a_subharmonic_resonance_is_found_by_twice_its_phase(
+def test_a_subharmonic_resonance_is_found_by_twice_the_phase_of_m0(
     carried_out, gap_m, phase_deg, model_hz, model_m
 ):
     """Beside harmonic balance (`benchmarks/backbones.py --subharmonic 2 --spring bumpers`), at 23.64 m/s2."""

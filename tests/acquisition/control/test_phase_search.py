@@ -34,7 +34,7 @@ def searched(natural_hz, damping, start_hz, noise_deg=0.0, seed=0):
 
 @settings(max_examples=60)
 @given(damping=st.floats(0.004, 0.05), start=st.floats(0.93, 1.07))
-def test_the_search_locks_on_from_both_sides_of_sharp_and_broad_modes(damping, start):
+def test_the_search_locks_onto_sharp_and_broad_modes_from_both_sides(damping, start):
     search = searched(266.0, damping, 266.0 * start)
     assert abs(search.tries[-1].error_deg) < 1
     found = search.resonance(0.0)
@@ -49,7 +49,7 @@ def test_the_stated_frequency_uncertainty_covers_noise():
     assert np.mean(np.abs(away) <= 2 * stated) > 0.9
 
 
-def test_the_sensors_phase_widens_the_uncertainty_by_the_slope():
+def test_the_phase_error_of_the_sensors_widens_the_frequency_uncertainty():
     search = searched(266.0, 0.0167, 262.0)
     slope = 2 / (2 * 0.0167 * 266.0) * 180 / np.pi
     assert search.resonance(0.3).uncertainty_hz == pytest.approx(0.3 / slope, rel=0.15)

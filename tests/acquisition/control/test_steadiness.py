@@ -67,7 +67,7 @@ def chaos(count, seed):
     return value - value.mean()
 
 
-def test_stationary_chaos_is_aperiodic_in_95_percent():
+def test_stationary_chaos_is_called_aperiodic_in_95_percent_of_runs():
     verdicts = [
         judgement_of(points(400, (1, 0.4 * chaos(400, seed))), RULE).steadiness for seed in range(100)
     ]
@@ -96,7 +96,7 @@ def test_channel_noise_is_not_reported_as_chaos():
     assert found.noise == pytest.approx(0.05, rel=0.01)
 
 
-def test_the_uncertainty_of_scatter_matches_repetitions():
+def test_the_uncertainty_of_the_scatter_covers_repeated_measurements():
     found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)
@@ -111,7 +111,7 @@ def test_too_few_periods_are_unsettled():
 @pytest.mark.parametrize(
     ("drives", "share", "period"), [(2, 0.1, 2), (3, 0.002, 3), (2, 0.0, 1), (3, 0.0, 1)]
 )
-def test_periods_are_counted_in_drive_periods(drives, share, period):
+def test_the_period_of_a_motion_is_counted_in_drive_periods(drives, share, period):
     """Orders that are not multiples of the drive's tell whether the motion is as long as it was looked at."""
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
@@ -120,7 +120,7 @@ def test_periods_are_counted_in_drive_periods(drives, share, period):
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
-def test_a_single_wandering_order_is_aperiodic(kept):
+def test_a_motion_with_one_wandering_order_is_aperiodic(kept):
     """It keeps its statistics and does not repeat, by itself too."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))

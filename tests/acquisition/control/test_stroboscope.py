@@ -35,17 +35,17 @@ def test_a_delayed_sine_has_a_negative_phase():
     np.testing.assert_allclose(periods.base[FIRST_BLOCK:], 2 * np.exp(-0.5j), atol=2e-4)
 
 
-def test_no_period_is_lost_or_seen_twice_between_blocks():
+def test_no_period_is_lost_or_repeated_between_blocks():
     periods = looked_at(np.sin).periods()
     assert periods.count == int(12 * 0.2 * NEAR_HZ)
 
 
-def test_harmonics_and_mean_appear_in_their_orders():
+def test_harmonics_and_mean_are_measured_in_their_orders():
     periods = looked_at(lambda a: 0.7 + np.sin(a) + 0.3 * np.sin(2 * a) + 0.1 * np.cos(4 * a)).periods()
     np.testing.assert_allclose(np.abs(periods.response.mean(axis=0)), [0.7, 1, 0.3, 0, 0.1], atol=1e-4)
 
 
-def test_a_subharmonic_makes_periods_alternate():
+def test_a_subharmonic_alternates_from_one_drive_period_to_the_next():
     motion = looked_at(lambda a: np.sin(a) + 0.1 * np.sin(a / 2))
     response = motion.periods().response[FIRST_BLOCK:]
     np.testing.assert_allclose(response[2:], response[:-2], atol=2e-4)
@@ -54,7 +54,7 @@ def test_a_subharmonic_makes_periods_alternate():
 
 
 @pytest.mark.parametrize("drives", [2, 3])
-def test_a_motion_over_several_drive_periods_has_one_row(drives):
+def test_a_motion_over_several_drive_periods_gives_one_row_per_repetition(drives):
     motion = looked_at(lambda a: np.sin(a - 1) + 0.1 * np.sin(a / drives), drives=drives)
     periods = motion.periods()
     assert periods.count == int(12 * 0.2 * NEAR_HZ / drives)
@@ -66,7 +66,7 @@ def test_a_motion_over_several_drive_periods_has_one_row(drives):
     np.testing.assert_allclose(turned, 1.0, atol=0.01)
 
 
-def test_noise_in_silence_equals_noise_per_period():
+def test_the_noise_per_period_is_measured_with_the_drive_off():
     noise = 1e-3 * np.random.default_rng(1).standard_normal(20_000)
     per_period = RATE_HZ / NEAR_HZ
     # Each order above the mean: variance 4 s^2 / n of a complex amplitude; the mean: s^2 / n.
