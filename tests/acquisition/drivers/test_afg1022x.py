@@ -65,7 +65,7 @@ class TestOpening:
         plugged.instrument.execute(b"NONSENSE")
         AFG1022X.open(plugged.config).close()
 
-    def test_nothing_on_the_bus_is_a_lost_instrument(self, bus):
+    def test_an_instrument_missing_from_the_bus_is_reported_as_lost(self, bus):
         config = bus.plug_in().config.model_copy(update={"resource": "USB0::0x0699::0x0353::NOBODY::INSTR"})
         with pytest.raises(InstrumentLost, match=r"NOBODY.*power and cable"):
             AFG1022X.open(config)
@@ -82,7 +82,7 @@ class TestOpening:
 
 
 class TestLoad:
-    def test_high_impedance_is_set_and_its_ohm_sign_read(self, plugged, generator):
+    def test_high_impedance_is_set_and_its_reply_with_an_ohm_sign_is_read(self, plugged, generator):
         assert math.isinf(plugged.instrument.settings(1).declared_load_ohm)
         assert generator.unconfirmed == ()
 
@@ -104,7 +104,7 @@ class TestLoad:
         assert generator.unconfirmed == ()
         generator.close()
 
-    def test_fifty_ohm_halve_the_range_of_amplitudes(self, bus):
+    def test_a_load_of_50_ohm_halves_the_amplitude_range(self, bus):
         config = bus.plug_in().config.model_copy(update={"load_ohm": 50.0, "amplitude_limit_vpp": 20.0})
         generator = AFG1022X.open(config)
         assert generator.amplitude_range_vpp == (1e-3, 10.0)
@@ -119,7 +119,7 @@ class TestPlaying:
         assert (generator.frequency_hz, generator.panel_vpp) == (266.2, 1.5)
         assert not plugged.is_on
 
-    def test_the_dialogue_follows_the_manual(self, plugged, generator):
+    def test_the_commands_follow_the_manual(self, plugged, generator):
         generator.load_sine(260.0, 1.5)
         generator.start()
         assert plugged.log.commands() == [
@@ -139,7 +139,7 @@ class TestPlaying:
         playing.stop()
         assert not plugged.is_on
 
-    def test_frequency_and_amplitude_change_while_it_plays(self, plugged, playing):
+    def test_frequency_and_amplitude_can_change_during_output(self, plugged, playing):
         playing.set_frequency(260.1)
         playing.set_amplitude(0.2)
         state = plugged.instrument.settings(1)
@@ -147,7 +147,7 @@ class TestPlaying:
         assert (state.frequency_hz, state.amplitude_vpp) == (260.1, 0.2)
 
     @pytest.mark.parametrize("points", [2, 3, 1024, 8191, 8192])
-    def test_the_memory_holds_what_was_requested(self, plugged, generator, points):
+    def test_the_waveform_memory_holds_the_requested_values(self, plugged, generator, points):
         values = np.cos(2 * np.pi * np.arange(points) / points)
         generator.load_waveform(values, 2.0, 0.5)
         held = plugged.instrument.memory.codes("EMEM")
@@ -214,7 +214,7 @@ class TestPlaying:
         generator.end_burst()
         assert plugged.instrument.settings(1).mode.value == "CW"
 
-    def test_the_second_channel_plays_and_has_no_bursts(self, plugged):
+    def test_the_second_channel_plays_sines_and_refuses_bursts(self, plugged):
         config = plugged.config.model_copy(update={"channel": 2})
         generator = AFG1022X.open(config)
         generator.load_sine(123.0, 0.5)
@@ -324,7 +324,7 @@ class TestFaults:
             playing.stop()
 
     @pytest.mark.parametrize("act", [lambda generator: generator.set_amplitude(0.2), AFG1022X.close])
-    def test_a_lost_instrument_raises_and_a_later_stop_works(self, plugged, playing, act):
+    def test_a_lost_instrument_raises_an_error_and_can_be_stopped_later(self, plugged, playing, act):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost):
             act(playing)

@@ -41,7 +41,7 @@ def test_the_remaining_dc_is_below_half_a_step(values):
     assert abs(achieved(made).mean()) <= half_a_step(made) * (1 + 1e-9)
 
 
-def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
+def test_a_full_range_sine_keeps_its_amplitude_on_the_panel():
     made = AFG1022_MODEL.codes(np.sin(2 * np.pi * np.arange(4096) / 4096))
     assert made.panel_factor == pytest.approx(1.0, abs=1e-12)
     assert (made.codes.min(), made.codes.max()) == (0, AFG1022_MODEL.top_code)

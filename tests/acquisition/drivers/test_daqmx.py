@@ -145,7 +145,7 @@ class TestReading:
 
 class TestStates:
     @pytest.mark.parametrize("samples", [0, -1])
-    def test_no_samples_are_an_error(self, digitizer, samples):
+    def test_reading_no_samples_is_an_error(self, digitizer, samples):
         digitizer.start()
         with pytest.raises(InstrumentError, match=r"1 or more"):
             digitizer.read(samples)
@@ -204,7 +204,7 @@ class TestConfiguration:
 
 
 class TestFaults:
-    def test_a_device_that_another_task_holds_is_busy(self, rig, digitizer):
+    def test_a_device_reserved_by_another_task_is_reported_as_busy(self, rig, digitizer):
         with pytest.raises(InstrumentBusy, match=r"another program, or a task that was never closed"):
             DaqmxDigitizer.open(rig)
 
@@ -242,7 +242,7 @@ class TestFaults:
         virtual.faults.heal()
         DaqmxDigitizer.open(rig).close()
 
-    def test_a_server_that_dies_is_lost_and_closing_is_still_possible(self, configured, opened):
+    def test_a_dead_daq_server_is_reported_as_lost_and_closing_still_works(self, configured, opened):
         dying = configured.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::DAQ2::INSTR"})
         with VirtualRig(configured.model_copy(update={"generator": dying})) as virtual:
             digitizer = opened(with_daq(configured, server=virtual.daq_address))
@@ -280,7 +280,7 @@ class TestErrors:
 
 class TestScaling:
     @given(step_v=st.floats(1e-8, 1e-3))
-    def test_a_straight_scaling_through_zero_has_a_step(self, step_v):
+    def test_a_linear_scaling_through_zero_has_a_converter_step(self, step_v):
         assert linear_step_v((0.0, step_v), 5.0) == step_v
 
     @pytest.mark.parametrize(
@@ -290,7 +290,7 @@ class TestScaling:
             *((0.0, 6e-7, 1e-13), (0.0, 6e-7, 0.0, 1e-20)),
         ],
     )
-    def test_a_shifted_or_nonlinear_scaling_has_no_step(self, coefficients):
+    def test_a_shifted_or_nonlinear_scaling_has_no_converter_step(self, coefficients):
         assert linear_step_v(coefficients, 5.0) is None
 
 

@@ -155,19 +155,19 @@ def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
         np.testing.assert_allclose(heard[delay + 256 :], expected[256:], atol=0.03 * amplitude_v)
 
 
-def test_opening_sets_an_output_to_zero_that_another_program_left_high(digitizer, virtual):
+def test_opening_zeroes_an_output_that_another_program_left_high(digitizer, virtual):
     virtual.world.play("Dev1/ao0", np.full(51_200, 1.0), 51_200.0)
     digitizer.start()
     opened_output(digitizer).close()
     assert np.max(np.abs(digitizer.read(2560).volts[0][-640:])) < NOISE_V
 
 
-def test_a_held_output_is_busy_for_a_second_program(digitizer, output):
+def test_an_output_in_use_is_reported_as_busy_to_a_second_program(digitizer, output):
     with pytest.raises(InstrumentBusy, match=r"Dev1/ao0"):
         opened_output(digitizer)
 
 
-def test_a_rate_that_the_output_coerces_is_refused_and_nothing_stays_reserved(digitizer):
+def test_a_rate_that_the_output_would_change_is_refused_and_frees_the_output(digitizer):
     # The USB-6211 divides 20 MHz: it has no 12 345.6 Hz.
     with pytest.raises(SettingRefused, match=r"daq\.output\.sample_rate_hz"):
         DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_345.6}), digitizer)

@@ -39,7 +39,7 @@ def playing(rig, original):
     return rig_of
 
 
-def test_the_same_plan_records_it_again_sample_for_sample(playing, original, tmp_path):
+def test_playing_back_a_recording_reproduces_every_sample(playing, original, tmp_path):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         again = run_measurement(bench, PLAN, tmp_path / "again.h5").path
     with open_recording(original) as first, open_recording(again) as second:
@@ -58,7 +58,7 @@ def test_the_same_plan_records_it_again_sample_for_sample(playing, original, tmp
             )
 
 
-def test_the_end_of_the_recording_is_reported(playing, original):
+def test_the_end_of_the_played_recording_is_reported(playing, original):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         with open_recording(original) as recording:
             samples = recording.samples
@@ -91,7 +91,7 @@ def test_an_altered_recording_is_not_played_back(playing, original, change):
         open_bench(playing(), calibration=CalibrationRule.WAIVED)
 
 
-def test_a_recording_under_another_plan_is_refused(playing, tmp_path):
+def test_playback_under_another_plan_is_refused(playing, tmp_path):
     other = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"frequency_hz": 255.0})})
     with (
         open_bench(playing()) as bench,
@@ -100,7 +100,7 @@ def test_a_recording_under_another_plan_is_refused(playing, tmp_path):
         run_measurement(bench, other, tmp_path / "again.h5")
 
 
-def test_a_recording_of_another_scale_is_refused(playing, rig):
+def test_playback_with_another_sensor_scale_is_refused(playing, rig):
     other = rig.vibrometer.model_copy(update={"range_mm_per_s_per_v": 500.0})
     with pytest.raises(ConfigurationError, match="units of m0_velocity per volt"):
         open_bench(playing().model_copy(update={"vibrometer": other}))

@@ -164,7 +164,7 @@ def test_an_overload_of_an_unknown_channel_is_an_error():
     assert len(str(refused.value)) < LONGEST_SENTENCE
 
 
-def test_a_non_numeric_scale_gives_no_step():
+def test_a_non_numeric_scale_gives_no_converter_step():
     assert linear_step_v([0.0, 1e-6, 0.0], 5.0) == 1e-6
     assert linear_step_v([0.0, 1e-6, float("nan")], 5.0) is None
     assert linear_step_v([float("nan"), 1e-6], 5.0) is None

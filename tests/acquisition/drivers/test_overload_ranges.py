@@ -16,7 +16,7 @@ def test_a_block_within_range_has_no_overload():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_range_names_first_and_last_sample_of_the_run_inclusive(sign):
+def test_an_overload_range_includes_its_first_and_last_sample(sign):
     row = np.zeros(1000)
     row[10:20] = sign * 0.95
     assert ranges(row, first_sample=5000) == (Overload("m0_velocity", 5010, 5019),)

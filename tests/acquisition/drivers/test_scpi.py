@@ -85,7 +85,7 @@ def test_an_endless_error_queue_raises_an_error():
         port(instrument).command("FREQ 1")
 
 
-def test_an_empty_first_answer_is_requested_again():
+def test_an_empty_first_answer_repeats_the_query():
     instrument = Instrument(IDN=[b"\n", b"TEKTRONIX,AFG1022\n"])
     instrument.answers["*IDN?"] = instrument.answers.pop("IDN")
     assert port(instrument).query_patiently("*IDN?") == "TEKTRONIX,AFG1022"
@@ -116,7 +116,7 @@ def test_a_timeout_is_an_error_that_states_how_long_was_waited():
 
 @pytest.mark.parametrize("death", [LOST, ValueError("[Errno 19] No such device"), OSError(errno.EIO, "I/O")])
 @pytest.mark.parametrize("act", ["command", "query", "query_codes"])
-def test_every_message_about_a_lost_device_is_recognised(death, act):
+def test_every_error_of_a_lost_device_is_recognised(death, act):
     instrument = Instrument()
     instrument.answers["FREQ?"] = [b"1\n"]
     instrument.dies_with = death
@@ -145,7 +145,7 @@ def test_a_query_after_a_timeout_gets_its_own_answer():
     assert ours.query("FREQ?") == "1000"
 
 
-def test_codes_go_out_big_endian_in_a_block_of_known_length():
+def test_codes_are_sent_big_endian_in_a_block_with_its_length():
     instrument = Instrument()
     port(instrument).command("DATA:DATA EMEM,", np.array([0, 10, 16383], dtype=np.uint16))
     assert instrument.written[0] == b"DATA:DATA EMEM,#16\x00\x00\x00\x0a\x3f\xff\n"
@@ -160,14 +160,14 @@ def test_codes_with_newline_bytes_are_read():
 @pytest.mark.parametrize(
     "reply", [b"\n", b"123\n", b"#\n", b"#0\n", b"#2x4\x00\x01\n", b"#16\x00\x01\n", b"#13\x00\x01\x02\n"]
 )
-def test_a_broken_block_is_an_error(reply):
+def test_a_malformed_block_is_an_error(reply):
     instrument = Instrument()
     instrument.answers["DATA?"] = [reply]
     with pytest.raises(InstrumentError, match=r"block|announced"):
         port(instrument).query_codes("DATA?")
 
 
-def test_the_required_pause_follows_commands_only():
+def test_the_required_pause_follows_the_command_and_not_its_error_query():
     pauses = []
     instrument = Instrument()
     port(instrument, settle_s=0.1, pause=pauses.append).command("FREQ 1")

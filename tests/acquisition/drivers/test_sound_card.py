@@ -55,7 +55,7 @@ def opened(card_rig, audio):
 
 
 @pytest.mark.thorough
-def test_the_bench_passes_its_check(opened, tmp_path):
+def test_a_bench_with_a_sound_card_passes_its_check(opened, tmp_path):
     report = bench_report(opened(), tmp_path)
     assert [each.name for each in report.findings if each.verdict is Verdict.FAIL] == []
     assert report["drive over setting"].number == pytest.approx(1.0, abs=0.02)
@@ -98,7 +98,7 @@ def test_noise_that_needs_a_generator_is_refused_before_anything_plays(opened, t
 
 
 @pytest.mark.parametrize("missing", ["calibrated", "input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
-def test_without_a_calibration_nothing_opens(card_rig, audio, missing):
+def test_a_sound_card_without_a_calibration_is_not_opened(card_rig, audio, missing):
     rig = card_rig(**{missing: None}).model_copy(update={"virtual": None})
     with pytest.raises(ConfigurationError, match=rf"daq\.options lacks {missing}"):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
@@ -164,7 +164,7 @@ def test_a_missing_output_of_a_card_is_reported(card_rig, audio):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_unread_samples_are_kept_for_the_buffer_time_only(card_rig, audio):
+def test_unread_samples_of_a_sound_card_are_kept_for_the_buffer_time_only(card_rig, audio):
     rig = card_rig()
     card = _Card(rig, (0, 1, 2, 3), 0)
     heard, fine = np.zeros((4800, 4), dtype=np.float32), SimpleNamespace(input_overflow=False)
