@@ -56,12 +56,12 @@ def attending(process):
 
 
 @pytest.mark.parametrize(("granted_s", "hung_s"), [(0.5, 2.0), (2.0, 8.0), (4.0, 10.0), (10.0, 10.0)])
-def test_a_hanging_window_gets_at_most_the_longest_patience(granted_s, hung_s):
+def test_a_blocked_window_gets_at_most_the_longest_allowed_timeout(granted_s, hung_s):
     assert hung_patience_s(granted_s) == hung_s
 
 
 @pytest.mark.thorough
-def test_an_attendant_keeps_a_run_alive_and_reports_a_hanging_program(engine, shipped_rig, tmp_path):
+def test_the_keep_alive_process_reports_a_blocked_window_and_ends_its_run(engine, shipped_rig, tmp_path):
     process = engine()
     with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
         Event().wait(2.0)
@@ -75,7 +75,7 @@ def test_an_attendant_keeps_a_run_alive_and_reports_a_hanging_program(engine, sh
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped program hangs")
-def test_an_attendant_is_silent_for_a_stopped_program(engine, shipped_rig, tmp_path):
+def test_the_keep_alive_process_sends_nothing_for_a_suspended_window(engine, shipped_rig, tmp_path):
     process = engine()
     with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
         os.kill(program.pid, signal.SIGSTOP)
@@ -85,7 +85,7 @@ def test_an_attendant_is_silent_for_a_stopped_program(engine, shipped_rig, tmp_p
 
 
 @pytest.mark.thorough
-def test_an_attendant_ends_when_its_program_is_killed(engine, shipped_rig, tmp_path):
+def test_the_keep_alive_process_ends_when_its_program_is_killed(engine, shipped_rig, tmp_path):
     process = engine()
     with attending(process) as (program, pid), running(process, shipped_rig, tmp_path) as visitor:
         program.kill()
@@ -100,7 +100,7 @@ def test_an_attendant_ends_when_its_program_is_killed(engine, shipped_rig, tmp_p
 
 
 @pytest.mark.thorough
-def test_a_killed_attendant_is_replaced(engine):
+def test_a_killed_keep_alive_process_is_replaced(engine):
     attendant, clock = Attendant(engine().address), Event()
     first = attendant.pid
     os.kill(first, signal.SIGTERM)

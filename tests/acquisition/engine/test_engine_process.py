@@ -133,7 +133,7 @@ class TestTheJob:
             assert before <= marks[0].sample <= recording.samples
 
     @pytest.mark.thorough
-    def test_a_held_run_continues(self, client, shipped_rig, tmp_path):
+    def test_a_held_run_continues_after_resume(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         client.stop(StopLevel.HOLD)
         until_state(client, EngineState.HELD)
@@ -200,7 +200,7 @@ class TestRefusals:
             client.arm(plan, tmp_path)
         assert client.status().state is EngineState.READY
 
-    def test_nothing_is_overwritten(self, client, shipped_rig, tmp_path):
+    def test_arming_refuses_to_overwrite_an_existing_file(self, client, shipped_rig, tmp_path):
         (tmp_path / "run.h5").write_bytes(b"precious")
         opened(client, shipped_rig)
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
@@ -284,7 +284,7 @@ class TestNobodyLooks:
         assert "unattended" in told.next_step
 
     @pytest.mark.thorough
-    def test_a_drive_far_from_its_limits_gets_the_granted_patience(self, client, shipped_rig, tmp_path):
+    def test_a_drive_far_from_its_limits_gets_the_requested_timeout(self, client, shipped_rig, tmp_path):
         """And one at its limits half a second, whatever was granted."""
         opened(client, shipped_rig)
         quiet, loud = campaign("run"), campaign("run").model_dump()
@@ -320,7 +320,7 @@ class TestNobodyLooks:
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
     @pytest.mark.thorough
-    def test_a_frozen_engine_does_not_report_its_viewer_as_missing(
+    def test_a_frozen_engine_does_not_stop_its_run_for_a_missing_viewer(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         before = running(client, shipped_rig, tmp_path).samples
@@ -341,7 +341,7 @@ class TestNobodyLooks:
             until(client, lambda status: status.samples > before + 500_000)
 
     @pytest.mark.thorough
-    def test_an_unattended_run_continues_alone(self, engine, shipped_rig, tmp_path):
+    def test_an_unattended_run_completes_without_requests(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
         opened(client, shipped_rig)
@@ -409,7 +409,7 @@ class TestItsEnd:
         assert not process.is_alive
 
     @pytest.mark.thorough
-    def test_leaving_a_started_engine_ends_its_run(self, shipped_rig, tmp_path):
+    def test_leaving_the_context_of_an_engine_ends_its_run(self, shipped_rig, tmp_path):
         with start_engine() as process:
             running(process.client, shipped_rig, tmp_path)
         assert not process.is_alive

@@ -36,7 +36,7 @@ def published(tmp_path):
     return published
 
 
-def test_a_repeated_attempt_is_a_new_run(published, tmp_path):
+def test_a_second_attempt_is_published_as_a_new_run(published, tmp_path):
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
     first = published.status()
@@ -50,7 +50,7 @@ def test_a_repeated_attempt_is_a_new_run(published, tmp_path):
     )
 
 
-def test_the_version_of_the_rows_changes_only_with_a_row(published, tmp_path):
+def test_the_row_version_changes_only_when_a_row_changes(published, tmp_path):
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     running = published.status().rows_number
     published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
@@ -62,7 +62,7 @@ def test_the_version_of_the_rows_changes_only_with_a_row(published, tmp_path):
     assert [row.state for row in published.status().rows] == ["recorded"]
 
 
-def test_a_vanished_folder_does_not_end_the_run_by_itself(published, tmp_path):
+def test_a_missing_folder_is_published_as_no_free_disk_space(published, tmp_path):
     gone = tmp_path / "gone"
     published.begin(campaign("point"), gone)
     published.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
@@ -70,7 +70,7 @@ def test_a_vanished_folder_does_not_end_the_run_by_itself(published, tmp_path):
     assert published.status().disk_free_bytes == 0
 
 
-def test_points_of_an_earlier_run_count_as_done(published, tmp_path):
+def test_elapsed_time_includes_points_kept_from_an_earlier_run(published, tmp_path):
     twice = campaign("made", "point")
     published.begin(twice, tmp_path)
     published.note_result(

@@ -172,7 +172,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
                     break
             assert GREETING_S * 0.9 < time.monotonic() - began_s < GREETING_S * 1.5
 
-    def test_too_many_viewers_disconnect_the_least_active_one(self, process):
+    def test_the_least_active_viewer_is_disconnected_when_there_are_too_many(self, process):
         with ExitStack() as viewers:
             attached = [
                 viewers.enter_context(EngineClient.attach(process.address)) for _ in range(VIEWERS_MOST + 3)

@@ -20,14 +20,14 @@ def measured(*options, name="time_to_silence.py"):
 
 
 @pytest.mark.thorough
-def test_two_cells_of_the_safety_table_meet_their_times_to_silence():
+def test_two_cases_of_the_safety_table_meet_their_times_to_silence():
     told = measured("--cells", "0.007", "--seed", "7")
     assert told.returncode == 0, told.stdout + told.stderr
     assert told.stdout.count(" s\n") == 2
 
 
 @pytest.mark.thorough
-def test_stops_and_kills_end_silent_and_are_measured_once(tmp_path):
+def test_stops_and_kills_end_in_silence_and_saved_cases_are_not_repeated(tmp_path):
     stops, kills = tmp_path / "stops.jsonl", tmp_path / "kills.jsonl"
     for options in (["--save", stops, "--seed", "3"], ["--save", kills, "--dead-man"]):
         told = measured(*map(str, options), "--count", "2", name="stops_from_outside.py")
@@ -39,7 +39,7 @@ def test_stops_and_kills_end_silent_and_are_measured_once(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_a_quarter_of_the_safety_table_meets_its_times_to_silence():
+def test_a_quarter_of_the_safety_table_meets_the_times_to_silence():
     told = measured("--cells", "0.25", "--seed", "8")
     assert told.returncode == 0, told.stdout + told.stderr
 

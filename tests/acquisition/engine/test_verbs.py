@@ -37,7 +37,7 @@ def handler() -> RequestHandler:
     return RequestHandler(engine, JobQueue(engine))
 
 
-def test_protocol_words_are_unchanged():
+def test_the_request_names_of_the_protocol_are_unchanged():
     assert set(VERBS) == WORDS
 
 
@@ -54,7 +54,7 @@ def test_handler_and_client_have_the_parameters_of_the_request(verb):
 
 
 @pytest.mark.parametrize("word", sorted(RESTRICTED - {"open", "close"}))
-def test_a_state_that_does_not_permit_a_verb_refuses_it(handler, word):
+def test_a_request_that_the_state_does_not_permit_is_refused(handler, word):
     verb = VERBS[word]
     assert EngineState.CLOSED not in verb.states
     arguments = dict.fromkeys(name for name in verb.request.model_fields if name != "ask")
@@ -114,7 +114,7 @@ def looked_after_until(handler, is_over):
 
 
 @pytest.mark.thorough
-def test_an_armed_run_has_time_to_be_started(shipped_rig, tmp_path):
+def test_an_armed_run_stays_armed_long_enough_to_be_started(shipped_rig, tmp_path):
     """What was armed before the attendant's first beat was taken back at once, and nobody said why."""
     engine = Engine(Supervision.ATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
@@ -193,7 +193,7 @@ def test_an_invalid_request_changes_nothing_and_names_the_error(handler, request
     assert "nothing was done" in answer["refused"]
 
 
-def test_an_unknown_word_is_refused_before_sending():
+def test_an_unknown_stop_level_is_refused_before_sending():
     with pytest.raises(ConfigurationError, match=r"a request to stop: level .*'ramp'"):
         VERBS["stop"].message(level="gently")
 
