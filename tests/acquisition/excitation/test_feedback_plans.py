@@ -28,7 +28,7 @@ every_plan = pytest.mark.parametrize("plan", SMART, ids=[each.name for each in S
 
 
 @every_plan
-def test_a_plan_survives_its_file(plan):
+def test_a_feedback_plan_round_trips_through_json(plan):
     assert Measurement.model_validate_json(plan.model_dump_json()) == plan
     assert isinstance(plan.excitation, AbstractFeedback)
 
@@ -43,14 +43,14 @@ def test_a_preview_shows_the_recorded_steps_at_the_largest_setting(plan):
 
 
 @every_plan
-def test_its_longest_time_counts_every_wait(plan):
+def test_the_longest_time_of_a_feedback_plan_includes_every_wait(plan):
     assert duration_s(plan) == HUSH_S + 2 * plan.ramp_s + plan.excitation.playing_s
 
 
 @pytest.mark.parametrize(
     "plan", [each for each in SMART if any(each.excitation.held_accelerations())], ids=lambda each: each.name
 )
-def test_a_held_level_is_checked_against_the_setting_that_it_needs(plan, rig):
+def test_the_setting_needed_for_a_held_level_is_checked_against_its_limit(plan, rig):
     held = list(plan.excitation.held_accelerations())
     (check,) = [each for each in limit_checks(plan, rig) if "holds the base's level" in each.what]
     assert check.value == max(needed_vpp(rig, acceleration, at_hz) for at_hz, acceleration in held)

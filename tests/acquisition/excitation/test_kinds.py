@@ -62,7 +62,7 @@ by_kind = {each.kind: each for each in EXAMPLES}
 every_kind = pytest.mark.parametrize("excitation", EXAMPLES, ids=list(by_kind))
 
 
-def test_the_union_and_the_registry_list_the_same_plans():
+def test_the_excitation_union_and_the_registry_list_the_same_plans():
     union = get_args(Excitation)[0]
     assert get_args(union) == tuple(kind.plan for kind in EXCITATION_KINDS.values())
     assert list(EXCITATION_KINDS) == list(by_kind)
@@ -77,7 +77,7 @@ def test_white_noise_is_read_by_its_name_and_by_the_name_of_version_0_1(word):
 
 
 @every_kind
-def test_every_recorded_segment_is_a_result_or_a_lead_in(excitation):
+def test_every_recorded_segment_is_labelled_as_result_or_lead_in(excitation):
     labels = {step.segment.label for step in excitation.steps()}
     assert labels - {SegmentLabel.LEAD_IN} <= set(excitation.result_labels)
     assert excitation.family in Family
@@ -118,7 +118,7 @@ def test_each_kind_declares_what_sets_the_base_motion(kind, level):
     assert by_kind[kind].level_at(250.0) == level
 
 
-def test_a_settled_sine_without_a_level_plays_its_setting():
+def test_a_settled_sine_without_a_base_level_plays_its_setting():
     plain = SettledSine(amplitude_vpp=1, frequencies_hz=(200, 210))
     assert plain.level_at(200.0) == RelativeSetting(1.0)
     assert not list(plain.held_accelerations())

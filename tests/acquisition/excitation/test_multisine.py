@@ -63,14 +63,14 @@ def test_waveforms_of_a_plan_are_cached():
         first[0][0] = 0.0
 
 
-def test_realisations_are_different_noises():
+def test_realisations_of_a_multisine_are_uncorrelated():
     first, second = flat_periods(BAND, realisations=2, seed=5)
     correlation = np.corrcoef(first, second)[0, 1]
     # Two random-phase multisines of L lines correlate like a mean of L cosines: sd 1/sqrt(2 L).
     assert abs(correlation) < 5 / np.sqrt(2 * len(BAND))
 
 
-def test_the_same_seed_gives_the_same_period_and_another_seed_another():
+def test_equal_seeds_give_equal_periods_and_different_seeds_different_ones():
     again = flat_periods(BAND, 1, seed=7)[0]
     np.testing.assert_array_equal(flat_periods(BAND, 1, seed=7)[0], again)
     assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
@@ -82,7 +82,7 @@ def test_more_realisations_keep_the_phases_of_the_first_ones():
     np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)
 
 
-def test_the_chosen_crest_factor_is_below_what_random_phases_give_on_average():
+def test_the_chosen_crest_factor_is_below_the_mean_of_random_phases():
     (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
     crest = np.max(np.abs(values)) / np.sqrt(np.mean(values**2))
     # Single draws of 991 lines scatter from 3.18 to 4.53.
@@ -100,13 +100,13 @@ def test_values_stay_close_to_gaussian():
     width=st.integers(0, 400),
     repetition_hz=st.sampled_from([0.1, 0.3, 0.5, 1.0, 2.0]),
 )
-def test_band_edges_that_are_harmonics_belong_to_the_band(start, width, repetition_hz):
+def test_a_band_includes_harmonics_at_its_edges(start, width, repetition_hz):
     lines = band_lines(start * repetition_hz, (start + width) * repetition_hz, repetition_hz)
     assert lines[0] == start
     assert lines[-1] == start + width
 
 
-def test_held_lines_match_a_finely_sampled_picture():
+def test_spectrum_of_held_samples_matches_a_finely_sampled_staircase():
     (values,) = flat_periods(BAND, 1, seed=2)
     picture = np.repeat(values, OVERSAMPLING)
     fine = 2 * np.fft.rfft(picture)[: 2 * MEMORY_POINTS] / len(picture)
@@ -119,12 +119,12 @@ def test_held_lines_match_a_finely_sampled_picture():
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32), first=st.integers(1, 100), count=st.integers(2, 300))
-def test_no_value_ever_leaves_the_range(seed, first, count):
+def test_no_value_of_a_multisine_exceeds_the_range(seed, first, count):
     for values in flat_periods(np.arange(first, first + count), 2, seed):
         assert np.max(np.abs(values)) <= 1.0
 
 
-def test_the_first_image_matches_the_zero_order_hold():
+def test_the_first_spectral_image_matches_the_zero_order_hold():
     (values,) = flat_periods(np.array([1000]), 1, seed=1)
     lines = np.abs(held_lines(values, spans=4))
     # -17.1 dB at 7192 Hz for 1000 Hz out of 8192 points a second (the hold's gain over itself).

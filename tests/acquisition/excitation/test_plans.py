@@ -45,11 +45,11 @@ def test_a_plan_round_trips_through_json(plan):
     assert ANY.validate_json(ANY.dump_json(plan)) == plan
 
 
-def test_the_steps_add_up_to_the_duration_of_the_plan(plan):
+def test_the_step_durations_add_up_to_the_duration_of_the_plan(plan):
     assert sum(step.duration_s for step in plan.steps()) == pytest.approx(plan.playing_s, rel=1e-12)
 
 
-def test_the_steps_are_reproducible(plan):
+def test_the_steps_of_a_plan_are_reproducible(plan):
     first, second = list(plan.steps()), list(plan.steps())
     assert [step.segment for step in first] == [step.segment for step in second]
     assert [(step.settle_s, step.record_s) for step in first] == [
@@ -67,7 +67,7 @@ def test_a_preview_stays_within_half_the_peak_to_peak_setting(plan):
     assert shown.duration_s == plan.playing_s
 
 
-def test_a_preview_keeps_the_energy(plan):
+def test_the_preview_spectrum_has_the_rms_of_the_signal(plan):
     shown = plan.preview(4096.0)
     # Parseval: half the square of each line's peak is its share of the mean square.
     mean_square = np.sum(shown.spectrum_v[1:] ** 2) / 2 + shown.spectrum_v[0] ** 2
@@ -80,7 +80,7 @@ def test_a_preview_at_too_low_a_rate_names_the_required_rate(plan):
 
 
 @pytest.mark.parametrize("amplitude_vpp", [0.0, -1.0, 2000.0, float("nan"), float("inf")])
-def test_an_amplitude_that_no_generator_has_is_refused(amplitude_vpp):
+def test_an_amplitude_that_no_generator_can_play_is_refused(amplitude_vpp):
     with pytest.raises(ValidationError, match="amplitude_vpp"):
         Dwell(amplitude_vpp=amplitude_vpp, frequency_hz=260, duration_s=2)
 
@@ -142,7 +142,7 @@ def test_noise_excites_exactly_the_lines_of_its_band():
     np.testing.assert_allclose(strong, np.arange(20, 800.5, 0.5))
 
 
-def test_the_rms_at_one_volt_is_half_over_the_crest_factor():
+def test_noise_of_one_volt_peak_to_peak_has_rms_0_5_over_crest_factor():
     shown = WhiteNoise(amplitude_vpp=1.0, band_start_hz=10, band_stop_hz=1000, realisations=1).preview(16384)
     assert shown.rms_v == pytest.approx(0.5 / shown.crest_factor, rel=1e-3)
     assert 0.11 < shown.rms_v < 0.17
@@ -186,7 +186,7 @@ SWEEPS = st.builds(
 
 @settings(max_examples=50)
 @given(sweep=SWEEPS)
-def test_a_stepped_sweep_keeps_the_phase_of_the_ideal_one_at_the_end_of_every_step(sweep):
+def test_a_stepped_sweep_has_the_phase_of_the_ideal_sweep_after_every_step(sweep):
     elapsed_s = cycles = 0.0
     for step in sweep.steps():
         elapsed_s += step.record_s
@@ -228,7 +228,7 @@ def test_a_sweep_down_mirrors_the_sweep_up():
     np.testing.assert_allclose(rising, falling[::-1], rtol=1e-12)
 
 
-def test_only_the_first_step_of_a_sweep_waits_so_that_it_is_one_segment():
+def test_only_the_first_step_of_a_sweep_settles_and_all_form_one_segment():
     steps = list(SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=10, settle_s=2).steps())
     assert steps[0].settle_s == 2
     assert {step.settle_s for step in steps[1:]} == {0.0}
@@ -276,24 +276,24 @@ class TestStreamedNoise:
         ]
         np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-13)
 
-    def test_its_rms_is_the_range_over_the_crest_factor(self):
+    def test_streamed_noise_has_the_range_over_the_crest_factor_as_rms(self):
         samples = self.PLAN.source.samples(0, 400_000, self.RATE)
         # 2 B T independent values: relative sd of the rms 1 / sqrt(4 B T).
         spread = 1 / np.sqrt(4 * 750 * 400_000 / self.RATE)
         assert np.sqrt(np.mean(samples**2)) == pytest.approx(1 / 4.5, rel=5 * spread)
 
-    def test_its_power_lies_in_the_band(self):
+    def test_the_power_of_streamed_noise_is_in_the_band(self):
         samples = self.PLAN.source.samples(0, 2**18, self.RATE)
         power = np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2
         frequency_hz = np.fft.rfftfreq(len(samples), 1 / self.RATE)
         far_out = (frequency_hz < 25) | (frequency_hz > 825)
         assert np.sum(power[far_out]) / np.sum(power) < 1e-5
 
-    def test_its_values_are_gaussian(self):
+    def test_the_values_of_streamed_noise_are_gaussian(self):
         samples = self.PLAN.source.samples(0, 400_000, self.RATE)
         assert np.mean(samples**4) / np.mean(samples**2) ** 2 == pytest.approx(3.0, abs=0.1)
 
-    def test_it_is_stationary_from_the_first_sample(self):
+    def test_streamed_noise_is_stationary_from_the_first_sample(self):
         draws = [self.PLAN.model_copy(update={"seed": seed}).source for seed in range(200)]
         starts, later = (
             np.mean([draw.samples(first, 16, self.RATE).std() for draw in draws]) for first in (0, 5000)

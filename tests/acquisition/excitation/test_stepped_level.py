@@ -21,7 +21,7 @@ def levels(excitation):
     ]
 
 
-def test_levels_rise_to_the_amplitude_and_come_back_each_with_its_direction():
+def test_levels_go_up_to_the_amplitude_and_down_and_state_their_direction():
     rising = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
     told = levels(plan())
     assert [way for way, _ in told] == ["up"] * 8 + ["down"] * 8
@@ -29,7 +29,7 @@ def test_levels_rise_to_the_amplitude_and_come_back_each_with_its_direction():
     assert [vpp for _, vpp in levels(plan(lowest_vpp=0.25, direction="down"))] == pytest.approx(rising[:0:-1])
 
 
-def test_the_level_changes_without_a_ramp_and_without_a_break_in_phase():
+def test_level_steps_have_no_ramp_and_no_phase_jump():
     laid_out = list(phases(Measurement(name="level", excitation=plan(), ramp_s=0.5)))
     states = [phase.state for phase in laid_out]
     assert states.count(RunState.RAMPING_UP) == states.count(RunState.RAMPING_DOWN) == 1
