@@ -7,7 +7,7 @@ from vibench.acquisition.campaign import ExistingRecordings, list_recordings
 from vibench.acquisition.host.chosen import chosen
 
 
-def test_an_enum_member_and_its_word_are_equivalent():
+def test_an_enum_member_and_its_value_as_text_are_equivalent():
     assert chosen(ExistingRecordings, "resume") is ExistingRecordings.RESUME
     assert chosen(ExistingRecordings, ExistingRecordings.RESUME) is ExistingRecordings.RESUME
 
@@ -29,11 +29,11 @@ def test_an_enum_member_and_its_word_are_equivalent():
         ),
     ],
 )
-def test_a_wrong_word_is_refused_with_the_allowed_words(tmp_path, asked, sentence):
+def test_a_wrong_option_value_is_refused_with_the_allowed_values(tmp_path, asked, sentence):
     with pytest.raises(ConfigurationError, match=sentence):
         asked(tmp_path)
 
 
-def test_a_bench_accepts_a_word_for_the_choice_of_calibration(rig):
+def test_open_bench_accepts_the_calibration_rule_as_text(rig):
     with open_bench(rig, calibration="waived") as bench:
         assert bench.rig == rig

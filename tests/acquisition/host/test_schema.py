@@ -119,7 +119,7 @@ def test_every_shipped_specimen_names_its_schema_and_passes_it(name):
     assert faults("specimen", text) == []
 
 
-def test_a_specimen_may_state_the_version_it_was_written_for(tmp_path):
+def test_a_specimen_may_state_its_format_version(tmp_path):
     path = tmp_path / "mine.toml"
     text = 'format_version = 1\nmodel = "gong2025"\nname = "mine"\n'
     path.write_text(text, encoding="utf-8")
@@ -183,7 +183,7 @@ def test_every_loadable_file_passes_the_schema(kind, text, tmp_path):
         ("mapping", 'source = "1"', 'sauce = "1"'),
     ],
 )
-def test_the_schema_finds_errors_that_loading_refuses(kind, old, new, tmp_path):
+def test_the_schema_also_finds_the_errors_that_loading_refuses(kind, old, new, tmp_path):
     named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper", "map": "map"}
     right = (
         MAPPING
@@ -245,7 +245,7 @@ def test_a_file_of_a_later_version_is_refused_with_advice(version, tmp_path):
     assert load_campaign(path) == load_campaign("quick")
 
 
-def test_the_editor_language_server_reports_only_the_error(tmp_path):
+def test_an_editor_check_reports_an_error_and_accepts_a_valid_file(tmp_path):
     taplo = shutil.which("taplo", path=str(Path(sys.executable).parent))
     if taplo is None:
         pytest.skip("pip install vibench[test] brings taplo")

@@ -34,7 +34,7 @@ def test_an_unknown_file_name_is_refused_with_the_known_ones(tmp_path, monkeypat
         shipped_folder("recipes")
 
 
-def test_a_folder_hides_no_shipped_file_of_its_name(tmp_path, monkeypatch):
+def test_a_folder_does_not_hide_a_shipped_file_of_the_same_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "virtual_rig").mkdir()  # as in a checkout
     assert named("virtual_rig", "hardware_configs").name == "virtual_rig.toml"

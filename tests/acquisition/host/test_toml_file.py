@@ -28,7 +28,7 @@ class Plan(FrozenModel):
 
 
 @pytest.mark.parametrize("key", ["Float", "Range", "float", "Masses", "str", "dict[str,Any]"])
-def test_a_key_named_as_a_kind_of_value_is_reported_by_its_name(tmp_path, key):
+def test_an_unknown_key_named_like_a_type_is_reported_by_its_own_name(tmp_path, key):
     for text, told in (
         (f'values = [1.0]\n"{key}" = 1\n', f"{key} is not a known key"),
         (f'[values]\nstart = 1.0\nstep = 1.0\n"{key}" = 1\n', f"values.{key} is not a known key"),
@@ -66,7 +66,7 @@ def test_an_excitation_of_no_known_kind_is_refused_with_the_known_ones(tmp_path,
         ('values = [1.0, "fast"]\n', "values.1 = 'fast': give a number"),
     ],
 )
-def test_the_intended_kind_determines_the_reported_key(tmp_path, text, told):
+def test_errors_name_the_key_of_the_kind_that_the_file_intends(tmp_path, text, told):
     file = tmp_path / "plan.toml"
     said = refusal(load_toml, file, text, Plan)
     assert said.startswith(f"{file}: {told}")
@@ -82,7 +82,7 @@ def test_the_intended_kind_determines_the_reported_key(tmp_path, text, told):
         (("rest_s", "2026-01-01"), "rest_s = 2026-01-01: "),
     ],
 )
-def test_a_newcomers_campaign_is_refused_in_words_of_toml(tmp_path, change, told):
+def test_common_first_mistakes_in_a_campaign_are_refused_in_toml_terms(tmp_path, change, told):
     given = {"name": '"mine"', change[0]: change[1]}
     text = "\n".join(f"{key} = {value}" for key, value in given.items())
     said = refusal(load_campaign, tmp_path / "campaign.toml", text)
