@@ -97,7 +97,7 @@ class TestRoundTrips:
         assert Measurement.model_validate_json(measurement.model_dump_json()) == measurement
 
     @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
-    def test_a_shipped_campaign_written_out_is_the_same(self, tmp_path, path):
+    def test_a_shipped_campaign_is_unchanged_after_writing_and_loading(self, tmp_path, path):
         campaign = load_campaign(path)
         assert loaded(tmp_path, toml_text(campaign)) == campaign
 
@@ -109,7 +109,7 @@ class TestDefaults:
         assert measurement.ramp_s == 0.7
         assert measurement.excitation.settle_s == 9.0
 
-    def test_a_measurement_s_own_value_comes_first(self, tmp_path):
+    def test_a_value_of_a_measurement_overrides_the_default(self, tmp_path):
         text = 'name = "c"\n[defaults.dwell]\nduration_s = 9.0\n' + DWELL_TABLE
         (measurement,) = loaded(tmp_path, text).measurements
         assert measurement.excitation.duration_s == 2.0
@@ -130,7 +130,7 @@ class TestDefaults:
 
 
 class TestRefusals:
-    def test_a_bench_file_given_as_a_campaign_is_refused_in_one_clause(self):
+    def test_a_bench_file_given_as_a_campaign_is_refused_in_one_sentence(self):
         bench = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml"
         with pytest.raises(
             ConfigurationError, match="specimen, virtual are not known keys: check"
@@ -147,11 +147,11 @@ class TestRefusals:
         assert "measurements.0.excitation.dwell.amplitude_vpp = 5000" in said
         assert "less than or equal to 1000" in said
 
-    def test_two_measurements_of_one_name_are_refused(self, tmp_path):
+    def test_two_measurements_with_the_same_name_are_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match="two measurements would be recorded as 'dwell'"):
             loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + DWELL_TABLE.replace('"dwell"\n[', '"Dwell"\n['))
 
-    def test_a_repeat_may_not_take_another_measurement_s_name(self, tmp_path):
+    def test_a_repeat_with_the_name_of_another_measurement_is_refused(self, tmp_path):
         twice = DWELL_TABLE.replace("[measurements.exc", "repeats = 2\n[measurements.exc")
         with pytest.raises(ConfigurationError, match="recorded as 'dwell-2'"):
             loaded(
@@ -171,7 +171,7 @@ class TestRefusals:
         with pytest.raises(ConfigurationError, match=r"retry\.on = \[\]: give 1 or more"):
             loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + "\n[retry]\nattempts = 3\non = []\n")
 
-    def test_a_ramp_without_stairs_is_refused(self):
+    def test_a_ramp_with_fewer_than_four_steps_is_refused(self):
         with pytest.raises(ValueError, match=r"ramp_step_s = 0\.1 leaves fewer than 4 stairs.*at most 0\.05"):
             Measurement(
                 name="a",
@@ -182,7 +182,7 @@ class TestRefusals:
 
 
 class TestEstimates:
-    def test_repeats_count_in_names_and_time(self):
+    def test_repeats_get_numbered_names_and_add_to_the_duration(self):
         plan = Measurement(
             name="a", excitation=Dwell(amplitude_vpp=1, frequency_hz=1, duration_s=7, settle_s=3), repeats=3
         )
@@ -192,7 +192,7 @@ class TestEstimates:
         assert campaign.duration_s == pytest.approx(3 * 12.6)
         assert campaign.size_bytes(1000.0, 2) == 3 * 12600 * 2 * 4
 
-    def test_a_change_of_waveform_costs_a_ramp_down_and_up(self):
+    def test_a_change_of_waveform_adds_a_ramp_down_and_up(self):
         noise = WhiteNoise(
             amplitude_vpp=1, band_start_hz=20, band_stop_hz=90, realisations=4, periods=2, settle_s=1
         )
@@ -207,7 +207,7 @@ def test_a_shipped_campaign_keeps_the_limits_of_the_virtual_rig(path):
         require_within_limits(measurement, rig)
 
 
-def test_a_campaign_of_version_0_1_is_the_same_with_the_present_name_of_white_noise():
+def test_version_0_1_campaigns_may_use_the_old_name_of_white_noise():
     text = (ROOT / "campaigns" / "paper.toml").read_text("utf-8")
     former = tomllib.loads(text.replace("white_noise", "multisine_noise"))
     present = tomllib.loads(text)
@@ -217,7 +217,7 @@ def test_a_campaign_of_version_0_1_is_the_same_with_the_present_name_of_white_no
         Campaign.model_validate(both)
 
 
-def test_the_paper_s_campaign_has_its_levels_band_and_times():
+def test_the_paper_campaign_has_the_levels_and_times_of_the_paper():
     plans = {
         each.name: each.excitation for each in load_campaign(ROOT / "campaigns" / "paper.toml").measurements
     }

@@ -34,19 +34,19 @@ def drive_source(excitation, rig):
 
 
 @pytest.mark.parametrize("tone", TONES, ids=lambda tone: tone.kind)
-def test_a_sine_is_played_by_the_output_only_where_it_is_plugged_in_for_sines(rig, tone):
+def test_a_sine_uses_the_analogue_output_only_if_configured_for_sines(rig, tone):
     assert drive_source(tone, rig) is DriveSource.GENERATOR
     assert drive_source(tone, with_output(rig, OutputUse.STREAMS)) is DriveSource.GENERATOR
     assert drive_source(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is DriveSource.OUTPUT
 
 
 @pytest.mark.parametrize("plays", list(OutputUse))
-def test_a_stream_is_played_by_the_output_and_a_waveform_by_the_generator(rig, plays):
+def test_streams_use_the_analogue_output_and_waveforms_the_generator(rig, plays):
     assert drive_source(STREAM, with_output(rig, plays)) is DriveSource.OUTPUT
     assert drive_source(WAVEFORM, with_output(rig, plays)) is DriveSource.GENERATOR
 
 
-def test_a_stream_needs_an_output_also_on_a_rig_without_one(rig):
+def test_a_stream_requires_an_analogue_output_even_if_the_rig_has_none(rig):
     assert drive_source(STREAM, rig) is DriveSource.OUTPUT
 
 

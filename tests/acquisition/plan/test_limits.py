@@ -31,7 +31,7 @@ def plan(excitation, **fields):
     return Measurement(name="plan", excitation=excitation, **fields)
 
 
-def test_a_sine_s_loads_are_its_amplitude_times_the_model(rig):
+def test_predicted_loads_of_a_sine_are_amplitude_times_transfer_function(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=0.1, frequency_hz=260, duration_s=1), rig)
     for quantity in BaseQuantity:
         expected = 0.05 * rig.generator.terminal_factor() * abs(RigModel(rig).transfer(quantity, 260.0))
@@ -56,7 +56,7 @@ def test_a_sweep_is_checked_at_the_largest_response_of_the_rig(rig):
     assert loads[BaseQuantity.STROKE].peak == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_waveform_s_peaks_match_an_integration_in_time(rig):
+def test_predicted_peaks_of_a_waveform_match_time_integration(rig):
     """The Fourier prediction against a step-by-step solution of the shaker's equations, nearly unladen."""
     light = {"masses_kg": tuple(1e-6 * each for each in rig.specimen.masses_kg), "contact": "linear"}
     rig = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=light)})
@@ -88,7 +88,7 @@ def test_streamed_noise_reaches_exactly_the_terminal_range(rig):
 @pytest.mark.thorough
 @given(factor=st.floats(0.01, 5))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_loads_grow_with_the_setting(linear_rig, factor):
+def test_predicted_loads_grow_with_the_generator_setting(linear_rig, factor):
     one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), linear_rig)
     more = predicted_loads(Dwell(amplitude_vpp=factor, frequency_hz=50, duration_s=1), linear_rig)
     for quantity in BaseQuantity:
@@ -115,7 +115,7 @@ def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):
     assert text.endswith("Nothing was played.")
 
 
-def test_all_violations_are_in_one_message(rig):
+def test_all_limit_violations_are_in_one_message(rig):
     with pytest.raises(LimitExceeded) as refused:
         require_within_limits(
             plan(Dwell(amplitude_vpp=18, frequency_hz=5000, duration_s=1), ramp_s=0.05, ramp_step_s=0.01), rig

@@ -29,14 +29,14 @@ def test_peak_and_size_match_the_signal(rig, name):
     assert len(seen.spectrum_hz) <= SPECTRUM_POINTS
 
 
-def test_the_spectrum_of_a_sine_is_one_line(rig):
+def test_the_previewed_spectrum_of_a_sine_is_one_line(rig):
     seen = preview_measurement(QUICK["dwell"], rig)
     highest = int(np.argmax(seen.spectrum_v))
     assert seen.spectrum_hz[highest] == pytest.approx(260, abs=0.5)
     assert seen.spectrum_v[highest] == pytest.approx(0.75, rel=0.02)
 
 
-def test_limits_are_sorted_by_use_and_exceeded_ones_are_marked(rig):
+def test_limit_checks_are_sorted_by_use_and_violations_are_marked(rig):
     excitation = QUICK["dwell"].excitation.model_copy(update={"amplitude_vpp": 15.0})
     seen = preview_measurement(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
     uses = [check.use for check in seen.checks]
@@ -59,7 +59,7 @@ def test_the_preview_band_is_the_excited_band(name, band_hz):
     assert QUICK[name].excitation.band_hz == band_hz
 
 
-def test_holdable_growth_follows_from_the_feedback_loop_of_the_rig(rig):
+def test_the_shortest_holdable_growth_time_follows_from_the_loop_delay(rig):
     assert preview_measurement(QUICK["dwell"], rig).least_growth_time_s is None
     smart = load_campaign(ROOT / "campaigns" / "smart.toml").measurements
     (dwell,) = (each for each in smart if each.name == "dwell_260")

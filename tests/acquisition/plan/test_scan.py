@@ -18,7 +18,7 @@ def scanned(*points, **others):
     return validated({"name": "scan", "scan": list(points), **content}, Campaign, "scan.toml")
 
 
-def test_each_point_gets_every_measurement_in_its_turn():
+def test_every_measurement_is_planned_at_each_scan_point():
     sweep = {
         "name": "line",
         "frequency_hz": [150, 160],
@@ -60,12 +60,12 @@ def test_the_shipped_scan_visits_all_three_masses():
         ([point("t" * 60)], r"a name of 66 characters, allowed are 64"),
     ],
 )
-def test_a_bad_point_is_refused_with_one_sentence(points, sentence):
+def test_an_invalid_scan_point_is_refused_with_one_sentence(points, sentence):
     with pytest.raises(ConfigurationError, match=sentence):
         scanned(*points)
 
 
-def test_feedback_is_refused_because_it_needs_m0():
+def test_a_scan_with_feedback_is_refused_because_feedback_needs_m0():
     held = {"kind": "held_dwell", "frequency_hz": 150, "duration_s": 1, "amplitude_vpp": 1}
     held["base_level"] = {"acceleration_m_per_s2": 5}
     with pytest.raises(ConfigurationError, match="held_dwell needs the motion of m0"):

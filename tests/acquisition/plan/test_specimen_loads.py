@@ -40,7 +40,7 @@ def test_predicted_motion_without_contact_matches_the_linear_response(rig):
 
 
 @pytest.mark.parametrize("frequency_hz", [180.0, 201.0, 440.0])
-def test_predicted_motion_with_contact_is_within_half(rig, frequency_hz):
+def test_predicted_motion_with_contact_is_within_50_percent(rig, frequency_hz):
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
     assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(settled_m(rig, 8.0, frequency_hz), rel=0.5)
 
@@ -59,7 +59,7 @@ def test_motion_during_ramps_stays_within_the_prediction(rig, frequency_hz, leve
 
 
 @pytest.mark.parametrize("kind", [WhiteNoise, StreamedNoise])
-def test_noise_is_predicted_by_free_or_stuck_linear_response(rig, kind):
+def test_noise_loads_follow_the_free_or_stuck_linear_response(rig, kind):
     band = {"band_start_hz": 50.0, "band_stop_hz": 600.0}
     more = {"duration_s": 1.0} if kind is StreamedNoise else {"repetition_hz": 1.0, "realisations": 1}
     weak, strong = (kind(amplitude_vpp=level, **band, **more) for level in (0.02, 10.0))
@@ -75,7 +75,7 @@ def test_noise_is_predicted_by_free_or_stuck_linear_response(rig, kind):
     assert 0.95 < against / rms_m(strong, model.stuck_transfer) < 1.25
 
 
-def test_a_specimen_without_stops_swings_with_the_drive(rig):
+def test_loads_without_stops_are_proportional_to_the_drive(rig):
     free = rig.model_copy(update={"specimen": rig.specimen.model_copy(update={"contact": "linear"})})
     low, high = (
         predicted_loads(Dwell(amplitude_vpp=level, frequency_hz=266, duration_s=1), free)
@@ -91,7 +91,7 @@ def test_a_plan_that_overstretches_the_specimen_is_refused(rig):
         require_within_limits(Measurement(name="plan", excitation=sweep), rig)
 
 
-def test_the_table_contains_the_vibrometer_range(rig):
+def test_the_limit_checks_include_the_vibrometer_range(rig):
     dwell = Measurement(name="plan", excitation=Dwell(amplitude_vpp=1, frequency_hz=266, duration_s=1))
     told = {check.what: check for check in limit_checks(dwell, rig)}
     velocity = told["the velocity of m0 (about, at 266 Hz)"]

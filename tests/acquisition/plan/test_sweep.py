@@ -29,17 +29,17 @@ class TestOrder:
         ]
         assert [point.measurement.excitation.frequency_hz for point in plan.points()] == [200, 205, 210] * 2
 
-    def test_a_stated_order_changes_the_nesting(self):
+    def test_the_order_key_changes_the_nesting_of_axes(self):
         plan = campaign(
             amplitude_vpp=[0.5, 1.5], frequency_hz=[200, 210], order=["frequency_hz", "amplitude_vpp"]
         )
         assert names(plan) == [f"line-{hz}hz-{level}vpp" for hz in (200, 210) for level in ("0p5", "1p5")]
 
-    def test_repetitions_are_an_axis_like_others(self):
+    def test_repetitions_are_a_sweep_axis(self):
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
         assert [name[:7] for name in names(plan)] == ["line-r1", "line-r1", "line-r2", "line-r2"]
 
-    def test_each_excitation_combines_template_and_own_values(self):
+    def test_each_excitation_combines_the_template_with_its_own_values(self):
         plan = campaign(
             measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
             excitations=[SWEEP, {"kind": "stepped_sine", "frequencies_hz": [200, 210]}],
@@ -120,7 +120,7 @@ class TestChains:
         assert whole_s[1] - 2 * whole_s[0] == pytest.approx(0.5 * 20 * 20)
         assert len(made(1200, lead_points=2).points()) == 1200
 
-    def test_up_and_down_is_one_chain(self):
+    def test_an_up_and_down_sweep_is_one_chain(self):
         plan = campaign(
             amplitude_vpp=[0.5],
             direction=["up_then_down"],

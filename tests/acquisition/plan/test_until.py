@@ -44,7 +44,7 @@ def test_until_accepts_only_results_of_its_kind(kind, name):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("0.1 %", 0.001), ("2%", 0.02), ("1e-3 %", 1e-5), (0.05, 0.05)])
-def test_a_bound_is_a_percentage_or_a_fraction(said, meant):
+def test_an_until_bound_is_given_as_percentage_or_fraction(said, meant):
     until = plan("dwell", {"response_i": said}).until
     assert until.response_i == pytest.approx(meant)
     assert type(until).model_validate_json(until.model_dump_json()) == until
@@ -61,7 +61,7 @@ def test_until_without_a_bound_is_refused():
         plan("dwell", {"shortest_s": 3.0})
 
 
-def test_a_plan_of_an_older_version_has_no_until():
+def test_a_plan_without_until_is_accepted():
     assert plan("dwell", None).until is None
     assert (
         Measurement.model_validate({"name": "a", "excitation": {"kind": "dwell", **KINDS["dwell"]}}).until
@@ -70,7 +70,7 @@ def test_a_plan_of_an_older_version_has_no_until():
 
 
 @pytest.mark.parametrize(("kind", "most_s"), [("dwell", 60), ("streamed_noise", 60), ("stepped_sine", 2)])
-def test_a_first_analysis_after_the_end_is_refused(kind, most_s):
+def test_an_earliest_end_after_the_planned_end_is_refused(kind, most_s):
     """Steps of less than the usual 2 s, which plans have that do not name it, are analysed at their end."""
     name = sorted(ALLOWED[kind])[0]
     assert plan(kind, {name: "1 %", "shortest_s": most_s}).until.shortest_s == most_s
