@@ -132,7 +132,7 @@ def sectors_of(write):
 
 
 @pytest.mark.thorough
-def test_any_part_of_the_unsynced_writes_may_survive_a_power_cut(tmp_path, traced):
+def test_a_recording_opens_whatever_unsynced_writes_survive_a_power_cut(tmp_path, traced):
     places, empty, trace, truth = traced
     cut_file = CutFile(tmp_path / "cut.h5.part", empty)
 
@@ -215,7 +215,7 @@ def test_the_power_cut_model_detects_wrong_write_order(traced):
     assert lies > 0
 
 
-def test_only_data_are_written_after_the_start(traced):
+def test_no_structure_of_the_file_is_written_after_the_start(traced):
     places, empty, trace, _ = traced
     first_place = min(places.n_valid, places.state, places.reason)
     assert min(each[0] for each in trace if each is not None) >= first_place

@@ -25,7 +25,7 @@ def test_24_bit_counts_round_trip_through_volts(step, zero, counts):
 
 
 @given(volts=st.lists(st.floats(-9.99, 9.99), min_size=1, max_size=50))
-def test_without_a_converter_step_volts_are_kept_to_half_a_fine_step(volts):
+def test_volts_without_a_converter_step_are_stored_to_half_a_fine_step(volts):
     counts = scale(None).counts(np.array([volts]))
     fine_step = 5.0 * 2**-30
     assert np.abs(counts * fine_step - volts).max() <= 0.5 * fine_step
@@ -39,6 +39,6 @@ def test_a_wrong_step_is_detected():
 
 
 @pytest.mark.parametrize("volts", [np.nan, np.inf, -np.inf, 1e6])
-def test_values_beyond_the_counts_are_refused(volts):
+def test_values_beyond_the_range_of_counts_are_refused(volts):
     with pytest.raises(RecordingError, match="was not recorded"):
         scale(1e-6).counts(np.array([[0.0, volts]]))

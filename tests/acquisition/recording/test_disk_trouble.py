@@ -22,7 +22,7 @@ def trouble():
         yield trouble
 
 
-def test_a_full_disk_refuses_at_once_and_shows_the_rig_before_repeating():
+def test_a_simulated_full_disk_refuses_at_once_and_notifies_the_rig():
     told = []
     trouble = DiskTrouble(lambda: told.append(len(told)))
     for _ in range(2):

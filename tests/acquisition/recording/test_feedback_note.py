@@ -73,14 +73,14 @@ def read(kind, text):
 
 
 @pytest.mark.parametrize(("kind", "text", "form"), WRITTEN)
-def test_a_note_of_an_older_recording_round_trips(kind, text, form):
+def test_a_feedback_note_of_an_older_recording_round_trips(kind, text, form):
     note = read(kind, text)
     assert type(note) is form
     assert (note.kind, note.text) == (kind, text)
     assert len(text) <= TEXT_WIDTH, "it is not cut in the file"
 
 
-def test_words_of_a_note_are_parsed_to_values():
+def test_the_text_of_a_feedback_note_is_parsed_to_values():
     assert read("achieved", STEP).segment is SegmentLabel.STEP
     assert read("achieved", STEP).level is Held.WITHIN
     assert read("settled", SETTLED).motion is Steadiness.UNSETTLED
@@ -98,13 +98,13 @@ def test_other_events_and_truncated_notes_are_ignored():
 
 
 @pytest.mark.parametrize("more", ['"version": 2, ', '"version": 2, "bandwidth_hz": 0.1, '])
-def test_a_note_of_an_unknown_version_is_refused_in_one_sentence_that_names_it(more):
+def test_a_note_of_an_unknown_version_is_refused_with_that_version(more):
     with pytest.raises(
         RecordingError, match=r"'level' at sample 512, of version 2, .* version 1\); read .* h5py"
     ):
         read("level", LEVEL.replace("{", "{" + more))
 
 
-def test_numbers_in_notes_have_six_digits():
+def test_numbers_in_feedback_notes_have_six_digits():
     note = ExcursionNote(from_hz=254.8123456, to_hz=258.8, worst=-0.2124261234, level=Held.OUTSIDE)
     assert (note.from_hz, note.worst) == (254.812, -0.212426)

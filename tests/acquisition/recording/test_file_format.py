@@ -44,7 +44,7 @@ def test_the_file_identifies_its_format(file):
     assert file.attrs["state"] == b"complete"
 
 
-def test_the_superblock_is_the_oldest(file):
+def test_the_file_has_the_oldest_hdf5_superblock_version(file):
     with Path(file.filename).open("rb") as raw:
         assert raw.read(9) == b"\x89HDF\r\n\x1a\n\x00"
 
@@ -65,7 +65,7 @@ def test_all_data_types_are_readable_by_old_readers(file):
     assert kinds == {h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING}
 
 
-def test_the_tables_are_plain_columns(file):
+def test_events_overloads_and_segments_are_stored_as_plain_columns(file):
     assert file["events/text"][0].decode() == "gap 45 µm"
     assert file["overloads/first_sample"][:].tolist() == [3]
     assert file["segments/last_sample"][:].tolist() == [SAMPLES - 1]
@@ -84,6 +84,6 @@ def test_chunks_made_in_threads_equal_those_of_hdf5(tmp_path, samples):
         np.testing.assert_array_equal(file["theirs"][:], counts)
 
 
-def test_no_reserved_space_remains(file):
+def test_the_finished_file_has_no_reserved_space(file):
     raw_bytes = 3 * SAMPLES * 4  # 24 of 32 bits are noise, in two channels
     assert Path(file.filename).stat().st_size < raw_bytes

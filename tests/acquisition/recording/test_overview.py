@@ -23,7 +23,7 @@ def recorded(tmp_path, make_header, make_block):
     return tmp_path / "a.h5", counts
 
 
-def test_the_extremes_of_a_bin_are_those_of_its_samples(recorded):
+def test_overview_bins_store_the_minimum_and_maximum_of_their_samples(recorded):
     path, counts = recorded
     with open_recording(path) as recording:
         for row, role in zip(counts, recording.roles, strict=True):
@@ -60,7 +60,7 @@ def test_an_overview_curve_is_nan_in_lost_bins(tmp_path, make_header, make_block
         assert file["view/m0_velocity/time"].shape == values.shape
 
 
-def test_lost_samples_do_not_enter_the_extremes():
+def test_overview_extremes_exclude_lost_samples():
     counts = np.arange(4 * BIN_SAMPLES, dtype=np.int32)
     counts[5:9] = MISSING_COUNT
     counts[BIN_SAMPLES : 2 * BIN_SAMPLES] = MISSING_COUNT
@@ -87,7 +87,7 @@ def test_a_recording_without_samples_has_an_empty_overview(tmp_path, make_header
         assert "default" not in file.attrs
 
 
-def test_a_file_without_an_overview_reports_it(recorded):
+def test_a_file_without_an_overview_returns_none(recorded):
     path, _ = recorded
     with h5py.File(path, "r+") as file:
         del file["overview"]
@@ -95,7 +95,7 @@ def test_a_file_without_an_overview_reports_it(recorded):
         assert recording.read_overview("m0_velocity") is None
 
 
-def test_a_growing_recording_has_no_overview_yet(tmp_path, make_header, make_block):
+def test_a_recording_in_progress_has_no_overview(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=1000)) as writer:
         writer.append(make_block(0, 500)[1])
         with open_recording(tmp_path / "a.h5.part") as recording:

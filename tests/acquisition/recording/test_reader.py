@@ -69,14 +69,14 @@ def test_an_unknown_channel_is_refused_with_the_known_ones(path):
         recording.read("m2_velocity")
 
 
-def test_a_closed_recording_reports_it(path):
+def test_reading_a_closed_recording_is_refused(path):
     recording = open_recording(path)
     recording.close()
     with pytest.raises(RecordingError, match="closed"):
         recording.read("m0_velocity")
 
 
-def test_a_just_finished_recording_is_found_by_its_part_name(path):
+def test_a_finished_recording_is_still_found_by_its_part_name(path):
     with open_recording(path.with_name("a.h5.part")) as recording:
         assert recording.path == path
         assert recording.state == "complete"
@@ -166,7 +166,7 @@ def test_results_are_stored_beside_their_samples(path):
         assert group["settings"].attrs["overlap"] == 0.5
 
 
-def test_two_analyses_at_once_both_keep_their_results(path):
+def test_results_of_two_simultaneous_analyses_are_both_stored(path):
     one, other = open_recording(path), open_recording(path)
     with one, other:
         one.save_results("spectrum", {}, {"by": "one"})

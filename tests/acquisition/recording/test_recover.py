@@ -56,7 +56,7 @@ def test_a_program_killed_while_writing_the_state_leaves_an_unfinished_recording
         assert [event.kind for event in recording.events] == ["interrupted"]
 
 
-def test_a_recording_is_finished_where_no_thread_can_be_started(tmp_path, abandoned, monkeypatch):
+def test_recovery_finishes_a_recording_without_starting_a_thread(tmp_path, abandoned, monkeypatch):
     part, counts = abandoned(tmp_path)
 
     def refuse(_):
@@ -72,14 +72,14 @@ def test_recover_accepts_the_part_and_the_final_name(tmp_path, abandoned):
     assert recover(tmp_path / "a.h5") == tmp_path / "a.h5"
 
 
-def test_an_incomplete_copy_is_repeated(tmp_path, abandoned):
+def test_recovery_replaces_an_incomplete_copy(tmp_path, abandoned):
     part, _ = abandoned(tmp_path)
     (tmp_path / "a.h5.tmp").write_bytes(b"half a copy")
     recover(part)
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
 
 
-def test_a_finished_copy_is_kept_and_its_part_removed(tmp_path, abandoned):
+def test_recovery_keeps_a_finished_copy_and_removes_the_part_file(tmp_path, abandoned):
     part, _ = abandoned(tmp_path)
     saved = tmp_path / "saved"
     shutil.copyfile(part, saved)
@@ -91,7 +91,7 @@ def test_a_finished_copy_is_kept_and_its_part_removed(tmp_path, abandoned):
     assert not part.exists()
 
 
-def test_another_recording_of_that_name_is_not_overwritten(tmp_path, abandoned):
+def test_recovery_does_not_overwrite_another_recording_of_the_same_name(tmp_path, abandoned):
     (tmp_path / "other").mkdir()
     part, _ = abandoned(tmp_path)
     other, _ = abandoned(tmp_path / "other")
@@ -129,7 +129,7 @@ def test_recover_reports_when_there_is_nothing_to_recover(tmp_path):
         recover(tmp_path / "a.h5")
 
 
-def test_a_growing_recording_shows_its_committed_samples(tmp_path, make_header, make_block):
+def test_a_recording_in_progress_shows_its_committed_samples(tmp_path, make_header, make_block):
     path = tmp_path / "a.h5"
     places = preallocate(path, part_of(path), make_header())
     writer = RecordingWriter(

@@ -94,7 +94,7 @@ def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
     assert example_says(path) == (1, "not as it was sealed: /m0_velocity")
 
 
-def test_the_key_alone_verifies_the_signature(recorded, key_file):
+def test_only_the_signing_key_verifies_the_signature(recorded, key_file):
     path = recorded()
     assert example_says(path, key_file)[0] == 0
     other = key_file.with_name("other")
@@ -168,7 +168,7 @@ def test_the_full_check_finds_a_changed_sample(recorded):
     assert (found.state, found.sentence) == (SealState.DAMAGED, "not as it was sealed: data of /m0_velocity")
 
 
-def test_a_new_seal_of_changed_content_has_another_digest(recorded):
+def test_resealing_changed_content_changes_the_digest_of_the_seal(recorded):
     path = recorded()
     with open_recording(path) as recording:
         before = recording.seal
@@ -202,7 +202,7 @@ def test_a_recording_without_a_seal_is_reported_as_such(recorded):
         assert "before recordings had one" in found.sentence
 
 
-def test_without_a_seal_samples_are_checked_against_the_checksum_of_their_channel(recorded):
+def test_samples_of_an_unsealed_recording_are_checked_by_channel_checksums(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -273,7 +273,7 @@ def test_a_damaged_copy_does_not_remove_its_source(recorded, tmp_path, make_head
     assert path.exists()
 
 
-def test_samples_that_changed_between_recording_and_end_are_not_sealed(tmp_path, make_header, make_block):
+def test_samples_changed_before_the_end_of_a_recording_are_not_sealed(tmp_path, make_header, make_block):
     writer = create_recording(tmp_path / "a.h5", make_header())
     writer.append(make_block(0, 2000)[1])
     writer._committer.close()
@@ -299,7 +299,7 @@ def test_with_a_key_a_seal_is_signed(recorded, key_file, monkeypatch):
     assert state_of(path, key=seal_key(other)) is SealState.OTHER_KEY
 
 
-def test_a_new_seal_without_the_key_is_detected(recorded, key_file):
+def test_a_seal_forged_without_the_key_is_detected(recorded, key_file):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_sample(file)
@@ -342,7 +342,7 @@ def test_a_result_has_a_separate_seal(with_result):
         assert recording.results["spectrum"].arrays["H"].axes == ("f",)
 
 
-def test_a_changed_result_is_refused_and_its_recording_accepted(with_result):
+def test_a_changed_result_is_refused_and_the_recording_stays_intact(with_result):
     with h5py.File(with_result, "r+") as file:
         file["results/spectrum/H"][1] = 7.0
     with open_recording(with_result) as recording:
@@ -379,7 +379,7 @@ def test_a_result_of_a_version_without_result_seals_is_read(with_result):
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.UNSEALED]
 
 
-def test_nothing_is_added_to_a_damaged_recording(recorded):
+def test_no_result_is_added_to_a_damaged_recording(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_time(file)
@@ -389,7 +389,7 @@ def test_nothing_is_added_to_a_damaged_recording(recorded):
     assert path.read_bytes() == before
 
 
-def test_a_decompression_bomb_is_not_read(with_result, monkeypatch):
+def test_a_result_that_expands_beyond_the_size_limit_is_not_read(with_result, monkeypatch):
     monkeypatch.setattr(_seal, "LARGEST_TABLE_BYTES", 1000)
     with h5py.File(with_result, "r+") as file:
         del file["results/spectrum/H"]

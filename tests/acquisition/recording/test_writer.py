@@ -52,7 +52,7 @@ def test_counts_of_another_shape_or_type_are_refused(tmp_path, make_header, make
         assert writer.samples == 0
 
 
-def test_only_the_finished_file_remains(tmp_path, make_header, make_block):
+def test_only_the_finished_file_remains_after_recording(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.append(make_block(0, BLOCK)[1])
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
@@ -72,7 +72,7 @@ def test_a_file_extension_other_than_h5_is_refused(tmp_path, make_header, name):
         create_recording(tmp_path / name, make_header())
 
 
-def test_a_missing_folder_is_named(tmp_path, make_header):
+def test_a_missing_folder_is_named_in_the_error(tmp_path, make_header):
     with pytest.raises(RecordingError, match="nowhere does not exist"):
         create_recording(tmp_path / "nowhere" / "a.h5", make_header())
 
@@ -113,7 +113,7 @@ def test_a_block_of_the_wrong_shape_is_refused(tmp_path, make_header, make_block
 
 
 @pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="this system claims no room beforehand")
-def test_a_recording_may_exceed_its_plan_by_margin_and_hold_only(tmp_path, make_header, make_block):
+def test_a_recording_may_exceed_its_plan_only_by_margin_and_hold_time(tmp_path, make_header, make_block):
     planned, margin, hold = 4000, 10_000, 600_000
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=planned)) as writer:
         claimed = disk_bytes(tmp_path)
@@ -208,7 +208,7 @@ def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
             writer.end_segment()
 
 
-def test_numbers_outside_json_are_refused(tmp_path, make_header):
+def test_numbers_that_json_cannot_store_are_refused(tmp_path, make_header):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         with pytest.raises(RecordingError, match="'steady' cannot be kept as JSON"):
             writer.begin_segment("steady", frequency_hz=float("nan"))
@@ -218,7 +218,7 @@ def test_numbers_outside_json_are_refused(tmp_path, make_header):
         assert recording.segments[0].numbers == {"frequency_hz": 260.0, "realisation": 3}
 
 
-def test_an_overload_across_blocks_is_one_range(tmp_path, make_header, make_block):
+def test_an_overload_across_blocks_is_stored_as_one_range(tmp_path, make_header, make_block):
     parts = [(0, 99), (100, 149), (200, 210)]
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         for index, (first, last) in enumerate(parts):
@@ -227,7 +227,7 @@ def test_an_overload_across_blocks_is_one_range(tmp_path, make_header, make_bloc
         assert recording.overloads == (Overload("m0_velocity", 0, 149), Overload("m0_velocity", 200, 210))
 
 
-def test_surplus_overloads_are_merged_not_lost(tmp_path, make_header, make_block):
+def test_overloads_beyond_the_table_size_are_merged(tmp_path, make_header, make_block):
     many = tuple(Overload("m0_velocity", 2 * each, 2 * each) for each in range(9000))
     late = (Overload("drive_voltage", 5, 6),)
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=20_000)) as writer:
@@ -242,7 +242,7 @@ def test_surplus_overloads_are_merged_not_lost(tmp_path, make_header, make_block
         assert late[0] in recording.overloads
 
 
-def test_more_events_than_fit_are_counted(tmp_path, make_header):
+def test_events_beyond_the_table_size_are_counted(tmp_path, make_header):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         for number in range(4100):
             writer.log("note", f"number {number}")
