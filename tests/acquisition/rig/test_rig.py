@@ -40,7 +40,7 @@ def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
         ("[specimen]", "[specimen", r"not valid TOML"),
     ],
 )
-def test_a_wrong_configuration_is_refused_with_its_key(tmp_path, old, new, said):
+def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
     with pytest.raises(ConfigurationError, match=said):
         load_rig(edited(tmp_path, old, new))
 
@@ -63,7 +63,7 @@ def test_a_wrong_configuration_is_refused_with_its_key(tmp_path, old, new, said)
         ("sample_rate_hz = 51200\n# What", "sample_rate_hz = 0\n# What", r"output\.sample_rate_hz = 0: .*0"),
     ],
 )
-def test_a_wrong_output_is_refused_with_its_key(tmp_path, old, new, said):
+def test_a_wrong_output_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
     with pytest.raises(ConfigurationError, match=said) as failure:
         load_rig(edited(tmp_path, old, new, CONFIGS / "virtual_rig_streaming.toml"))
     assert "\n" not in str(failure.value)

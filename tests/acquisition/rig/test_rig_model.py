@@ -34,7 +34,7 @@ def test_an_amplifier_with_a_lower_band_edge_blocks_dc():
     assert model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, 0.0) == 0
 
 
-def test_the_amplifier_is_down_by_the_root_of_two_at_its_band_edges():
+def test_the_amplifier_gain_is_3_db_down_at_its_band_edges():
     model = with_amplifier(low_cut_hz=0.3, high_cut_hz=30e3)
     edges = np.abs(model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, [0.3, 30e3]))
     assert edges == pytest.approx(RIG.amplifier.gain / np.sqrt(2), rel=1e-4)
@@ -49,7 +49,7 @@ def test_force_over_acceleration_tends_to_the_suspended_mass():
     assert abs(force / acceleration) == pytest.approx(suspended_mass_kg(RIG.shaker), rel=1e-3)
 
 
-def test_the_undamped_table_resonates_at_the_root_of_stiffness_over_mass():
+def test_the_undamped_table_resonates_at_sqrt_of_stiffness_over_mass():
     shaker = RIG.shaker
     resonance_hz = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     model = with_shaker(force_constant_n_per_a=1e-6, suspension_damping_ns_per_m=0.1)
@@ -78,7 +78,7 @@ def test_velocity_and_acceleration_are_derivatives_of_the_stroke(frequency_hz):
 
 
 @given(st.floats(0.5, 20e3))
-def test_the_state_equations_and_the_transfer_are_the_same_system(frequency_hz):
+def test_state_equations_and_transfer_function_agree(frequency_hz):
     equations = shaker_of(RIG).equations()
     s = 2j * np.pi * frequency_hz
     voltage = complex(MODEL.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, frequency_hz))

@@ -87,7 +87,7 @@ def rig_with(**texts):
     return from_toml(content, Rig, path)
 
 
-def test_a_hardware_configuration_takes_the_units_of_data_sheets():
+def test_a_hardware_configuration_accepts_data_sheet_units():
     rig = rig_with(
         accelerometer__sensitivity_v_per_m_per_s2="100 mV/g", vibrometer__range_mm_per_s_per_v="4 V/(m/s)"
     )
