@@ -91,7 +91,7 @@ def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, late
     assert cycles(stretch(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
 
 
-def test_a_ramp_lasts_as_long_as_its_commands(bench, tmp_path):
+def test_a_ramp_is_extended_to_the_time_of_its_commands(bench, tmp_path):
     bench.world.latency_s = 0.25
     with run_of(bench, dwell(), tmp_path) as run:
         most = [bench.digitizer.waiting_samples / RATE for _ in run]
@@ -101,7 +101,7 @@ def test_a_ramp_lasts_as_long_as_its_commands(bench, tmp_path):
     assert up.size / RATE == pytest.approx(6 * 0.25, abs=0.01)
 
 
-def test_a_lagging_drive_ends_the_run_with_its_position(bench, tmp_path):
+def test_a_drive_that_lags_its_plan_ends_the_run_with_an_error(bench, tmp_path):
     plan = sweep(0.05)
     bench.world.latency_s = 0.02
     with run_of(bench, plan, tmp_path) as run:
@@ -135,7 +135,7 @@ def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s)
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_stalls_of_the_computer_request_no_frequency_outside_the_plan(bench, tmp_path, seed):
+def test_a_sweep_stays_within_its_frequencies_despite_computer_stalls(bench, tmp_path, seed):
     """A sweep from 20 Hz to 600 Hz asked its generator for -186 Hz after some stalls, others for 1,451 Hz."""
     chance = np.random.default_rng(seed)
     bench.world.latency_s = 0.005

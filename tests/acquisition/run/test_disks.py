@@ -77,7 +77,7 @@ DISKS = {
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", DISKS)
-def test_every_disk_fault_leaves_silence_a_sentence_and_a_recording(laboratory, tmp_path, name):
+def test_every_disk_fault_ends_in_silence_with_an_error_and_a_recording(laboratory, tmp_path, name):
     virtual, connected = laboratory()
     disk, path, said = BadDisk(DISKS[name]), tmp_path / "run.h5", ""
     with bench_on(connected) as bench:

@@ -156,7 +156,7 @@ def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, mo
 
 
 @pytest.mark.thorough
-def test_a_long_ramp_shows_that_it_continues(announced, monkeypatch):
+def test_a_stop_is_confirmed_after_a_ramp_longer_than_the_timeout(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
@@ -174,7 +174,7 @@ def test_a_long_ramp_shows_that_it_continues(announced, monkeypatch):
         ramp.join()
 
 
-def test_without_memory_the_reserve_is_freed_and_the_output_switched_off():
+def test_running_out_of_memory_frees_the_reserve_and_switches_the_output_off():
     output = Output(MemoryError())
     with DriveGuard(output, StopSwitch()) as guard:
         guard.begin()
@@ -196,7 +196,7 @@ def test_a_run_without_memory_reserve_is_refused(monkeypatch):
         DriveGuard(Output(), StopSwitch())
 
 
-def test_background_work_starts_no_new_thread(monkeypatch):
+def test_background_jobs_of_a_run_start_no_new_thread(monkeypatch):
     beside, done = Beside("test"), []
     monkeypatch.setattr(threading.Thread, "start", lambda self: pytest.fail("a thread was started"))
     beside.do(lambda: done.append(1))

@@ -40,7 +40,7 @@ SWEEP = DWELL.model_copy(
         (-201003, InstrumentLost, "gone|cannot be accessed|reached"),
     ],
 )
-def test_a_converter_that_fails_leaves_silence_and_the_record_so_far(laboratory, tmp_path, code, kind, said):
+def test_a_converter_failure_ends_in_silence_and_keeps_the_recording(laboratory, tmp_path, code, kind, said):
     virtual, connected = laboratory()
     fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
     with bench_on(connected) as bench:

@@ -86,7 +86,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("kept", "frequency_hz", "peaks", "quantity", "limit"), CASES)
-def test_each_limit_ends_the_run_when_it_is_passed_and_is_named(
+def test_each_exceeded_limit_ends_the_run_and_is_named_in_the_error(
     rig, kept, frequency_hz, peaks, quantity, limit
 ):
     five_per_cent_above = {role: 1.05 * peak for role, peak in peaks.items()}
@@ -122,7 +122,7 @@ def test_the_limit_event_names_the_first_sample_past_the_limit(rig):
     assert (trip.sample, trip.value) == (BLOCK + 1234, pytest.approx(750.0))
 
 
-def test_a_vibrometer_at_its_range_is_named_by_its_range_and_a_converter_by_its_own(rig):
+def test_an_overload_names_the_range_of_the_vibrometer_or_converter(rig):
     volts = np.zeros((4, BLOCK))
     volts[3, 100] = 3.9
     volts[0, 200] = 4.9
@@ -138,7 +138,7 @@ def test_a_vibrometer_at_its_range_is_named_by_its_range_and_a_converter_by_its_
 
 
 @pytest.mark.parametrize("ending", OnChange)
-def test_a_change_of_the_specimen_ends_a_run_only_if_planned(rig, ending):
+def test_a_changed_specimen_ends_a_run_only_if_the_plan_says_so(rig, ending):
     monitor, quiet = monitor_of(rig, on_changed_specimen=ending), np.zeros((4, BLOCK))
     monitor.require_safe(Block(0, quiet))
     monitor.note_change("The specimen is not what it was.", BLOCK)
@@ -152,7 +152,7 @@ def test_a_change_of_the_specimen_ends_a_run_only_if_planned(rig, ending):
             assert "vibench twin --new-baseline" in text
 
 
-def test_a_flagged_over_range_is_no_amplitude(rig):
+def test_a_flagged_over_range_does_not_trip_an_amplitude_limit(rig):
     monitor = monitor_of(rig)
     for first in range(0, 20 * BLOCK, BLOCK):
         volts = np.zeros((4, BLOCK))
@@ -212,7 +212,7 @@ def test_an_exceeded_limit_is_recorded_with_its_values(bench, tmp_path):
     assert bench.recorder.ending[1] == str(failure.value)
 
 
-def test_settling_of_an_ac_coupled_input_is_no_stroke(rig):
+def test_settling_of_an_ac_coupled_input_does_not_trip_the_stroke_limit(rig):
     """An AC-coupled input with a time constant of 0.1 s, half a volt from its rest when the run begins."""
     monitor = monitor_of(rig)
     time_s = np.arange(round(2 * RATE_HZ)) / RATE_HZ

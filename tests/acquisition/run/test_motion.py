@@ -55,14 +55,14 @@ def test_residual_ringing_at_the_start_does_not_inflate_the_motion(phase):
         assert np.max(np.abs(stretched)) < 0.3e-3
 
 
-def test_a_constant_offset_gives_no_motion():
+def test_a_constant_acceleration_offset_gives_no_displacement():
     motion = BaseTracker(RATE_HZ).follow(np.full(TIME_S.size, 9.81))
     assert np.max(np.abs(motion.displacement)) < 1e-12
 
 
 @pytest.mark.parametrize("role", [Role.M0_ACCELERATION, Role.M0_DISPLACEMENT])
 @pytest.mark.parametrize("frequency_hz", [10.0, 95.0, 500.0])
-def test_an_accelerometer_or_probe_on_m0_shows_the_same_stretch(role, frequency_hz):
+def test_any_sensor_on_m0_gives_the_same_spring_stretch(role, frequency_hz):
     turn, seen = 2 * np.pi * frequency_hz, np.zeros(TIME_S.size, dtype=np.bool_)
     base = BaseTracker(RATE_HZ).follow(-1e-3 * turn**2 * np.sin(turn * TIME_S))
     by_velocity = SpecimenTracker(RATE_HZ).follow(3e-3 * turn * np.cos(turn * TIME_S), base, seen)

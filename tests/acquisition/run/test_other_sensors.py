@@ -79,7 +79,7 @@ def amplitude(samples, rate_hz, frequency_hz):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("role", ["m0_displacement", "m0_acceleration"])
-def test_a_probe_and_an_accelerometer_show_the_motion_that_the_vibrometer_shows(tmp_path, role):
+def test_probe_and_accelerometer_measure_the_motion_of_the_vibrometer(tmp_path, role):
     path = measured(rig_with(role), tmp_path, amplitude_vpp=0.5, frequency_hz=250.0, **DWELL)
     with open_recording(path) as recording:
         rate = recording.sample_rate_hz
@@ -138,7 +138,7 @@ def test_a_plan_beyond_the_range_of_a_sensor_on_m0_is_refused(role):
 
 
 @pytest.mark.thorough
-def test_a_dwell_with_accelerometers_gives_responses_of_its_sensors(tmp_path):
+def test_a_dwell_without_a_vibrometer_gives_responses_of_its_accelerometers(tmp_path):
     results = [
         analyse_files(
             [measured(rig, tmp_path / str(number), amplitude_vpp=1.5, frequency_hz=260.0, **DWELL)],
@@ -177,7 +177,7 @@ def test_an_unsuitable_sensor_is_refused(change, words):
         Rig.model_validate({**BASE.model_dump(mode="json"), **change})
 
 
-def test_a_channel_without_a_sensor_names_the_table_to_add():
+def test_the_error_for_a_missing_sensor_names_the_table_to_add():
     said = WITHOUT.model_dump(mode="json") | {"sensors": {}}
     with pytest.raises(ValidationError, match=re.escape("[sensors.m0_acceleration] (docs/sensor-units.md)")):
         Rig.model_validate(said)
@@ -266,7 +266,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     assert kinds[0] == kinds[1]
 
 
-def test_a_force_under_a_sine_is_refused(tmp_path):
+def test_a_force_response_of_a_sine_is_refused(tmp_path):
     path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
     with pytest.raises(UnusableData, match="base_force has results of noise only"):

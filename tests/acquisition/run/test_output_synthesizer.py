@@ -26,7 +26,7 @@ def half_cosine(samples):
     return 0.5 * (1 - np.cos(np.pi * np.arange(samples) / samples))
 
 
-def test_a_stream_is_its_source_times_a_half_cosine_envelope():
+def test_a_stream_is_multiplied_by_a_half_cosine_envelope():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(NOISE))
     envelope = np.concatenate([half_cosine(512), np.ones(1536), 1 - half_cosine(512), np.zeros(100)])
@@ -65,7 +65,7 @@ def test_a_tone_with_changing_frequency_is_continuous(frequencies, hold_s):
 
 
 @given(durations=st.lists(st.floats(1e-5, 0.05), min_size=1, max_size=40))
-def test_boundaries_are_rounded_to_the_nearest_sample(durations):
+def test_segment_boundaries_are_rounded_to_the_nearest_sample(durations):
     synthesizer = OutputSynthesizer(RATE_HZ)
     levels = [1.0 if number % 2 else 0.5 for number in range(len(durations))]
     phases = [
@@ -81,7 +81,7 @@ def test_boundaries_are_rounded_to_the_nearest_sample(durations):
     np.testing.assert_allclose(np.abs(volts[1::2]), expected[1::2], atol=1e-9)
 
 
-def test_the_last_signal_ends_without_a_step():
+def test_the_last_signal_fades_out_without_a_step():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(
         [Phase(RunState.CHECKING, Tone(160.0), 0.2), Phase(RunState.CHECKING, Tone(160.0), 0.3)]
@@ -94,7 +94,7 @@ def test_the_last_signal_ends_without_a_step():
     assert synthesizer.is_over
 
 
-def test_a_signal_appended_after_the_end_starts_at_the_next_sample():
+def test_a_signal_appended_after_the_end_begins_at_the_next_sample():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(NOISE))
     synthesizer.take(4321)

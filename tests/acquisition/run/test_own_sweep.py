@@ -83,12 +83,12 @@ def test_a_dead_man_excludes_hardware_sweeps(tmp_path):
         run_measurement(bench, sweep(), tmp_path / "sweep.h5")
 
 
-def test_a_sweep_with_changing_amplitude_is_made_by_the_computer():
+def test_a_sweep_with_changing_amplitude_is_stepped_by_the_computer():
     with pytest.raises(ValueError, match="swept_by = 'computer'"):
         sweep(hold="velocity")
 
 
-def test_the_preview_shows_the_whole_sweep():
+def test_the_preview_of_a_hardware_sweep_shows_the_whole_sweep():
     shown = sweep().excitation.preview(2000.0)
     assert shown.peak_v == pytest.approx(0.1, rel=1e-3)
     assert len(shown.volts) == 6000

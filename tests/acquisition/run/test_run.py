@@ -124,7 +124,7 @@ class TestThePlanIsCarriedOut:
         assert lengths == {label: round(seconds * RATE) for label, seconds in expected.items()}
         assert played.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
 
-    def test_the_blocks_show_the_progress(self, played):
+    def test_every_block_states_elapsed_time_and_setting(self, played):
         shown = played.shown
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
@@ -172,7 +172,7 @@ class TestThePlanIsCarriedOut:
         assert ("check", "left out: the bench was checked shortly before") in events
         assert ("player", "function generator") in events
 
-    def test_the_header_holds_plan_bench_and_confirmations(self, played):
+    def test_the_header_contains_plan_bench_and_confirmations(self, played):
         header = played.recorder.header
         assert Measurement.model_validate_json(header.plan_json) == DWELL
         assert type(played.rig).model_validate_json(header.bench_json) == played.rig
@@ -284,7 +284,7 @@ class TestEveryWayOut:
         assert run.outcome.state is RunState.FINISHED
 
     @every_state
-    def test_an_exceeded_limit_ramps_down_and_is_named(self, bench, tmp_path, state):
+    def test_an_exceeded_limit_ramps_down_and_is_named_in_the_error(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
@@ -363,7 +363,7 @@ class TestEveryWayOut:
             watch()
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
-    def test_a_recording_that_cannot_be_finished_leaves_silence(self, bench, tmp_path):
+    def test_a_failure_to_finish_the_recording_ends_in_silence(self, bench, tmp_path):
         bench.world.permanent["recorder.finish"] = lambda: RecordingError("disk full")
         run = run_of(bench, tmp_path)
         with pytest.raises(RecordingError, match="disk full"):
@@ -416,7 +416,7 @@ class TestStopLevels:
         assert took_s == pytest.approx(ramp_s * 49 / 50, abs=1e-3)
         assert_ended_without_a_jump(bench)
 
-    def test_off_switches_the_output_off_before_the_next_read(self, bench, tmp_path):
+    def test_a_stop_at_level_off_acts_before_the_next_read(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.ask(by_operator(StopLevel.OFF))
         before = len(bench.world.calls)
@@ -424,7 +424,7 @@ class TestStopLevels:
         assert bench.world.calls[before][0] == "stop"
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
-    def test_a_harder_stop_takes_over_from_a_slow_ramp(self, bench, tmp_path):
+    def test_a_faster_stop_replaces_a_slow_ramp(self, bench, tmp_path):
         _, shown = self.ended(bench, tmp_path, StopLevel.RAMP, StopLevel.ABORT)
         assert shown[-1].elapsed_s - shown[0].elapsed_s < shortest_ramp_s(bench.rig) + 2 * SLOW.ramp_s / 50
         assert_ended_without_a_jump(bench)
@@ -432,7 +432,7 @@ class TestStopLevels:
             "ramp pressed", "abort pressed"
         ]  # fmt: skip
 
-    def test_a_gentler_stop_does_not_replace_a_harder_one(self):
+    def test_a_slower_stop_does_not_replace_a_faster_one(self):
         switch = StopSwitch()
         switch.ask(StopRequest(Cause.EMERGENCY, StopLevel.ABORT, "first"))
         switch.ask(by_operator(StopLevel.RAMP))
@@ -446,7 +446,7 @@ class TestStopLevels:
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "measured silence" in said
 
-    def test_off_switches_the_output_off_before_the_converter_is_asked(self, bench, tmp_path, monkeypatch):
+    def test_a_stop_at_level_off_acts_before_the_converter_is_queried(self, bench, tmp_path, monkeypatch):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         was_on = []
         waiting = property(lambda _: was_on.append(bench.world.is_on) or 0)
@@ -456,7 +456,7 @@ class TestStopLevels:
         assert was_on
         assert not any(was_on)
 
-    def test_samples_that_wait_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
+    def test_unread_samples_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
         """A busy computer reads five times as fast as real time, and ten seconds are unread."""
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         convert, read = bench.world.convert, bench.digitizer.read
@@ -478,7 +478,7 @@ class TestStopLevels:
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
     @pytest.mark.parametrize("reading_s", [0.0, 0.03, 0.1])
-    def test_a_ramp_takes_its_time_on_a_computer_that_reads_slowly(
+    def test_a_ramp_keeps_its_stairs_on_a_computer_that_reads_slowly(
         self, bench, tmp_path, monkeypatch, reading_s
     ):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
@@ -516,7 +516,7 @@ class TestStopLevels:
         assert "measured silence" in text_of_silence(bench)
 
     @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
-    def test_a_held_run_keeps_its_state_and_continues_there(self, bench, tmp_path, state):
+    def test_a_held_run_keeps_its_setting_and_resumes_in_the_same_state(self, bench, tmp_path, state):
         run = run_of(bench, tmp_path)
         before = upto(run, state)
         run.switch.hold()
@@ -548,7 +548,7 @@ class TestStopLevels:
         assert_ended_without_a_jump(bench)
 
     @pytest.mark.thorough
-    def test_a_hold_ends_after_its_longest_time(self, bench, tmp_path):
+    def test_a_hold_ends_after_the_longest_hold_time(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.hold()
         list(run)
@@ -604,7 +604,7 @@ class TestTheBenchCheck:
         assert loudest == pytest.approx(0.02 * AMPLITUDE_VPP)
 
     @pytest.mark.parametrize("fault", [{"drive_factor": 1.1}, {"base_factor": 1.35}, {"base_factor": 0.75}])
-    def test_small_differences_from_the_configuration_pass(self, bench, tmp_path, fault):
+    def test_the_check_passes_small_differences_from_the_configuration(self, bench, tmp_path, fault):
         for name, value in fault.items():
             setattr(bench.world, name, value)
         run = run_of(bench, tmp_path)

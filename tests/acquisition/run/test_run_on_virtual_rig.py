@@ -65,7 +65,7 @@ def test_the_ramps_rise_and_fall_on_a_half_cosine(virtual_bench, tmp_path):
         np.testing.assert_allclose(levels, heights, atol=2e-3)
 
 
-def test_recorded_noise_is_flat_with_lines_in_whole_periods(virtual_bench, tmp_path):
+def test_recorded_noise_has_a_flat_line_spectrum_in_its_band(virtual_bench, tmp_path):
     noise = WhiteNoise(
         amplitude_vpp=1.0, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1, settle_s=0.2
     )
@@ -84,7 +84,7 @@ def test_recorded_noise_is_flat_with_lines_in_whole_periods(virtual_bench, tmp_p
     assert np.max(lines[900:]) < 0.02 * np.mean(inside)
 
 
-def test_a_recorded_sweep_has_the_cycles_of_the_ideal_one(virtual_bench, tmp_path):
+def test_a_recorded_sweep_has_the_cycles_of_the_ideal_sweep(virtual_bench, tmp_path):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=2, step_s=0.05, settle_s=0.2)
     with measured(virtual_bench, tmp_path, sweep) as recording:
         drive = segment(recording, "sweep")

@@ -236,13 +236,13 @@ def every_third(ways):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("state", "stop"), every_third(list(STOPS)))
-def test_every_stop_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_path, state, stop):
+def test_every_stop_in_every_state_ends_in_silence_with_a_reason(laboratory, tmp_path, state, stop):
     carried_out(laboratory, tmp_path, state, STOPS[stop], "none")
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("state", "fault"), every_third([name for name in FAULTS if name != "none"]))
-def test_every_fault_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_path, state, fault):
+def test_every_fault_in_every_state_ends_in_silence_with_a_reason(laboratory, tmp_path, state, fault):
     carried_out(laboratory, tmp_path, state, STOPS["nothing"], fault)
 
 
@@ -251,7 +251,7 @@ def test_every_fault_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_
     ("state", "stop", "fault"),
     list(itertools.product(STATES, STOPS, FAULTS)),
 )
-def test_every_stop_alone_and_beside_every_fault_in_every_state(laboratory, tmp_path, state, stop, fault):
+def test_every_stop_with_and_without_a_fault_ends_in_silence(laboratory, tmp_path, state, stop, fault):
     carried_out(laboratory, tmp_path, state, STOPS[stop], fault)
 
 
@@ -262,7 +262,7 @@ def test_the_stated_time_of_an_abort_matches_the_shipped_rig(rig):
 @pytest.mark.thorough
 @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.RECORDING, RunState.RAMPING_DOWN])
 @pytest.mark.parametrize("what", ["removed", "moved"])
-def test_a_vanished_folder_leaves_silence_and_a_sentence(laboratory, tmp_path, state, what):
+def test_a_removed_folder_ends_the_run_in_silence_with_an_error(laboratory, tmp_path, state, what):
     virtual, connected = laboratory()
     folder = tmp_path / "recordings"
     folder.mkdir()
@@ -321,7 +321,7 @@ def test_an_abort_of_a_slow_generator_meets_its_time(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_an_abort_at_wall_pace_is_recorded_until_its_silence(rig, tmp_path):
+def test_an_abort_in_real_time_is_recorded_until_the_drive_is_silent(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     with open_bench(on_the_wall) as bench, Run(bench, PLAN, tmp_path / "run.h5") as run:

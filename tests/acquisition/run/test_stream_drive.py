@@ -95,7 +95,7 @@ def assert_faded_without_a_step(bench, ramp=RAMP):
 
 class TestThePlanIsCarriedOut:
     @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_the_drive_is_the_planned_noise_in_segments_of_known_length(
+    def test_streamed_noise_is_played_as_planned_and_recorded_in_segments(
         self, streaming_bench, tmp_path, check
     ):
         shown = list(run_of(streaming_bench, tmp_path, check=check))
@@ -117,7 +117,7 @@ class TestThePlanIsCarriedOut:
         ramps = {"ramp_up": (begin, begin + RAMP), "ramp_down": (end, end + RAMP)}
         assert found == {**ramps, "noise": (noise, end)}
 
-    def test_states_and_settings_match_a_generators_run(self, streaming_bench, tmp_path):
+    def test_a_stream_passes_the_same_states_as_a_run_of_the_generator(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
         settings = {progress.state: progress.amplitude_vpp for progress in run}
         seen = list(settings)
@@ -147,7 +147,7 @@ class TestThePlanIsCarriedOut:
 
 class TestEveryWayOut:
     @every_state
-    def test_a_cancel_fades_after_the_written_samples(self, streaming_bench, tmp_path, state):
+    def test_a_cancel_fades_the_stream_out_after_the_written_samples(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
         shown = upto(run, state)
         run.cancel("the operator pressed stop")
@@ -170,7 +170,7 @@ class TestEveryWayOut:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     @every_state
-    def test_an_exceeded_limit_fades_out_and_is_named(self, streaming_bench, tmp_path, state):
+    def test_an_exceeded_limit_fades_the_stream_out_and_is_named(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.base_factor, streaming_bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
@@ -188,14 +188,14 @@ class TestEveryWayOut:
         assert_faded_without_a_step(streaming_bench)
 
     @heard_state
-    def test_off_discards_written_samples(self, streaming_bench, tmp_path, state):
+    def test_a_stop_at_level_off_discards_samples_already_written(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
         (listened,) = list(run)  # to what is there after the cut: silence
         assert listened.amplitude_vpp == 0.0
         assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
 
-    def test_an_overload_fades_when_the_plan_says_so(self, streaming_bench, tmp_path):
+    def test_an_overload_fades_the_stream_out_if_the_plan_says_so(self, streaming_bench, tmp_path):
         strict = NOISE.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
         run = run_upto(RunState.RECORDING, streaming_bench, tmp_path, strict)
         streaming_bench.world.overloads = (Overload("m0_velocity", 3, 5),)
@@ -235,7 +235,7 @@ class TestEveryWayOut:
         assert world.played > sounding[-1]
 
     @heard_state
-    def test_an_output_that_refuses_samples_is_stopped_at_once(self, streaming_bench, tmp_path, state):
+    def test_a_failed_write_to_the_output_stops_it_at_once(self, streaming_bench, tmp_path, state):
         world = streaming_bench.world
         run = run_upto(state, streaming_bench, tmp_path)
         world.permanent["write"] = lambda: DataLost("the output ran out of samples")

@@ -75,7 +75,7 @@ def one_sentence(failure):
     return text
 
 
-def test_a_limit_passed_while_streaming_fades_out_and_is_named(laboratory, tmp_path):
+def test_an_exceeded_limit_fades_the_output_out_and_is_named(laboratory, tmp_path):
     virtual, connected = laboratory()
     # The noise itself reaches some 100 m/s2: allowed are 736.
     tight = PLAN.model_copy(update={"limits": InRunLimits(base_acceleration=0.05)})
@@ -129,7 +129,7 @@ def test_a_dead_server_plays_at_most_the_written_samples(laboratory, tmp_path):
 @pytest.mark.parametrize(
     ("code", "kind"), [(-200279, DataLost), (-200361, DataLost), (-200284, InstrumentError)]
 )
-def test_failing_inputs_fade_the_output_out(laboratory, tmp_path, code, kind):
+def test_a_failing_input_fades_the_output_out(laboratory, tmp_path, code, kind):
     virtual, connected = laboratory()
     fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
     with bench_on(connected) as bench:

@@ -109,7 +109,7 @@ def test_the_check_at_low_level_plays_through_the_output(streamed):
     assert streamed.state is RecordingState.COMPLETE
 
 
-def test_the_recording_names_its_output(streamed):
+def test_the_recording_names_its_analogue_output(streamed):
     assert "analogue output" in streamed.log
     assert streamed.output.startswith("Dev1/ao0 of Dev1: USB-4431")
 

@@ -21,7 +21,7 @@ def resident_mb():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_ten_minutes_lose_no_sample_and_take_no_more_memory_than_one(tmp_path):
+def test_a_ten_minute_recording_loses_no_sample_and_memory_stays_constant(tmp_path):
     memory_mb = []
 
     def watch(progress):

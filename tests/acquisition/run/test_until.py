@@ -67,7 +67,7 @@ def test_a_dwell_ends_when_its_response_meets_the_bound(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_an_unmet_bound_ends_at_the_longest_time(rig, tmp_path):
+def test_a_dwell_with_an_unmet_bound_ends_at_its_longest_time(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=3)
     outcome, recording, _ = measured(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))
     with recording:
@@ -79,7 +79,7 @@ def test_an_unmet_bound_ends_at_the_longest_time(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_each_step_ends_when_its_bound_is_met(rig, tmp_path):
+def test_each_frequency_step_ends_when_its_bound_is_met(rig, tmp_path):
     steps = SteppedSine(amplitude_vpp=0.1, frequencies_hz=(150, 160), settle_s=0.3, record_s=60)
     _, recording, _ = measured(rig, tmp_path, steps, Until(response_ii=0.02, shortest_s=1.0))
     with recording:
@@ -145,7 +145,7 @@ def test_a_stop_ends_a_recording_with_until(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_the_recording_continues_when_the_analysis_has_died(rig, tmp_path, monkeypatch):
+def test_the_recording_continues_if_the_analysis_process_dies(rig, tmp_path, monkeypatch):
     began = UntilWatch.wait_until_ready
 
     def kill_when_ready(watch, switch):
@@ -171,6 +171,6 @@ def test_the_recording_continues_when_the_analysis_has_died(rig, tmp_path, monke
         ({"response_i": 0.5}, "not within 20 s"),
     ],
 )
-def test_the_remaining_time_is_predicted_by_the_root_of_time(bounds, said):
+def test_the_remaining_time_assumes_a_bound_proportional_to_1_over_sqrt_time(bounds, said):
     progress = UntilNote(stretch=1, wishes={"response_i": 0.01}, bounds=bounds, looked_s=4.0, longest_s=20.0)
     assert said in progress.sentence
