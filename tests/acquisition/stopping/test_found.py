@@ -96,7 +96,7 @@ def test_an_announcement_is_restored_after_the_state_folder_was_emptied(own_stat
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
 
 
-def test_leftovers_of_a_killed_program_are_removed_by_the_next_one():
+def test_the_next_program_removes_files_left_by_a_killed_program():
     script = (
         "from vibench.acquisition import *; a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
     )

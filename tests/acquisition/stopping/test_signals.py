@@ -72,7 +72,7 @@ def test_a_second_ctrl_z_does_not_stop_harder(default, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_a_nested_run_takes_the_signal(default, tmp_path, monkeypatch):
+def test_a_signal_stops_the_innermost_of_two_nested_runs(default, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     outer, inner = StopSwitch(), StopSwitch()
     with stop_on_signal(outer, "campaign"), stop_on_signal(inner, "dwell"):
