@@ -71,7 +71,7 @@ DONE = "✔"
 
 
 class NavigationBar(QListWidget):
-    """List of the pages; selecting one shows it."""
+    """List of the pages; selecting a page shows it."""
 
     chosen = Signal(str)
 
@@ -136,7 +136,7 @@ SPAN_S = 1.0
 MOST_DROPPED = 20
 """Most files opened by one drop."""
 TICK_MS = 50
-"""Interval between updates [ms]; a shorter one would use a whole core, a longer one looks jerky."""
+"""Interval between updates [ms]; a shorter interval would use a whole core, a longer one looks jerky."""
 
 
 class Window(QMainWindow):
@@ -364,7 +364,7 @@ class Window(QMainWindow):
         act(path)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accept a drag that holds files."""
+        """Accept a drag that contains files."""
         if event.mimeData().hasUrls():
             event.acceptProposedAction()
 

@@ -1,5 +1,5 @@
 """The simulated DAQ: NI's DAQmx service over gRPC, for the unmodified nidaqmx.
 
-Devices, tasks, channels, timing, attributes, events and errors as the driver reports them, and the passing of
-rig time: on demand or in real time. The device table names its sources.
+It has devices, tasks, channels, timing, attributes, events and errors as the real driver reports them. Rig
+time advances on demand or in real time. The device table names its sources.
 """

@@ -48,7 +48,7 @@ class Timing:
 
     @property
     def total(self) -> float:
-        """Samples to acquire, or infinity."""
+        """Number of samples to acquire; infinite for a continuous task."""
         return self.samples if self.mode is AcquisitionType.FINITE else math.inf
 
     def verify_reference(self) -> None:
@@ -117,7 +117,7 @@ class Stream:
 
 
 class Acquisition(Stream):
-    """Acquired samples [V], and those that the program has not read."""
+    """A running acquisition, with the samples that the program has not read yet [V]."""
 
     def __init__(
         self,
@@ -159,7 +159,7 @@ class Acquisition(Stream):
 
     @property
     def awaits_trigger(self) -> bool:
-        """Whether the reference trigger has not come yet; until then only the newest samples are kept."""
+        """Whether the reference trigger is still awaited; until then only the newest samples are kept."""
         return self._reference is not None and self._is_open and self.total == math.inf
 
     @property

@@ -53,7 +53,7 @@ class Group:
     name: str
     """Prefix of the property names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], Sequence[Any]]
-    """Returns the objects of a request: the first one is read, all of them are set."""
+    """Function that returns the objects of a request; a query reads the first, setting applies to all."""
     attributes: Callable[[Any], Attributes]
     is_set_at_rest: bool = False
     """Whether these properties cannot be set while the task runs."""

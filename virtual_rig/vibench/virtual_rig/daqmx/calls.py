@@ -35,7 +35,7 @@ from .tasks import Task
 
 
 class DaqmxSystem:
-    """State of the driver; callers hold the rig's lock."""
+    """State of the driver; the caller must hold the rig's lock."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -76,7 +76,7 @@ class DaqmxSystem:
     # --- devices -------------------------------------------------------------------------
 
     def device(self, name: str) -> Device:
-        """Return a device by its name or that of a channel on it (-200220 if there is none)."""
+        """Return a device by its name or the name of one of its channels (-200220 if there is none)."""
         device = self.catalogue.find(name.strip("/").partition("/")[0])
         if device is None:
             known = ", ".join(known.name for known in self.catalogue.devices)
@@ -109,7 +109,7 @@ class DaqmxSystem:
 
 
 def _with_devices(names: Iterable[str]) -> Iterable[str]:
-    """Add the device to names without one: in ``"Dev1/ai0, ai2"`` both channels are on Dev1."""
+    """Add the device to names without a device: in ``"Dev1/ai0, ai2"`` both channels are on Dev1."""
     device = ""
     for name in names:
         if "/" in name.strip("/"):
@@ -128,7 +128,7 @@ NOTHING: Fields = {}
 
 
 def pick(request: Any, field: str) -> int:
-    """Return an enum of a request: the raw number if given, else the named value."""
+    """Return the number of an enum in a request: the raw number if given, else the named value."""
     return int(getattr(request, f"{field}_raw") or getattr(request, field))
 
 

@@ -143,7 +143,7 @@ def _expand_one(part: str) -> Iterable[str]:
 
 
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of virtual channels: the physical names if none is given, else the given ones.
+    """Return the names of virtual channels: the given names, or the physical names if none is given.
 
     ``given`` is a list or range with one name per channel, or one name to which numbers are added.
     """

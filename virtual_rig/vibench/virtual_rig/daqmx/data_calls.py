@@ -165,7 +165,7 @@ def _await_samples(task: Task, acquisition: Acquisition, end: int, deadline_s: f
 def write(task: Task, volts: NDArray[np.float64], request: Any) -> Fields:
     """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
-    ``request`` has the timeout, and says whether a stopped task is started.
+    ``request`` gives the timeout, and whether a stopped task is started.
     Raises DaqmxRefusal: -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full
     buffer, -200290 after an underflow.
     """
@@ -240,7 +240,7 @@ def _await_space(task: Task, generation: Generation, samples: int, deadline_s: f
 
 
 _SECONDS_1904_TO_1970 = 2_082_844_800
-"""NI's time stamps count from 1904."""
+"""Seconds from 1904, where NI's time stamps start, to 1970."""
 
 
 def _read_scaled(system: DaqmxSystem, request: Any) -> Fields:
@@ -280,7 +280,7 @@ def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMod
 def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
     reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
-    if reading.status:  # the caller cannot use a part
+    if reading.status:  # the caller cannot use a part of the requested samples
         raise DaqmxRefusal(reading.status, samples_read=reading.samples)
     size = task.inputs[0].raw_bits // 8
     raw = np.ascontiguousarray(_counts(task, reading).T).astype(f"<i{size}").tobytes()

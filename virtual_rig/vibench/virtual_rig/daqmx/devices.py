@@ -19,7 +19,7 @@ _NI_9234_MAX_DIVISOR = 31
 _M_SERIES_TIMEBASE_HZ = 20e6
 
 _ROUNDING = 1e-12
-"""A rate that is read back and set again must not change to the next one."""
+"""Relative tolerance, so that a rate that is read back and set again does not change to the next rate."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class AnyRate:
 
 @dataclass(frozen=True)
 class DividedRate:
-    """A clock divided by an integer; a requested rate is rounded up to the next possible one."""
+    """A clock divided by an integer; a requested rate is rounded up to the next possible rate."""
 
     clock_hz: float
     minimum_hz: float

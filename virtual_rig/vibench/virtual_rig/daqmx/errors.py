@@ -35,7 +35,7 @@ Member = TypeVar("Member", bound=Enum)
 
 
 def member(kind: type[Member], code: int, property_name: str) -> Member:
-    """Return the member of an NI enum for a number in a request; unknown ones are refused (-200077)."""
+    """Return the member of an NI enum for a number in a request; unknown numbers are refused (-200077)."""
     try:
         return kind(code)
     except ValueError:

@@ -13,7 +13,7 @@ from .devices import AnalogOutputs
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
-"""Time by which samples are passed to the world in advance [s]: avoids gaps, yet plays new data soon."""
+"""Lead of samples passed to the world [s]: long enough to avoid gaps, short enough to play new data soon."""
 
 
 class OutputBuffer:
@@ -32,7 +32,7 @@ class OutputBuffer:
 
     @property
     def filled(self) -> int:
-        """Number of samples repeated by a regeneration."""
+        """Number of samples in the buffer, which a regeneration repeats."""
         return min(self.written, self.size)
 
     def grow(self, count: int) -> None:
@@ -46,12 +46,12 @@ class OutputBuffer:
         self.written += volts.shape[1]
 
     def cyclic(self, first: int, count: int) -> NDArray[np.float64]:
-        """Return ``count`` samples from number ``first`` on; the filled part repeats for ever."""
+        """Return ``count`` samples from number ``first`` on; the filled part repeats endlessly."""
         return self._ring[:, (first + np.arange(count)) % self.filled]
 
 
 class Generation(Stream):
-    """The played samples, and those that wait in the buffer and in the device."""
+    """A running generation: played samples, and samples that wait in the buffer and in the device."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class Generation(Stream):
         self._world = world
         self._outputs = outputs
         self.repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
-        """Whether the buffer is played again and again; if not, every sample is played once."""
+        """Whether the buffer is played repeatedly; if not, every sample is played once."""
         self._idle = device.idle
         self._memory = np.empty((len(outputs), 0))
         """Samples in the device's memory; a repeated buffer is not transferred ahead."""

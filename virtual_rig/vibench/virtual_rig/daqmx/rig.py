@@ -38,7 +38,7 @@ YIELD_S = 1e-4
 class Rig:
     """Advances the world and all running tasks together.
 
-    ``changed`` guards tasks and trigger lines. The world has its own lock, because others use it too.
+    ``changed`` guards tasks and trigger lines. The world has its own lock, because other threads use it too.
     """
 
     def __init__(self, world: World, pace: "Pace", catalogue: Catalogue) -> None:
@@ -114,7 +114,7 @@ class Rig:
         self.changed.notify_all()
 
     def reserve(self, resource: str, task: Any) -> None:
-        """Reserve one side of a device for a task (-50103 if another one has it)."""
+        """Reserve the inputs or outputs of a device for a task (-50103 if another task has them)."""
         other = self._holders.setdefault(resource, task)
         if other is not task:
             detail = f"Resource: {resource}, held by task {other.name}\nTask Name: {task.name}"
@@ -143,7 +143,7 @@ class Rig:
         }
 
     def edge(self, terminal: str) -> None:
-        """Raise a terminal, and start everything that waits for it."""
+        """Apply a rising edge to a terminal, and call all functions that wait for it."""
         for begin in self._armed.pop(terminal.lower(), []):
             begin()
         self.changed.notify_all()
@@ -172,7 +172,7 @@ class OnDemandPace:
         """Advance time at once; wait only for events from other calls, such as a trigger.
 
         ``until_s`` is the rig time at which ``is_there()`` is expected, infinite if other calls decide;
-        ``deadline_s`` is a time of the monotonic clock. Return whether it became true.
+        ``deadline_s`` is a time of the monotonic clock. Return whether ``is_there()`` became true.
         """
         if is_there():
             return True
@@ -219,11 +219,11 @@ class WallPace:
             self._thread.join()
 
     def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:  # noqa: ARG002 - this clock needs no hint
-        """Wait for the clock."""
+        """Wait until ``is_there()`` or the deadline; return whether it became true."""
         self._step(rig)
         return is_there() or _wait(rig, is_there, deadline_s)
 
-    def pass_time(self, rig: "Rig", duration_s: float) -> None:  # noqa: ARG002 - it passes by itself
+    def pass_time(self, rig: "Rig", duration_s: float) -> None:  # noqa: ARG002 - time passes by itself
         """Advance the rig to the clock."""
         self._step(rig)
 

@@ -54,11 +54,11 @@ def _refuse(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG00
 
 
 LOOPBACK = "127.0.0.1:0"
-"""This computer only, on a free port, because the server has no passwords."""
+"""Default address: this computer only, because the server has no passwords, and a free port."""
 
 LAST_PORT = 65_535
 _WORKERS = 64
-"""Threads: each blocking read and each event listener needs one."""
+"""Number of threads; each blocking read and each event listener needs one."""
 
 LONGEST_REQUEST_BYTES = 64_000_000
 """Largest request: eight million output samples, which is 40 s at the highest rate."""
@@ -74,7 +74,7 @@ Metadata = tuple[tuple[str, str], ...]
 
 
 class DaqServer:
-    """Server of the simulated DAQmx system; leaving it deletes every task and ends every thread.
+    """Server of the simulated DAQmx system; leaving its context deletes every task and ends every thread.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class DaqServer:
             self._rig.advance_to(self._rig.now_s + duration_s)
 
     def edge(self, terminal: str) -> None:
-        """Raise a terminal, such as ``"/Dev1/PFI0"``, and start what waits for it."""
+        """Apply a rising edge to a terminal, such as ``"/Dev1/PFI0"``, and start the waiting tasks."""
         with self._rig.changed:
             self._rig.edge(terminal)
 
@@ -174,7 +174,7 @@ class DaqServer:
         return handle
 
     def _check_faults(self, name: str) -> None:
-        """Raise an error if a rule applies. The first failure takes no rig time; repeated ones do.
+        """Raise an error if a rule applies. The first failure takes no rig time; repeated failures do.
 
         Successful calls take no time, because readers would otherwise fall behind.
         """

@@ -76,7 +76,7 @@ _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), 
 
 
 class TaskState(IntEnum):
-    """States of a task (NI-DAQmx Help, "Task State Model"); each includes the previous ones."""
+    """States of a task (NI-DAQmx Help, "Task State Model"); each state includes the previous states."""
 
     UNVERIFIED = 0
     VERIFIED = 1
@@ -137,7 +137,7 @@ class Task:
 
     @property
     def rate_hz(self) -> float:
-        """Effective rate, the next possible one above the requested [Hz]; -200077 out of range."""
+        """Effective rate [Hz]: the requested rate, rounded up to a possible one; -200077 out of range."""
         side, requested_hz = self.side, self.timing.requested_hz
         is_shared = isinstance(side, AnalogInputs) and side.is_multiplexed
         highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
@@ -198,7 +198,7 @@ class Task:
         return "" if is_own else source.replace("SampleClock", "StartTrigger")
 
     def find(self, names: str) -> list[Channel]:
-        """Return the channels in a list of names; all of them for an empty list."""
+        """Return the channels in a list of names; all channels for an empty list."""
         if not names:
             return self.channels
         by_name = {channel.name.lower(): channel for channel in self.channels}
@@ -310,7 +310,7 @@ class Task:
 
     @property
     def output_buffer(self) -> OutputBuffer:
-        """Return the output buffer, created at first use."""
+        """The output buffer, created at first use."""
         if self.buffer is None:
             self.buffer = OutputBuffer(len(self.outputs), self.output_size)
         return self.buffer
@@ -339,12 +339,12 @@ class Task:
             self.rig.arm(self.timing.reference.terminal, self._reference_edge)
 
     def _reference_edge(self) -> None:
-        """Apply an edge to the reference trigger; an early one is ignored."""
+        """Apply an edge to the reference trigger; an edge that comes too early is ignored."""
         if self.acquisition is not None and not self.acquisition.trigger():
             self._await_reference_edge()
 
     def await_reference(self, deadline_s: float) -> bool:
-        """Wait for a reference trigger up to the deadline; return whether none is awaited any more."""
+        """Wait for a reference trigger until the deadline; return False if it is still awaited then."""
         acquisition = self.acquisition
         if acquisition is None:
             return True

@@ -224,7 +224,7 @@ def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> byte
 
 
 def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    """Parse ``31DEG`` or radians; the phase is truncated to degrees, a negative one is refused."""
+    """Set the phase from ``31DEG`` or radians; it is truncated to degrees, and must not be negative."""
     full_turn_deg = 360.0
     angle, unit = scpi.number_and_unit(only(parameters))
     if unit not in ("", "RAD", "DEG"):
@@ -361,5 +361,5 @@ COMMANDS = (
     Command("DATA:COPY", "IVI, drivers", _copy_memory, None),
     report("DATA:CATalog", "IVI, drivers", _catalogue),
 )
-"""Commands of an AFG1022 besides the common ones and `LOAD`."""
+"""Commands of an AFG1022, except the common commands and `LOAD`."""
 # fmt: on

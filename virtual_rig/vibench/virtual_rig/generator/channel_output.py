@@ -32,7 +32,7 @@ from .terminal_voltage import (
 LOWEST_FREQUENCY_HZ = 1e-6
 LOWEST_BURST_FREQUENCY_HZ = 2e-3
 OPEN_AMPLITUDE_RANGE_VPP = (2e-3, 20.0)
-"""Open circuit; 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
+"""Amplitude limits in open circuit: 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
 OPEN_PEAK_V = 10.0
 """Largest |offset| + amplitude/2 in open circuit, the stricter of the two published values."""
 _PEAK_ROUNDING_V = 1e-9
@@ -55,7 +55,7 @@ class RunMode(StrEnum):
 
 
 MODULATIONS = tuple(RunMode)[3:]
-"""Modulations may be on from the panel, and SCPI can switch them off; their effect is not simulated."""
+"""Modulations, which SCPI can switch off but not on; their effect on the output is not simulated."""
 
 
 SINE, SQUARE, RAMP, PULSE, NOISE, DC = "SIN", "SQU", "RAMP", "PULS", "PRN", "DC"
@@ -68,7 +68,7 @@ _WORDS = {
     "PRNO": NOISE,
     "DC": DC,
 }
-"""Shapes without a memory; PRNO is a spelling of public drivers."""
+"""Shapes without a memory; PRNO is the spelling in public drivers."""
 _HIGHEST_FREQUENCY_HZ = {SINE: 25e6, SQUARE: 12.5e6, PULSE: 12.5e6, RAMP: 1e6, NOISE: 25e6, DC: 1e6}
 
 

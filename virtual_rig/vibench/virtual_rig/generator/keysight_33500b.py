@@ -26,7 +26,7 @@ from .phase_course import Spacing
 from .scpi_instrument import Command, Parameters, Quirks, choice, none, number, only, switch
 
 TOP_CODE = 65_534
-"""Codes -32767 to 32767, shifted to start at zero."""
+"""Largest code; the codes -32767 to 32767 are shifted to start at zero."""
 _MIDDLE = 32_767
 POINTS = (8, 1_048_576)
 HIGHEST_RATE_HZ = 250e6

@@ -64,7 +64,7 @@ class Spacing(StrEnum):
 
 @dataclass(frozen=True)
 class SweptPhase:
-    """One triggered sweep: start frequency before it, then a hold at the stop frequency, then start again."""
+    """One triggered sweep and a hold at the stop frequency; before and after, the start frequency."""
 
     start_hz: float
     stop_hz: float
@@ -107,7 +107,7 @@ class SweptPhase:
         return _fraction(cycles[:-1]), np.diff(cycles)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return start, end and return of the sweep, and times between them where the phase is curved."""
+        """Return begin and end of sweep and hold, and times during the sweep where the phase is curved."""
         end_of_sweep_s = self.begin_s + self.sweep_s
         corners = np.array([self.begin_s, end_of_sweep_s, end_of_sweep_s + self.hold_s])
         corners = corners[(corners > begin_s) & (corners < end_s)]
@@ -129,6 +129,6 @@ PhaseCourse = SteadyPhase | SweptPhase
 
 
 def _fraction(cycles: Samples) -> Samples:
-    """Return the fractional part, strictly below one (a tiny negative number would round up to it)."""
+    """Return the fractional part, strictly below one (a tiny negative number would round up to one)."""
     fraction = cycles - np.floor(cycles)
     return np.asarray(np.where(fraction >= 1.0, 0.0, fraction))

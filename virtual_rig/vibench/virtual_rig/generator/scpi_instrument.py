@@ -174,11 +174,11 @@ class Quirks:
     high_impedance_has_ohm_sign: bool = True
     """``OUTP:IMP?`` at high impedance answers ``9.9E+37`` and an ohm sign in GBK, which is not ASCII."""
     unknown_is_syntax_error: bool = True
-    """An unknown command queues -102; an unknown query also answers an empty line (else -113, silence)."""
+    """An unknown command queues -102; an unknown query also answers an empty line (else -113, no reply)."""
     out_of_range_becomes_default: bool = True
     """A number out of range silently sets the parameter's default (else -222, setting unchanged)."""
     panel_load_ohm: float | None = None
-    """Load set at the front panel if there is no ``OUTP:IMP`` (one driver's report); None if there is."""
+    """Load set at the panel [ohm], for a unit without ``OUTP:IMP`` (one driver's report); else None."""
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ class ScpiInstrument:
         """Restore the defaults."""
 
     def trigger(self) -> None:
-        """Start whatever waits for a bus trigger."""
+        """Start the output that waits for a bus trigger (``*TRG``)."""
 
     def _answers(self, message: bytes) -> list[bytes]:
         """Execute all units of a message in order and return the replies."""
@@ -285,7 +285,7 @@ class ScpiInstrument:
                 self.status.report(error.code)
                 continue
             room -= sum(map(len, found))
-            if found and room < 0:  # nobody can read replies before the message ends (IEEE 488.2, 6.3.1.7)
+            if found and room < 0:  # replies cannot be read before the message ends (IEEE 488.2, 6.3.1.7)
                 answers.clear()
                 self.status.report(scpi.ErrorCode.QUERY_DEADLOCKED)
         return answers
@@ -417,7 +417,7 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
         def _answer(self, message: bytes) -> None:
             reply = device.execute(message)
             if reply.delay_s and closing.wait(reply.delay_s):
-                return  # the server closed while the message was executed
+                return  # the server closed during the delay
             if reply.data:
                 # A disconnected client needs no reply.
                 with suppress(ConnectionError):

@@ -141,7 +141,7 @@ class Unit:
     """One command or query of a message, as written."""
 
     header: str
-    """``"SOUR1:FREQ"`` without the question mark, not yet resolved."""
+    """Header as sent, such as ``"SOUR1:FREQ"``, without the question mark."""
     asks: bool
     parameters: tuple[bytes, ...]
     """Raw parameters without surrounding white space; a block keeps its ``#`` header."""
@@ -357,7 +357,7 @@ Codes = NDArray[np.uint16]
 FEWEST_POINTS = 2
 MOST_POINTS = 8192
 TOP_CODE = 16383
-"""14 bits (Tektronix AFG1000 IVI driver tkafg1k; confirmed by read-back in public drivers)."""
+"""Largest code of 14 bits (IVI driver tkafg1k of Tektronix; public drivers read it back)."""
 USER_MEMORIES = 256
 EDIT_MEMORY = "EMEM"
 _MIDDLE_CODE = 8191
@@ -405,7 +405,7 @@ class ArbitraryMemory:
         return (EDIT_MEMORY, *sorted(users, key=lambda name: int(name.removeprefix("USER"))))
 
     def hold(self, codes: Codes) -> None:
-        """Store codes in the edit memory, whatever the range of the generator."""
+        """Store codes in the edit memory, without checking their range."""
         self._checked_length(len(codes))
         self._store(EDIT_MEMORY, codes)
 

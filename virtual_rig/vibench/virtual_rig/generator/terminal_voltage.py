@@ -1,7 +1,7 @@
 """Exact mean voltage at the generator's terminal over consecutive intervals.
 
-A timeline of immutable signals, each valid from the time of its command. Signals are functions of the
-generator's own time, so block sizes do not affect the samples.
+The output is a timeline of immutable signals, each valid from the time of its command. Signals are functions
+of the generator's own time, so block sizes do not affect the samples.
 """
 
 from bisect import bisect_right
@@ -228,7 +228,7 @@ class Timeline:
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> float:
-        """Return when a command acts that arrives at ``time_s``: not before the end of the rendered part."""
+        """Return when a command from ``time_s`` acts, which is not before the end of the rendered part."""
         return max(time_s, self._end_s, self._since_s[-1])
 
     def own_time(self, time_s: float) -> float:
@@ -250,7 +250,7 @@ class Timeline:
         if count == 0:
             return volts
         noise = self._noise(count)
-        # Remove signals that ended before a rig time.
+        # Remove signals that ended before the first interval.
         ended = max(bisect_right(self._since_s, edges_s[0]) - 1, 0)
         del self._since_s[:ended], self._signals[:ended]
         until = [*self._since_s[1:], np.inf]
@@ -297,7 +297,7 @@ class Timeline:
         return drawn[skip : skip + count]
 
     def _draw(self, block: int) -> Samples:
-        """Return a block of unit noise; the last one is cached."""
+        """Return a block of unit noise; the last block is cached."""
         if self._noise_block[0] != block:
             generator = np.random.default_rng((self.terminal.seed, block))
             self._noise_block = block, generator.standard_normal(NOISE_BLOCK)
@@ -317,6 +317,6 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     # Coinciding edges give empty intervals without weight.
     result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
     whole = interval[pieces[interval] == 1]
-    # The mean of an undivided interval must not depend on divisions of others, not even in the last bit.
+    # Divisions of other intervals must not change the mean of an undivided one, not even in the last bit.
     result[whole] = means[pieces[interval] == 1]
     return np.asarray(result, dtype=np.float64)

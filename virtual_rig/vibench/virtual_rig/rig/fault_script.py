@@ -1,4 +1,4 @@
-"""Faults of the virtual rig, on demand or by a script of rig times, to rehearse a long campaign in minutes.
+"""Faults of the virtual rig, on demand or at the rig times of a script, to rehearse a long campaign.
 
 ::
 
@@ -31,7 +31,7 @@ DROPOUT_LEVEL = 0.0
 OVER_RANGE_LEVEL = 1.0
 Heal = Callable[[], None]
 """Function that ends one fault."""
-# Calls at which a program first accesses the device: setting a task's clock, and starting it.
+# Calls at which a program first accesses the device: setting a task's clock, and starting the task.
 _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
 
@@ -147,19 +147,19 @@ class RigFaults:
         return self._until(lambda: self._world.connect(channel))
 
     def overrun(self) -> Heal:
-        """Overwrite the converter's buffer before it is read."""
+        """Make reads fail as if the converter's buffer had been overwritten before it was read."""
         code = DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE.value
         return self._in_force(*(Fault(call, code) for call in _READS))
 
     def reserve_device(self) -> Heal:
-        """Reserve the converter for another program: running tasks continue, new ones are refused."""
+        """Reserve the converter for another program: running tasks continue, new tasks are refused."""
         code = DAQmxErrors.PAL_RESOURCE_RESERVED.value
         return self._in_force(*(Fault(call, code) for call in _RESERVING))
 
     def fail_daq(self, call: str, code: int) -> Heal:
         """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
 
-        A fault of one call that reads samples applies to all of them, because a driver may use any.
+        A fault of one call that reads samples applies to all such calls, because a driver may use any one.
         """
         calls = _READS if call in _READS else (call,)
         return self._in_force(*(Fault(each, code) for each in calls))
@@ -169,7 +169,7 @@ class RigFaults:
         return self._in_force(ServerGone())
 
     def fill_disk(self, refusals: int | None = None) -> Heal:
-        """Make recording writes of this process fail as on a full disk: this many, or until healed."""
+        """Make writes of recordings fail as on a full disk, ``refusals`` times or until the fault ends."""
         return self._until(self._disk.fill() if refusals is None else self._disk.fill(refusals))
 
     def slow_disk(self, delay_s: float) -> Heal:
@@ -197,7 +197,7 @@ class ScriptedFault(FrozenModel):
     fault: str
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Start the fault; return what ends it."""
+        """Start the fault; return the function that ends it."""
         parameters = {name: getattr(self, name) for name in type(self).__annotations__ if name != "fault"}
         heal: Heal = getattr(rig, self.fault)(**parameters)
         return heal
@@ -259,7 +259,7 @@ class Disconnect(ScriptedFault):
 
     fault: Literal["disconnect"]
     channel: str
-    """``"cDAQ1Mod1/ai2"``."""
+    """Name of the input, such as ``"cDAQ1Mod1/ai2"``."""
 
 
 class FailDaq(ScriptedFault):
@@ -275,7 +275,7 @@ class FillDisk(ScriptedFault):
 
     fault: Literal["fill_disk"]
     refusals: PositiveInt | None = None
-    """Number of failing writes; absent: until healed."""
+    """Number of failing writes; absent: until the fault ends."""
 
 
 class SlowDisk(ScriptedFault):

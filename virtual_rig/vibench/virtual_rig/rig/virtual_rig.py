@@ -40,7 +40,7 @@ class DiskFaults(Enum):
     PLAYED = auto()
     """This process records; the faults act on its disk."""
     REFUSED = auto()
-    """Another process records; its disk cannot be given faults."""
+    """Another process records; this process cannot cause faults on its disk."""
 
 
 class VirtualRig:
@@ -193,7 +193,7 @@ class _Running:
 
 
 def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
-    """Return the simulated controller, a `ScpiDevice` with a `ClosedLoop` as ``cables``; None without one."""
+    """Return the simulated controller: a `ScpiDevice` with a `ClosedLoop` as ``cables``, or None."""
     if rig.controller is None:
         return None
     simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")

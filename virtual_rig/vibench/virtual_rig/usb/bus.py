@@ -1,4 +1,4 @@
-"""A USB bus in memory, whose devices any program that uses pyvisa-py or PyUSB finds.
+"""A USB bus in memory; any program that uses pyvisa-py or PyUSB finds its devices.
 
 For a generator in another process, one line before (or after) pyvisa opens its resource manager is enough::
 

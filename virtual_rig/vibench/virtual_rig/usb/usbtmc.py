@@ -165,8 +165,8 @@ class UsbTmcInstrument:
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Return the requested reply (3.3), or time out.
 
-        A read without a query queues -420 and times out. A reply that is later than the timeout remains, with
-        its delay reduced by the timeout.
+        A read without a query queues -420 and times out. A reply that is later than the timeout stays
+        pending, with its delay reduced by the timeout.
         """
         with self._lock:
             self._check_cable()
@@ -214,7 +214,7 @@ class UsbTmcInstrument:
             self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
 
     def _transfer(self, request: _Request) -> bytes:
-        """Return a transfer with the requested part of the reply; the last one has the end-of-message bit."""
+        """Return a transfer with the requested part of the reply; the last part has the end bit."""
         end = min(request.length, len(self._flight.reply))
         if request.terminator:
             found = self._flight.reply.find(request.terminator, 0, end)
@@ -232,7 +232,7 @@ class UsbTmcInstrument:
         return transfer
 
     def abort_bulk_in(self, tag: int) -> bytes:
-        """Abort a transfer for which the host has stopped waiting; the reply remains."""
+        """Abort a transfer for which the host has stopped waiting; the reply stays pending."""
         if self._flight.request is None or self._flight.request.tag != tag:
             return bytes([TRANSFER_NOT_IN_PROGRESS, 0])
         self._flight.request = None
@@ -260,4 +260,4 @@ _REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
     4: lambda *_: bytes([SUCCESS, *bytes(7)]),  # CHECK_ABORT_BULK_IN_STATUS, 4.2.1.5: always complete
     7: lambda *_: _CAPABILITIES,  # GET_CAPABILITIES, 4.2.1.8
 }
-"""Class requests used by pyvisa (table 15), by number; each receives the tag. Others stall."""
+"""Class requests used by pyvisa (table 15), by number; each receives the tag. Other requests stall."""

@@ -42,7 +42,7 @@ _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Smallest delay of a channel (an advance) for which the filter needs no future means."""
+"""Smallest delay of a channel for which the filter needs no future means [steps]; negative: an advance."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ AC_CUT_HZ = 0.5
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder, at which an excitation current causes a voltage."""
+"""Output resistance of generator, divider and decoder; an excitation current causes a voltage at it."""
 COMPLIANCE_V = 19.0
 """Voltage of an open input with excitation."""
 OVER_RANGE = 1.02

@@ -115,7 +115,7 @@ class LowPass:
     """An analogue all-pole low-pass of unit gain at zero hertz."""
 
     poles: tuple[complex, ...]
-    """In the left half plane, complex ones in pairs [rad/s]."""
+    """Poles in the left half plane, complex poles in conjugate pairs [rad/s]."""
 
     @property
     def delay_s(self) -> float:
@@ -123,18 +123,18 @@ class LowPass:
         return float(-sum(1 / pole for pole in self.poles).real) if self.poles else 0.0
 
     def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the complex gain, shape of ``frequency_hz``."""
+        """Return the complex gain, with the shape of ``frequency_hz``."""
         s = 2j * np.pi * np.asarray(frequency_hz)
         return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
 
 
 def first_order(cut_hz: float) -> LowPass:
-    """Return one real pole, -3 dB at ``cut_hz``."""
+    """Return a low-pass with one real pole, -3 dB at ``cut_hz``."""
     return LowPass((complex(-2 * np.pi * cut_hz),))
 
 
 def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
-    """Return the response of a mass on a spring."""
+    """Return the low-pass response of a mass on a damped spring."""
     omega = 2 * np.pi * resonance_hz
     imaginary = omega * np.sqrt(1 - damping_ratio**2)
     pole = complex(-damping_ratio * omega, imaginary)
@@ -155,8 +155,8 @@ def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
     """Return a low-pass filter for a grid of ``step_s``, initially at rest.
 
     The poles are mapped exactly (z = exp(s T)), so a resonance keeps its frequency even close to the grid's
-    Nyquist frequency. A resonance beyond it is omitted, as it would appear at another frequency. The zeros
-    are a least-squares fit to the complex analogue response, with exact gain at zero frequency.
+    Nyquist frequency. A resonance above Nyquist is omitted, as it would appear at another frequency. The
+    zeros are a least-squares fit to the complex analogue response, with exact gain at zero frequency.
     """
     poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
     denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
@@ -172,7 +172,7 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
     total = denominator.sum()
     reduced = powers[:, 1:] - powers[:, :1]
     remainder = target - total * powers[:, 0]
-    weight = (1 / frequency_hz)[:, np.newaxis]  # errors count as delays, equally at all frequencies
+    weight = (1 / frequency_hz)[:, np.newaxis]  # phase errors count as delays, equally at all frequencies
     matrix = np.concatenate([reduced.real * weight, reduced.imag * weight])
     aim = np.concatenate([remainder.real * weight[:, 0], remainder.imag * weight[:, 0]])
     weights, *_ = np.linalg.lstsq(matrix, aim)
@@ -193,11 +193,11 @@ class SensorParts:
 
     filter: RecursiveFilter
     noise: FloatArray
-    """In units of the motion, shape (steps,)."""
+    """Noise in units of the motion, shape (steps,)."""
     instead: FloatArray
     """Values that replace the motion except where they are NaN, in its units; empty if there are none."""
     full_scale: float
-    """In units of the motion."""
+    """Full scale in units of the motion."""
     full_scale_v: float
 
     def showing(self, motion: FloatArray, volts: FloatArray) -> Structure:

@@ -21,7 +21,7 @@ class Signal(IntEnum):
 
 
 class Coupling(StrEnum):
-    """How an input is coupled."""
+    """Coupling of an input."""
 
     AC = "AC"
     DC = "DC"

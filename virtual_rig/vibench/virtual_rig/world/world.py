@@ -38,7 +38,7 @@ from .wiring import OPEN_INPUT, Cable, Input, Signal, amplifier_input, cables_of
 
 
 class AnalogueOutput:
-    """A queue of samples, played at their own rate on the world's grid; zero when it is empty.
+    """Analogue output with a queue of samples, played at their own rate; zero when the queue is empty.
 
     The mean voltage over each step is exact at any sample rate. Real converters with an interpolation filter
     have weaker images than this zero-order hold.
@@ -52,7 +52,7 @@ class AnalogueOutput:
         """Start of the first queued sample in steps, including fractions."""
 
     def queue(self, volts: FloatArray, sample_rate_hz: float, now_step: int) -> None:
-        """Append samples; they start now if none is left to play.
+        """Append samples; they start now if no sample is left to play.
 
         If the rate differs, samples that are left to play also change to the new rate.
         """
@@ -114,7 +114,7 @@ class EventSchedule:
             heapq.heappop(self._due)[2]()
 
     def stop_before(self, step: int) -> int:
-        """Return the step up to which the world may be computed: ``step``, or that of the next action."""
+        """Return the step up to which the world may be computed: ``step``, or that of an earlier action."""
         return min(step, self._due[0][0]) if self._due else step
 
 
@@ -139,7 +139,7 @@ class ClosedLoop(Protocol):
 
     @property
     def is_on(self) -> bool:
-        """Whether it plays or delayed voltages remain; otherwise the world does not call `move`."""
+        """Whether the loop plays, or delayed voltages remain; otherwise the world does not call `move`."""
 
     def move(
         self,
@@ -153,8 +153,8 @@ class ClosedLoop(Protocol):
     ) -> int:
         """Advance the shaker from a step of the world with the loop closed; return the number of steps.
 
-        ``noise`` is the amplifier's [V], ``sensors`` those of base and m0. On entry ``signals`` contains the
-        amplifier input from other sources; on return it contains all signals.
+        ``noise`` is the amplifier's noise [V]; ``sensors`` describes the sensors of base and m0. On entry
+        ``signals`` contains the amplifier input from other sources, on return all signals.
         """
 
 
@@ -162,8 +162,8 @@ class World:
     """The simulated rig; its time advances only on request.
 
     Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds of one configuration agree bit
-    for bit, whatever the block sizes. Thread-safe; `time_s` takes no lock, so an instrument may read it while
-    it is rendered.
+    for bit, for any block sizes. Thread-safe; `time_s` takes no lock, so an instrument may read it while it
+    is rendered.
     """
 
     def __init__(
@@ -285,7 +285,7 @@ class World:
             self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
 
     def aim(self, role: Role) -> None:
-        """Move the vibrometer's beam to the mass of ``role``; it then shows that velocity instead of m0's."""
+        """Move the vibrometer's beam to the mass of ``role``, whose velocity replaces that of m0."""
         with self._turn:
             self._beam = role
             self._compute_to(self._step + 1)  # the velocity over a step needs the state before it
