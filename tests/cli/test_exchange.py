@@ -92,6 +92,8 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folde
         (("export", "run.h5", "--to", "uff", "--spectra", "--until", "inf"), "to inf s was requested"),
         (("export", "run.h5", "--to", "csv", "--until", "1e308"), "to 1e+308 s was requested"),
         (("export", "run.h5", "--to", "csv", "--from", "1", "--until", "0.5"), "a start and a later end"),
+        (("export", "run.h5", "--to", "uff", "--out", "a.csv"), "another format; end its name with .uff"),
+        (("pack", ".", "--license", "MIT", "--out", "a.h5"), "another format; end its name with .zip"),
         (("export", ".", "--to", "csv"), ". is a folder; give a recording (vibench catalogue"),
         (("import", "run.h5", "--out", "a.h5"), "give --mapping"),
         (("recover", "."), "nothing to recover; give the path of a .h5.part"),
@@ -106,7 +108,8 @@ def test_invalid_exchanges_are_refused_without_leftovers(run, recorded, argument
 
 
 def test_a_refusal_is_one_sentence_on_standard_error(vibench, recorded, tmp_path):
-    result = vibench("export", "run.h5", "--to", "csv", "--out", "run.h5", cwd=tmp_path)
+    (tmp_path / "run.csv").touch()
+    result = vibench("export", "run.h5", "--to", "csv", cwd=tmp_path)
     assert (result.returncode, result.stdout) == (1, "")
-    assert "error: run.h5 exists, and nothing is ever overwritten; choose another name" in result.stderr
+    assert "error: run.csv exists, and nothing is ever overwritten; choose another name" in result.stderr
     assert "Traceback" not in result.stderr

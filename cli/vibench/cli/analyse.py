@@ -12,6 +12,7 @@ from vibench.acquisition import open_recording, save_toml
 from vibench.analysis import (
     DRAWS,
     FEWEST_DRAWS,
+    MOST_DRAWS,
     AnalysisError,
     AnalysisOptions,
     CampaignResults,
@@ -89,7 +90,7 @@ def analyse(
         ),
     ] = DrivenBy.VOLTAGE,
     draws: Annotated[
-        int, option("Runs of the ensemble for motions with contact.", "N", min=FEWEST_DRAWS)
+        int, option("Runs of the ensemble for motions with contact.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS)
     ] = DRAWS,
     fit: Annotated[
         bool,

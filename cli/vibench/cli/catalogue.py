@@ -28,8 +28,10 @@ def show_catalogue(
         entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
     if as_json:
         print_json({"folder": str(folder.resolve()), "recordings": [asdict(each) for each in entries]})
-    else:
+    elif entries:
         _show(entries)
+    else:
+        console.print(f"{folder} contains no recordings")
     for each in entries:
         if each.is_bad:
             where = "" if each.path in each.reason else f"{each.path}: "

@@ -16,6 +16,7 @@ from vibench.acquisition.rig import load_rig
 from vibench.analysis import (
     DRAWS,
     FEWEST_DRAWS,
+    MOST_DRAWS,
     AnalysisError,
     CampaignResults,
     analyse_files,
@@ -89,7 +90,8 @@ def second_process(name: str, draws: int) -> Iterator[Analyst]:
 def demo(
     out: Annotated[Path | None, option("New folder for everything; vibench_demo if absent.", "DIR")] = None,
     draws: Annotated[
-        int, option("Simulation runs per test, from neighbouring starts.", "N", min=FEWEST_DRAWS)
+        int,
+        option("Simulation runs per test.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS),
     ] = DRAWS,
     as_json: AsJson = False,
 ) -> None:

@@ -83,16 +83,25 @@ def room_for_page(path: Path) -> None:
     room_for_folder(path.parent)
 
 
+SUFFIXES = frozenset({".csv", ".h5", ".json", ".mat", ".nxs", ".toml", ".uff", ".wav", ".zip"})
+"""Suffixes of files that vibench writes or reads."""
+
+
 def file_at(out: Path | None, usual: Path) -> Path:
     """Return the path of a new file: ``out`` itself, or ``usual`` in the folder ``out``.
 
-    If ``out`` has no suffix and does not exist, it is created as a folder.
+    If ``out`` has no suffix and does not exist, it is created as a folder. Raises ConfigurationError if its
+    suffix is that of another format.
     """
     if out is None:
         return usual
     if not out.suffix and not out.exists():
         out.mkdir(parents=True)
-    return out / usual.name if out.is_dir() else out
+    if out.is_dir():
+        return out / usual.name
+    if out.suffix.lower() in SUFFIXES - {usual.suffix}:
+        raise ConfigurationError(f"{out} has the suffix of another format; end its name with {usual.suffix}")
+    return out
 
 
 def free_path(path: Path) -> Path:
