@@ -232,7 +232,7 @@ def parse_option(text: str) -> Alternative:
 
 
 SCORED_S = (1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5, 4e-5, 5e-5)
-"""Values of c_i / k_i [s]: 1e-5 s is the paper's value read in mm, g and ms; larger ones end its chaos."""
+"""Values of c_i / k_i [s]: 1e-5 s is the paper's value read in mm, g and ms; larger values end chaos."""
 ALIKE = change("zeta", 0.0165)
 BY_ODE45 = change("exponents", ExponentsBy.ODE45)
 DAMPINGS = (*(damping(value) for value in SCORED_S if value != FigureOptions.damping_time_s), ALIKE)

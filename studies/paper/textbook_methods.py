@@ -81,7 +81,7 @@ def _stop_force(depth: Reals, rate: Reals, law: Law) -> Reals:
 
 
 def rates(time_s: float | Reals, state: Reals, place: Place, law: Law, numbers: Reals) -> Reals:
-    """Return the time derivative of x, y, z, vx, vy, vz; without forces of the stops in flight.
+    """Return d/dt of x, y, z, vx, vy, vz; stops act only at depths above 0, and not at all in FLIGHT.
 
     ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
     """

@@ -296,7 +296,7 @@ def vibench(
 
 
 def main() -> None:
-    """Run the command line; for an error that a user can fix, print one sentence and exit with its code."""
+    """Run the command line; for an error that a user can fix, print one sentence and exit with 1 or 3."""
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; suppresses gRPC's log of ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:

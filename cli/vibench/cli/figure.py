@@ -44,7 +44,7 @@ def figure(
     ],
     as_json: AsJson = False,
 ) -> None:
-    """Draw a figure of the paper; studies are stored in DIR/studies, and interrupted ones are continued."""
+    """Draw a figure of the paper; DIR/studies keeps the studies, and interrupted studies continue."""
     if as_json:
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)

@@ -192,7 +192,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on adjacent points solved in the same way; details are for the largest p.
+    """Return a paragraph on adjacent points solved alike; details are for the point with the largest p.
 
     Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes the start-up of the
     process.

@@ -1,4 +1,4 @@
-"""Options of several commands: the specimen, and parameters that replace those of the specimen."""
+"""Options of several commands: the specimen, and parameters that replace values of the specimen."""
 
 from typing import Annotated, TypeVar
 

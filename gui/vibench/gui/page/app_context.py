@@ -170,7 +170,7 @@ class AppContext(QObject):
         self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
-        """Worker for short jobs that must not wait behind long ones: previews."""
+        """Worker for previews, short jobs that must not wait behind long jobs."""
         UNITS.choose(dict(zip(CHOICES, settings.text(SettingKey.UNITS).split(), strict=False)))
         self.theme = THEMES.get(settings.text(SettingKey.THEME), LIGHT)
 

@@ -48,7 +48,7 @@ class Theme:
     accent: Colour
     tones: Mapping[Tone, Paint]
     traces: tuple[Colour, ...]
-    """Curve colours in order of use: those of Okabe and Ito, adapted to this background."""
+    """Curve colours in order of use: the colours of Okabe and Ito, adapted to this background."""
     predicted: Colour
     """Colour of simulated curves, which are also dashed."""
 

@@ -1,6 +1,6 @@
 """Table of all properties of system, devices, tasks and channels that a program can read or set.
 
-Names are those of NI's protocol file (`nidaqmx.proto`); the NI-DAQmx help describes each property.
+Names are as in NI's protocol file (`nidaqmx.proto`); the NI-DAQmx help describes each property.
 """
 
 import re
@@ -76,7 +76,7 @@ def _coupling(code: int) -> Coupling:
 
 
 def _require(property_name: str, allowed: Callable[[Any], Enum]) -> Callable[[Any, int], None]:
-    """Return a function that accepts the only supported value and refuses others."""
+    """Return a function that accepts the only supported value and refuses other values."""
 
     def write(thing: object, code: int) -> None:
         if code != allowed(thing).value:

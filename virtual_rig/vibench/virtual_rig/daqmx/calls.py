@@ -1,6 +1,6 @@
 """Table of the calls on tasks, channels, clocks, triggers and devices.
 
-Names are those of NI's protocol file (`nidaqmx.proto`); with the prefix ``DAQmx``, the NI-DAQmx C reference
+Names are as in NI's protocol file (`nidaqmx.proto`); with the prefix ``DAQmx``, the NI-DAQmx C reference
 describes them.
 """
 

@@ -93,7 +93,7 @@ class Trigger(StrEnum):
 
 @dataclass(frozen=True)
 class ChannelSettings:
-    """All settings of one channel; defaults are those of ``*RST``."""
+    """All settings of one channel; defaults are the state after ``*RST``."""
 
     relay: Relay = Relay.OPEN
     declared_load_ohm: float = OUTPUT_RESISTANCE_OHM

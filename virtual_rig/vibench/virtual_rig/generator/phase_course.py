@@ -1,7 +1,7 @@
 """Phase of a generator as a function of its own time: steady or swept.
 
 Phase is in cycles, time in seconds of the generator's clock. Frequencies are integer microhertz, the
-instrument's resolution, so that whole seconds give an exact fraction of a cycle and the phase does not drift
+instrument's resolution. Whole seconds thus give an exact fraction of a cycle, and the phase does not drift
 over hours (like a DDS accumulator that never overflows).
 """
 

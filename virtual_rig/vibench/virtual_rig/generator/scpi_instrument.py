@@ -164,7 +164,7 @@ LONGEST_REPLY = 1 << 20
 
 @dataclass(frozen=True)
 class Quirks:
-    """Documented peculiarities of the firmware; the defaults are those of FV:V1.0.2.
+    """Documented peculiarities of the firmware; the defaults describe FV:V1.0.2.
 
     Sources: hardware reference, sections 1.1, 1.2 and 1.4.
     """
@@ -200,7 +200,7 @@ class ScpiInstrument:
     identity
         Reply to ``*IDN?``.
     commands
-        Commands besides the common ones.
+        Commands in addition to the common commands.
     """
 
     def __init__(

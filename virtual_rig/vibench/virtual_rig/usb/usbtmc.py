@@ -1,7 +1,7 @@
 """The USB test-and-measurement class for an instrument: messages in bulk transfers.
 
-Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are those
-of USBTMC. Waiting is not simulated: a transfer that would exceed the host's timeout fails at once.
+Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings refer to
+USBTMC. Waiting is not simulated: a transfer that would exceed the host's timeout fails at once.
 """
 
 import errno

@@ -22,8 +22,8 @@ class TimeGrid:
     Rig time is counted by the converter's clock, so that samples always lie at integer numbers of steps.
     Physical time differs by the clock's error, and the equations of motion use the physical step.
 
-    The usual grid has twice the highest usual sample rate. Integer ratios give every rate of an NI 9234, the
-    transition band of its anti-alias filter fits below the Nyquist frequency, and a step (9.8 us) is short
+    The usual grid has twice the highest usual sample rate. Integer ratios give every rate of an NI 9234, and
+    the transition band of its anti-alias filter fits below the Nyquist frequency. A step (9.8 us) is short
     compared with the specimen's shortest period (2 ms). Shorter contacts are resolved within a step.
     """
 

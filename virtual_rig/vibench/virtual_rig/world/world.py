@@ -319,7 +319,7 @@ class World:
     def truth(self) -> FloatArray:
         """Return and clear the recorded true motion, shape (steps, 9).
 
-        Columns are those of ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
+        Columns are as in ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
         """
         with self._turn:
             kept, self._truth = self._truth or [], []

@@ -236,7 +236,7 @@ ALL = "All recordings"
 
 
 class CampaignChoice(Choice):
-    """Choice of all recordings or those of one campaign; hidden in a folder without campaigns."""
+    """Choice of all recordings or the recordings of one campaign; hidden in a folder without campaigns."""
 
     chosen = Signal(object)
     """Files of the selected campaign as a set; None for all recordings."""

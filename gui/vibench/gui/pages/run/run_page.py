@@ -540,7 +540,7 @@ class RunPage(Page):
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
         self.watch_card.reject_requested.connect(self._reject)
-        # Until the next tick, the pictures of a finished run would look like those of this run.
+        # Until the next tick, the pictures of a finished run would look like pictures of this run.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_requested.connect(self._turn_twin)
         self.context.recording_made.connect(self._recorded)
