@@ -1,4 +1,4 @@
-"""The Tektronix AFG1022: every setting is read back, and a failed change switches the output off."""
+"""Driver of the Tektronix AFG1022: settings are read back; the output is off after a failed change."""
 
 import re
 import statistics
@@ -30,13 +30,13 @@ class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
     `open` returns it with the output off, set to a 1 kHz sine of the smallest amplitude. Frequency and
-    amplitude may change while it plays. Settings beyond its limits or the bench's ``amplitude_limit_vpp``
-    are refused (`LimitExceeded`), and no step between two settings is larger than the larger of them.
+    amplitude may change while it plays. Settings beyond its limits or the bench's ``amplitude_limit_vpp`` are
+    refused (`LimitExceeded`). During a change, the amplitude never exceeds both the old and the new setting.
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
-    """Maker and model required in the reply to ``*IDN?``, as a pattern and in words."""
+    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` is the same in words."""
     wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
     load_header: ClassVar[str] = "OUTP{c}:IMP"
 
@@ -44,9 +44,9 @@ class AFG1022X(ScpiInstrument):
     shape = Word(
         "SOUR{c}:FUNC:SHAP", {Shape.SINE: ("SIN", "SINUSOID"), Shape.EDIT_MEMORY: ("EMEM", "EMEMORY")}
     )
-    # Frequencies are sent to 1 uHz; replies have at least seven digits.
+    # Frequencies are sent with a resolution of 1 uHz; replies have at least seven digits.
     frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
-    # The panel resolves 1 mVpp: half of that and 0.1 % of the value are rounding; more is another value.
+    # The panel resolves 1 mVpp: half of that plus 0.1 % of the value is rounding; more is another value.
     panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
     offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
     burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
@@ -54,7 +54,7 @@ class AFG1022X(ScpiInstrument):
     burst = Word("SOUR{c}:BURS:STAT", SWITCH)
 
     identity: Identity
-    """Reply to ``*IDN?``; stored whole, since its last field varies."""
+    """Reply to ``*IDN?``; stored completely, because its last field varies."""
     codes: ArbitraryCodes | None = None
     """Contents of the memory while it is selected."""
     unconfirmed: tuple[Knob, ...] = ()
@@ -71,7 +71,7 @@ class AFG1022X(ScpiInstrument):
 
     @classmethod
     def open(cls, config: GeneratorConfig) -> Self:
-        """Find the generator, switch its output off, and bring it into a known state.
+        """Find the generator, switch its output off, bring it into a known state, and return it.
 
         Raises InstrumentLost when nothing answers, InstrumentBusy when another program holds the resource,
         InstrumentError for another instrument; the output is then off, if it could be reached.
@@ -99,7 +99,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def playing(self) -> Shape:
-        """The shape that is set; raises InstrumentError when a change has failed."""
+        """Shape that is set; raises InstrumentError after a failed change."""
         _ = self.panel_vpp
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
@@ -119,7 +119,7 @@ class AFG1022X(ScpiInstrument):
             self.panel_vpp = amplitude_vpp
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Put one period in memory, compare the memory with it, and select it. The output keeps its state.
+        """Write one period to the memory, verify the memory, and select it. The output keeps its state.
 
         The mean is removed, see `GeneratorModel.codes`. While the memory changes, the amplitude is at its
         minimum.
@@ -136,14 +136,14 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Before the shape too: a sine's frequency may be too high for the memory.
+            # Set before the shape too, because the sine's frequency may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)
             self.panel_vpp = panel_vpp
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse: the sweep time can be set on the panel only."""
+        """Refuse the sweep: its time can be set only on the panel."""
         del amplitude_vpp
         self.model.check_sweep(sweep)
 
@@ -210,7 +210,7 @@ class AFG1022X(ScpiInstrument):
         )
 
     def close(self) -> None:
-        """Output off, connection closed. Legal at any time; the connection closes in any case."""
+        """Switch the output off and close the connection, even after an error. Legal at any time."""
         if self._is_silent_and_closed:
             return
         try:
@@ -221,9 +221,9 @@ class AFG1022X(ScpiInstrument):
             self.disconnect()
 
     def measured_latency_s(self) -> float:
-        """Return how long one verified change of amplitude takes: the shortest possible stop [s].
+        """Return the duration of one verified change of amplitude [s]; no stop is faster.
 
-        Median of nine; each sets the present amplitude again.
+        The result is the median of nine changes; each sets the present amplitude again.
         """
         durations_s = []
         for _ in range(_LATENCY_TRIALS):
@@ -232,7 +232,7 @@ class AFG1022X(ScpiInstrument):
             durations_s.append(time.perf_counter() - began_s)
         return statistics.median(durations_s)
 
-    # Steps that differ between models of generators
+    # Steps that differ between generator models
 
     def _end_modes(self) -> None:
         self.end_if_known("SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
@@ -249,7 +249,7 @@ class AFG1022X(ScpiInstrument):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Fill the edit memory, and compare it point by point."""
+        """Write the edit memory, read it back, and compare it point by point."""
         points = codes.codes.size
         self.command(f"DATA:DEF EMEM,{points}")
         self.command("DATA:DATA EMEM,", codes.codes)
@@ -266,7 +266,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def _panel_factor(self) -> float:
-        """Panel amplitude over requested amplitude; other than 1 only for an uneven waveform."""
+        """Ratio of panel to requested amplitude; not 1 for a waveform with DC or a peak other than 1."""
         return 1.0 if self.codes is None else self.codes.panel_factor
 
     def _mute(self) -> None:
@@ -313,11 +313,11 @@ class AFG1022X(ScpiInstrument):
         self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
-        """Set the load that the generator expects; return settings to be confirmed if it cannot be read.
+        """Set the load that the generator expects; return it as a setting to confirm if it cannot be read.
 
         Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so it is
-        tried. A wrong load is a factor of two at the terminal. Raises SettingRefused when the generator
-        reports another load that cannot be changed.
+        tried. A wrong load changes the terminal voltage by a factor of two. Raises SettingRefused when the
+        generator reports another load that cannot be changed.
         """
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
@@ -340,7 +340,7 @@ class AFG1022X(ScpiInstrument):
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
-        """Switch off when a change fails: the state of the instrument is then unknown."""
+        """Switch the output off when a change fails, because the state of the instrument is then unknown."""
         try:
             yield
         except InstrumentError as error:

@@ -1,4 +1,4 @@
-"""A converter behind NI-DAQmx: continuous, hardware-timed, without gaps, and always released."""
+"""Digitizer on NI-DAQmx: samples continuously, hardware-timed, without gaps; it is always released."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -50,7 +50,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc 
 
 @dataclass(frozen=True)
 class DaqmxSession:
-    """An address and its connection; close it after everything that was opened through it."""
+    """Connection to a DAQmx driver; close it after everything that was opened through it."""
 
     server: str | None
     """``"host:port"``; None for the driver on this computer."""
@@ -73,7 +73,7 @@ class DaqmxSession:
 
 
 def daqmx_session(server: str | None) -> DaqmxSession:
-    """Prepare a connection to a driver; nothing is contacted before the first call."""
+    """Return a connection to a driver; no server is contacted before the first call."""
     if server is None:
         return DaqmxSession(None, None, None)
     channel = grpc.insecure_channel(server, options=_CHANNEL_OPTIONS)
@@ -82,7 +82,7 @@ def daqmx_session(server: str | None) -> DaqmxSession:
 
 
 def list_daqmx_devices(server: str | None) -> tuple[FoundDevice, ...]:
-    """List the devices of the driver on this computer, or of a device server at ``"host:port"``.
+    """Return the devices of the driver on this computer, or of a device server at ``"host:port"``.
 
     Raises InstrumentLost when the server does not answer, and InstrumentError when this computer has no
     driver.
@@ -119,7 +119,7 @@ _MOST_COUNTS = 2**29
 
 
 def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | None:
-    """Add one input to a task, named by its role; return its volts per count where these scale linearly.
+    """Add one input to a task, named by its role; return its volts per count (None if not linear).
 
     Raises SettingRefused when coupling or sensor current read back differently, and DaqError when the device
     refuses a setting.
@@ -174,10 +174,10 @@ def _couple(made: AIChannel, channel: Channel) -> None:
 
 
 def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:
-    """Step of a converter [V]; None when volts are not simply multiples of one step.
+    """Return the step of a converter [V]; None if volts are not multiples of one step.
 
     A calibrated device may scale with an offset or a curve; its volts are then recorded as read.
-    ``coefficients`` are those of the polynomial from counts to volts, constant term first.
+    ``coefficients`` define the polynomial from counts to volts, constant term first.
     """
     if len(coefficients) < 2 or not coefficients[1] * _MOST_COUNTS > range_v:
         return None
@@ -206,21 +206,21 @@ def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
 
 # A read is divided into pieces of this length, so that no single call waits long or needs the whole buffer.
 LONGEST_READ_S = 2.0
-# Added to the length of a read: a device whose samples are later counts as dead.
+# Time added to the duration of a read; samples that come later are an error [s].
 _READ_MARGIN_S = 10.0
-# Sigma-delta modules use the next higher rate of a list; a lower or a twice as high one is refused.
+# Sigma-delta modules use the next higher rate of a list; a lower rate, or one twice as high, is refused.
 _MOST_COERCED = 2.0
 
 
 class DaqmxDigitizer:
     """A `Digitizer` on NI-DAQmx, on this computer or behind a gRPC device server.
 
-    `open` makes it and reserves the device: every setting is checked then, not when a run begins.
+    `open` creates it and reserves the device. All settings are checked there, not at the start of a run.
     """
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
         self.session = session
-        """Connection to the driver, for an output on the same one."""
+        """Connection to the driver; an output of the same driver uses it too."""
         self._config = config
         self._channels = channels
         self.roles = tuple(channel.role.value for channel in channels)
@@ -232,14 +232,14 @@ class DaqmxDigitizer:
         """Step of the converter for each channel [V]; None where volts are not multiples of one step."""
         self._identity: Identity | None = None
         self.sample_rate_hz = 0.0
-        """The rate that the hardware runs at, read back from it."""
+        """Actual sample rate, read back from the hardware [1/s]."""
         self._next_sample = 0
         self._is_running = False
         self._tells_overloads = True
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Reserve the converter of a rig with all its inputs, and read back its rate.
+        """Reserve the converter of a rig with all its inputs, read back its rate, and return the digitizer.
 
         Raises InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError or SettingRefused as
         `_daqmx_errors` assigns them. Nothing stays reserved then.
@@ -260,7 +260,7 @@ class DaqmxDigitizer:
         return self._identity
 
     def start_trigger(self) -> str:
-        """Terminal of this task's start trigger; arm other tasks on it before `start`."""
+        """Return the terminal of this task's start trigger; arm other tasks with it before `start`."""
         with daqmx_call(f"asking {self._config.device} for its start trigger"):
             return str(self._open_task().triggers.start_trigger.term)
 
@@ -277,7 +277,7 @@ class DaqmxDigitizer:
     def read(self, samples: int) -> Block:
         """Wait for the next ``samples`` of every channel and return them.
 
-        After a failure the run cannot continue, since its sample numbers are lost: stop, and start again.
+        After a failure the run cannot continue, because its sample numbers are lost: stop and start again.
 
         Raises DataLost when samples were overwritten before they were read; InstrumentLost when the device or
         its server is gone; InstrumentError when the samples do not come in time, or nothing is running.
@@ -368,7 +368,7 @@ class DaqmxDigitizer:
         return self._task
 
     def _next_samples(self, samples: int) -> tuple[Samples, Counts | None]:
-        """Read volts, and their counts if the converter scales linearly."""
+        """Return the next volts, and their counts if the converter scales linearly."""
         shape = len(self._channels), samples
         if isinstance(self._reader, AnalogUnscaledReader):
             counts = np.empty(shape, np.int32)
@@ -415,7 +415,7 @@ class DaqmxDigitizer:
         scales_v = tuple(channel.full_scale_v for channel in self._channels)
         seen = overload_ranges(volts, self.roles, scales_v, first_sample)
         unseen = overloaded_roles - {overload.channel for overload in seen}
-        # A clip too short to show in the samples: only its block is known.
+        # A clip too short to be visible in the samples: only the block that contains it is known.
         last_sample = first_sample + volts.shape[1] - 1
         return (*seen, *(Overload(role, first_sample, last_sample) for role in sorted(unseen)))
 

@@ -1,4 +1,4 @@
-"""Table of DAQmx errors: the meaning of each for a measurement, and advice.
+"""Table of DAQmx errors: what each error means for a measurement, and advice.
 
 Numbers and names: ``nidaqmx.error_codes.DAQmxErrors``; meanings: NI-DAQmx help and hardware reference 5.3.
 """
@@ -114,7 +114,7 @@ _SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_
 
 @contextmanager
 def daqmx_call(doing: str) -> Iterator[None]:
-    """Turn any failure of the DAQmx client into an error with advice; ``doing`` starts its sentence."""
+    """Turn any failure of the DAQmx client into an error with advice; its text begins with ``doing``."""
     try:
         yield
     except AcquisitionError:
@@ -137,7 +137,7 @@ def daqmx_call(doing: str) -> Iterator[None]:
 
 
 def from_code(error: DaqError, doing: str) -> AcquisitionError:
-    """Return our error for a DAQmx error; one that is not in the table keeps its text."""
+    """Return vibench's error for a DAQmx error; an error that is not in the table keeps its text."""
     text = " ".join(str(error).split())
     meaning = MEANINGS.get(error.error_type)
     if meaning is None:

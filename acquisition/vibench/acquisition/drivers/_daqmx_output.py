@@ -1,4 +1,4 @@
-"""An analogue output that streams samples ahead of time, never repeats old ones, and ends at zero."""
+"""Analogue output that plays samples written ahead of time, never repeats them, and ends at zero volts."""
 
 from contextlib import ExitStack, suppress
 from dataclasses import replace
@@ -19,19 +19,18 @@ from ._daqmx_errors import daqmx_call
 from ._overload import require_playable
 
 _WRITE_TIMEOUT_S = 10.0
-# Length of the final zeros: the output holds the last one, and some devices need more than one.
+# Number of final zeros: the output holds the last value, and some devices need more than one sample.
 _ZERO_SAMPLES = 64
-# Two oscillators of one device do not differ; a larger deviation means another rate.
+# Rounding of the rate that is read back; a larger deviation means another rate.
 _SAME_RATE = 1e-6
 
 
 class DaqmxOutput:
     """An `AnalogOutput` on NI-DAQmx, started by the same trigger as the inputs.
 
-    ``open``, ``write`` the first stretch, ``arm``, then start the digitizer: both begin with sample 0.
+    ``open`` it, ``write`` the first samples, ``arm`` it, then start the digitizer: both begin with sample 0.
     Continue to write as fast as samples are played. `stop` goes to zero volts at once; the next ``write``
-    begins a new stream. A program that dies stops writing: the output then runs empty within ``ahead_s`` and
-    stops.
+    begins a new stream. If the program dies, the output runs out of samples within ``ahead_s`` and stops.
     """
 
     def __init__(self, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> None:
@@ -40,18 +39,18 @@ class DaqmxOutput:
         self.sample_rate_hz = config.sample_rate_hz
         """The requested sample rate, which the device accepted."""
         self.ahead_samples = int(config.ahead_s * config.sample_rate_hz)
-        """Largest number of samples ahead of the one being played."""
+        """Largest number of samples that can be written ahead of the sample being played."""
         self._digitizer = digitizer
         self._resources = ExitStack()
         self._task: Task | None = None
         self._written = 0
         self._is_open = True
         self.idle = IdleOutput.HELD
-        """State of the output when it runs empty: zero volts if the device can be set so, as read back."""
+        """Voltage of the output when it runs out of samples, as read back: zero if the device can do this."""
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
-        """Set an output to zero volts and reserve it on the digitizer's driver.
+        """Set an output to zero volts, reserve it on the digitizer's driver, and return it.
 
         Parameters
         ----------
@@ -72,21 +71,21 @@ class DaqmxOutput:
 
     @property
     def identity(self) -> Identity:
-        """Module of the output, and its name."""
+        """Identity of the output's module, with the name of the output in its reply."""
         device, _, _ = self._physical.rpartition("/")
         with daqmx_call(f"identifying {self._physical}"):
             module = daqmx_identity(self._digitizer.session, device)
         return replace(module, reply=f"{self._physical} of {module.reply}")
 
     def write(self, volts: Samples) -> None:
-        """Add samples behind those still to be played; wait if the buffer is full.
+        """Add samples after those still to be played; wait if the buffer is full.
 
         Raises
         ------
         LimitExceeded
             When a sample is beyond the limit of the bench, or NaN. Nothing was written.
         DataLost
-            When the output ran empty before: it has stopped.
+            When the output ran out of samples before and has stopped.
         """
         require_playable(volts, self._physical, self._config.limit_v, is_open=self._is_open)
         task = self._task or self._reserve()
@@ -96,7 +95,7 @@ class DaqmxOutput:
         self._written += volts.size
 
     def arm(self) -> None:
-        """Wait for the start of the inputs: call it before the digitizer's ``start``."""
+        """Let the output start with the inputs; call this before the digitizer's ``start``."""
         if self._task is None or self._written == 0:
             raise InstrumentError(f"{self._physical} has nothing to play; write the first stretch, then arm")
         with daqmx_call(f"arming {self._physical}"):
@@ -114,7 +113,7 @@ class DaqmxOutput:
             with ExitStack() as last:
                 last.callback(self._to_zero)  # also when stopping fails: devices may hold their last value
                 last.callback(self._release)
-                # An output that ran empty reports it once more; it has stopped, as required.
+                # An output that ran out of samples reports this again; it has stopped, as required.
                 last.enter_context(suppress(DataLost))
                 with daqmx_call(f"stopping {self._physical}"):
                     task.stop()
@@ -181,8 +180,8 @@ class DaqmxOutput:
 
 
 def _set_idle_output(channel: AOChannel) -> IdleOutput:
-    """Set the idle output to zero volts; return the value read back, since many devices hold the last one."""
-    # A device that cannot do this refuses the setting, and one that does not know it refuses the query.
+    """Set the idle output to zero volts; return the value read back, as many devices hold the last value."""
+    # A device that cannot do this refuses the setting; a device without this setting refuses the query.
     with suppress(DaqError):
         channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS
         if channel.ao_idle_output_behavior is AOIdleOutputBehavior.ZERO_VOLTS:

@@ -1,4 +1,4 @@
-"""A recording replayed as if it were measured."""
+"""Digitizer that replays a recording as if it were measured."""
 
 from pathlib import Path
 from typing import Self
@@ -17,8 +17,8 @@ _SAME_SCALE = 1e-6
 class FilePlayer:
     """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` is its path. Under the plan of the recording, check and segments are at the same
-    samples; ``generator.driver = "file"`` accepts the plan's commands.
+    ``daq.options.recording`` is its path. With the plan of the recording, check and segments have the same
+    sample numbers; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     waiting_samples = 0
@@ -36,7 +36,7 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError if seal, channels, scales or rate do not fit."""
+        """Open the recording; raises ConfigurationError for a wrong seal, channel, scale or sample rate."""
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
@@ -82,12 +82,12 @@ class FilePlayer:
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """Steps of the recording's converter, where count zero is zero volts [V]."""
+        """Step of the recording's converter for each channel [V]; None if count zero is not zero volts."""
         heads = (self._recording.channel(role) for role in self.roles)
         return tuple(None if head.volts_at_zero_count else head.volts_per_count for head in heads)
 
     def start(self) -> None:
-        """Begin with the recording's first sample."""
+        """Start playing, from the recording's first sample."""
         if not self._is_open or self._is_running:
             raise InstrumentError(
                 "the recording is closed, or playing already; open the bench again, or stop it"
@@ -97,7 +97,7 @@ class FilePlayer:
     def read(self, samples: int) -> Block:
         """Return the next samples.
 
-        Raises InstrumentLost at the end of the recording, DataLost where it has lost samples.
+        Raises InstrumentLost at the end of the recording, DataLost at samples that the recording has lost.
         """
         if not self._is_running or samples < 1:
             raise InstrumentError(

@@ -1,6 +1,6 @@
-"""Ranges and waveforms of each model of generator, checked before anything is sent.
+"""Limits of each generator model, and checks of settings and waveforms before anything is sent.
 
-Nothing here needs pyvisa: plans are checked without it.
+This module does not need pyvisa, so that plans can be checked without it.
 """
 
 from dataclasses import dataclass
@@ -17,26 +17,26 @@ from ..rig import GeneratorConfig, GeneratorDriver
 
 
 class Shape(StrEnum):
-    """A shape that a driver plays; the value is its SCPI word on an AFG1022."""
+    """Shape of the signal that a driver plays; the value is its SCPI word on an AFG1022."""
 
     SINE = "SIN"
     EDIT_MEMORY = "EMEM"
 
 
 class ArbitraryCodes(NamedTuple):
-    """One period in the generator's memory: without DC, over the full range of codes.
+    """Codes of one period in the generator's memory, without DC and over the full range of codes.
 
-    Code 0 is minus half of the panel's peak-to-peak amplitude, and the model's ``top_code`` is plus half.
+    Code 0 plays minus half of the panel's peak-to-peak amplitude, the model's ``top_code`` plays plus half.
     """
 
     codes: NDArray[np.uint16]
     panel_factor: float
-    """Panel amplitude over requested amplitude: 1 when the waveform is free of DC and reaches 1."""
+    """Ratio of panel amplitude to requested amplitude; 1 for a waveform without DC and with a peak of 1."""
 
 
 @dataclass(frozen=True)
 class GeneratorModel:
-    """Limits of one model of generator, and the class of `vibench.acquisition.drivers` that opens it."""
+    """Limits of one generator model, and the class of `vibench.acquisition.drivers` that opens it."""
 
     name: str
     driver: str
@@ -50,10 +50,10 @@ class GeneratorModel:
     burst_cycles: tuple[int, int]
     usb_ids: tuple[tuple[int, int], ...] = ()
     longest_sweep_s: float = 0.0
-    """Longest internal sweep; 0 if its sweep time cannot be set remotely."""
+    """Longest internal sweep [s]; 0 if the sweep time cannot be set remotely."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return the generator's abilities at the configured load."""
+        """Return the generator's capabilities at the configured load."""
         lowest, highest = (limit * config.shown_fraction for limit in self.open_range_vpp)
         sine_hz = self.highest_hz[Shape.SINE]
         return GeneratorDescription(
@@ -61,12 +61,12 @@ class GeneratorModel:
         )
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open a generator; pyvisa is loaded only now."""
+        """Open a generator and return it; pyvisa is loaded only now."""
         driver = getattr(import_module("vibench.acquisition.drivers"), self.driver)
         return cast("GeneratorDriver", driver).open(config)
 
     def amplitude_range_vpp(self, config: GeneratorConfig) -> tuple[float, float]:
-        """Smallest and largest amplitude setting of this bench, peak to peak [V]."""
+        """Return the smallest and largest amplitude setting of this bench, peak to peak [V]."""
         lowest, highest = self.describe(config).amplitude_range_vpp
         return lowest, min(highest, config.amplitude_limit_vpp)
 
@@ -101,9 +101,9 @@ class GeneratorModel:
             )
 
     def codes(self, waveform: Samples) -> ArbitraryCodes:
-        """Convert one period of values to codes of the full range.
+        """Return the codes of one period of values, scaled to the full range of codes.
 
-        The mean is removed, since DC would displace the shaker, and the rest is scaled so that its largest
+        The mean is removed, because DC would displace the shaker. The rest is scaled so that its largest
         magnitude gets the first or last code.
 
         Raises LimitExceeded when the waveform has too few or too many points, is not finite, leaves -1 to 1,
@@ -167,9 +167,9 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     memory_points=(8, 65_536),
     top_code=65_534,
     burst_cycles=(1, 100_000_000),
-    # Models with one or two channels, 20 or 30 MHz; the numbers are those in public programs.
+    # Models with one or two channels, 20 or 30 MHz; the numbers are taken from public programs.
     usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
-    longest_sweep_s=500.0,  # linear ones may last longer, logarithmic ones may not
+    longest_sweep_s=500.0,  # linear sweeps may last longer, logarithmic sweeps may not
 )
 
 
@@ -178,7 +178,7 @@ _NOTHING_VPP = 1e-6
 
 @dataclass(frozen=True)
 class NoGenerator:
-    """Placeholder on a bench without generator; it refuses commands, or accepts those of a recording's plan.
+    """Placeholder on a bench without generator; it refuses all commands, or accepts those of a recording.
 
     The table ``[generator]`` still describes the load of the output: ``connected_ohm``, ``load_ohm``.
     """
@@ -189,7 +189,7 @@ class NoGenerator:
     amplitude_limit_vpp: float = 0.0
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return a description without abilities, or one wide enough for a recording's plan."""
+        """Return a description that allows nothing, or one that allows the plan of a recording."""
         if not self.silently:
             return GeneratorDescription(self.name, (_NOTHING_VPP, _NOTHING_VPP), _NOTHING_VPP, (1, 1))
         return GeneratorDescription(self.name, (_NOTHING_VPP, config.amplitude_limit_vpp), 1e6, (2, 65_536))
@@ -205,7 +205,7 @@ class NoGenerator:
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Return no settings."""
+        """Return no settings to be confirmed."""
         return ()
 
     @property
@@ -242,7 +242,7 @@ class NoGenerator:
         self._take("a trigger")
 
     def end_burst(self) -> None:
-        """Nothing plays."""
+        """Do nothing, because nothing plays."""
 
     def measured_latency_s(self) -> float:
         """Return zero [s]."""
@@ -253,10 +253,10 @@ class NoGenerator:
         self._take("its output")
 
     def stop(self) -> None:
-        """Nothing plays."""
+        """Do nothing, because nothing plays."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing, because nothing is open."""
 
     def _take(self, what: str) -> None:
         if not self.silently:

@@ -71,7 +71,7 @@ class Keysight33500B(AFG1022X):
             self.sweep = "ON"
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each trigger of the bus."""
+        """Play ``cycles`` periods at each bus trigger."""
         with self._changing():
             self.trigger_source = "BUS"
         self._arm_burst(cycles)
@@ -82,7 +82,7 @@ class Keysight33500B(AFG1022X):
             self.burst = "OFF"
 
     def _end_modes(self) -> None:
-        """End sweep, burst and modulation; set amplitudes to peak to peak, and the waveform filter off."""
+        """End sweep, burst and modulation; set peak-to-peak amplitudes; switch the waveform filter off."""
         self.sweep = self.burst = self.am = self.fm = self.pm = self.fsk = self.pwm = "OFF"
         self.amplitude_unit = "VPP"
         self.output_filter = "OFF"
@@ -100,7 +100,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Fill the memory, and compare number and mean of its points: the points cannot be read back."""
+        """Write the memory, and compare number and mean of its points, which cannot be read back."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

@@ -7,7 +7,7 @@ from ..instruments import Overload, Samples
 
 # Vibrometers and converters distort before they clip: hardware reference 4.
 OVERLOAD_FRACTION = 0.95
-# A delta-sigma converter's filter rings about this long after a clip: shorter pauses are part of it.
+# After a clip, a delta-sigma converter's filter rings about this long; shorter pauses end no overload.
 _RECOVERY_SAMPLES = 64
 
 
@@ -21,9 +21,9 @@ def overload_ranges(
     volts
         Shape (channels, samples) [V] at the converter's input.
     roles, full_scales_v
-        One for each channel.
+        Role and full scale [V] of each channel.
     first_sample
-        Position of the block in the run.
+        Number of the block's first sample in the run.
     """
     found: list[Overload] = []
     peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
@@ -42,7 +42,7 @@ def overload_ranges(
 
 
 def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: bool) -> None:
-    """Raise LimitExceeded for a sample beyond the limit of the bench, or NaN, InstrumentError if closed."""
+    """Raise LimitExceeded for a NaN or a sample beyond the bench's limit, InstrumentError if closed."""
     peak_v = float(np.max(np.abs(volts), initial=0.0))
     if not peak_v <= limit_v:  # so that a NaN does not pass
         raise LimitExceeded(

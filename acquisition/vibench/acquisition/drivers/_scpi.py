@@ -72,7 +72,7 @@ class ScpiInstrument:
         self._reply_due = False
 
     def command(self, message: str, codes: Codes | None = None) -> None:
-        """Send a command; raises InstrumentError when the instrument queues any complaint about it."""
+        """Send a command; raises InstrumentError when the instrument's error queue then has an entry."""
         if complaints := self.send(message, codes):
             raise InstrumentError(
                 f"{self.name} refused {message!r}: {'; '.join(complaints)}. The setting is not in force; "
@@ -80,9 +80,9 @@ class ScpiInstrument:
             )
 
     def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
-        """Send a command, with 16-bit codes as a big-endian block after it; return the complaints.
+        """Send a command, then any 16-bit codes as a big-endian block; return the entries of the error queue.
 
-        The complaints may be older than the command.
+        The entries may be older than the command.
         """
         with self._dialogue(message):
             if codes is None:
@@ -90,18 +90,18 @@ class ScpiInstrument:
             else:
                 block = pyvisa.util.to_ieee_block(codes.tolist(), "H", is_big_endian=True)
                 self._link.write_raw(message.encode("ascii") + block + b"\n")
-            # Some firmware drops messages that come too soon after a command, and has no flag for it.
+            # Some firmware drops messages that come too soon after a command, without reporting it.
             if self._settle_s > 0:
                 self._pause(self._settle_s)
             return self.complaints()
 
     def query(self, message: str) -> str:
         """Return the reply to a query without its line end; bytes outside ASCII are kept readable."""
-        # This family writes ohm as the GBK character A6 B8: invalid text must not stop a query.
+        # These generators send "ohm" as the GBK character A6 B8: invalid text must not stop a query.
         return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
-        """Return the reply to a query; repeat it once if empty, as the first one after ``*CLS`` may be."""
+        """Return the reply to a query; repeat it once if empty, as the first reply after ``*CLS`` may be."""
         return self.query(message) or self.query(message)
 
     def query_number(self, message: str) -> float:
@@ -150,7 +150,7 @@ class ScpiInstrument:
         )
 
     def known(self, header: str) -> Any:
-        """Return the setting read back last; raises InstrumentError after a failed change."""
+        """Return the last value read back for a setting; raises InstrumentError after a failed change."""
         if header not in self.held:
             raise InstrumentError(
                 f"{self.name} has no known settings since a change failed; load a sine or a waveform first"
@@ -158,7 +158,7 @@ class ScpiInstrument:
         return self.held[header]
 
     def end_if_known(self, header: str, word: str, answers: tuple[str, ...]) -> None:
-        """End a mode; an empty reply means that the firmware does not have it, so it cannot be on."""
+        """End a mode. An empty reply means that the firmware does not have the mode, so it cannot be on."""
         header = header.format(c=self.channel)
         self.send(f"{header} {word}")
         reply = self.query(f"{header}?")
@@ -175,7 +175,7 @@ class ScpiInstrument:
             self._link.close()
 
     def reconnect(self) -> None:
-        """Open another session, whatever the state of the last one."""
+        """Open a new session, whatever the state of the old session."""
         try:
             self.disconnect()
         except InstrumentError as error:
@@ -244,17 +244,17 @@ def _block(reply: bytes) -> tuple[int, int]:
         return 0, -1
 
 
-# Settings as declarations: assigning one sends it, reads it back, and keeps the instrument's value. This
-# family replaces a value out of range by a default (Tektronix AFG1000 programmer manual, general syntax), so
-# a command without a complaint proves nothing.
+# Settings are descriptors: an assignment sends the value, reads it back, and keeps the instrument's value.
+# These generators replace a value out of range by a default (Tektronix AFG1000 programmer manual, general
+# syntax), so the absence of an error proves nothing.
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number, formatted by ``form``; refused unless it reads back within the instrument's resolution."""
+    """Numeric setting, sent as ``form``; an error if it does not read back within the given tolerances."""
 
     header: str
-    """``{c}`` stands for the channel."""
+    """SCPI header of the setting; ``{c}`` stands for the channel."""
     form: str = "{:g}"
     absolute: float = 0.0
     relative: float = 0.0
@@ -273,7 +273,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Word:
-    """A setting with several words; ``answers`` lists the replies for each, in upper case."""
+    """Setting whose value is a word; ``answers`` lists the valid replies for each word, in upper case."""
 
     header: str
     answers: Mapping[str, tuple[str, ...]]
@@ -286,7 +286,7 @@ class Word:
         self._expect(owner, word)
 
     def insist(self, owner: ScpiInstrument, word: str) -> None:
-        """Set the word and ignore complaints, which may be old: the value read back decides."""
+        """Set the word and ignore errors in the queue, which may be old: the value read back decides."""
         owner.send(f"{self.header.format(c=owner.channel)} {word}")
         self._expect(owner, word)
 
@@ -306,4 +306,4 @@ def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> Setting
 
 
 SWITCH = {"ON": ("1", "ON"), "OFF": ("0", "OFF")}
-"""Words of a setting that is on or off."""
+"""Words, and valid replies, of a setting that is on or off."""

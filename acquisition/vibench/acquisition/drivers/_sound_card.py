@@ -1,8 +1,8 @@
-"""A sound card as converter and analogue output, over PortAudio, once calibrated.
+"""Calibrated sound card as converter and analogue output, over PortAudio.
 
-A sound card does not report volts and passes no DC: its full scale is measured once and written in
-``daq.options`` (docs/instruments.md, decision 0054); otherwise no card opens. Inputs and output are one
-stream, so they begin together except for the card's delay.
+A sound card does not report volts and passes no DC. Its full scale is therefore measured once and entered in
+``daq.options`` (docs/instruments.md, decision 0054); without it, no card is opened. Inputs and output form
+one stream, so they start together except for the card's delay.
 """
 
 from collections import deque
@@ -21,7 +21,7 @@ from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges, require_playable
 
 _LATEST_S = 10.0
-"""A card whose samples are later than this counts as lost [s]."""
+"""If samples are later than this, the card counts as lost [s]."""
 _SAME_RATE = 1e-6
 
 _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
@@ -115,7 +115,7 @@ class SoundCardDigitizer:
         self._device = rig.daq.device
         self._channels = channels
         self.sample_rate_hz = float(card.stream.samplerate)
-        """The rate that PortAudio reports."""
+        """Sample rate that PortAudio reports [1/s]."""
         self.roles = tuple(channel.role.value for channel in channels)
         """Roles of the channels, in the order of the rows of a block."""
         self.volts_per_count = (None,) * len(channels)
@@ -127,14 +127,14 @@ class SoundCardDigitizer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the card that ``daq.device`` names, with its calibration.
+        """Open the card named in ``daq.device`` with its calibration, and return the digitizer.
 
         Raises
         ------
         ConfigurationError
-            When a calibration is missing, or an input is to be coupled to DC or fed with a current.
+            When a calibration value is missing, or an input needs DC coupling or a sensor current.
         InstrumentLost, InstrumentError
-            When there is no such card, or it does not take the rate.
+            When there is no such card, or the card does not support the sample rate.
         """
         _require_calibration(rig)
         channels = channels_of(rig)
@@ -167,7 +167,7 @@ class SoundCardDigitizer:
         return Identity("", self._device, "", version, reply)
 
     def start(self) -> None:
-        """Begin sampling, and playing an armed output."""
+        """Start sampling, and start playing if the output is armed."""
         if not self._is_open or self._is_running:
             raise InstrumentError(f"{self._device} is closed, or samples already; open it, or stop it first")
         self._next_sample = 0
@@ -176,7 +176,7 @@ class SoundCardDigitizer:
         self._is_running = True
 
     def read(self, samples: int) -> Block:
-        """Return the next samples; raises DataLost if some were overwritten, InstrumentLost if none come."""
+        """Return the next samples; raises DataLost if some were overwritten, InstrumentLost if none came."""
         if not self._is_running or samples < 1:
             raise InstrumentError(
                 f"{samples} samples were requested from {self._device}, which is not sampling; start it"
@@ -224,7 +224,7 @@ class SoundCardDigitizer:
 
 
 class SoundCardOutput:
-    """An `AnalogOutput` on the card of a `SoundCardDigitizer`, in its stream."""
+    """An `AnalogOutput` on the card of a `SoundCardDigitizer`, in the same stream."""
 
     idle = IdleOutput.ZERO
 
@@ -233,9 +233,9 @@ class SoundCardOutput:
         self._config = config
         self._digitizer = digitizer
         self.sample_rate_hz = digitizer.sample_rate_hz
-        """The rate of the stream."""
+        """Sample rate of the stream [1/s]."""
         self.ahead_samples = int(config.ahead_s * digitizer.sample_rate_hz)
-        """Largest number of samples ahead of the one being played."""
+        """Largest number of samples that can be written ahead of the sample being played."""
         self._card = digitizer.card
         self._full_scale_v = float(digitizer.options["output_full_scale_v"])
         self._is_open = True
@@ -259,7 +259,7 @@ class SoundCardOutput:
         return Identity(card.maker, card.model, "", card.firmware, f"{self._physical} of {card.reply}")
 
     def write(self, volts: Samples) -> None:
-        """Add samples behind those still to be played, waiting for room; raises as `AnalogOutput.write`."""
+        """Add samples after those still to be played; wait for room. Errors: see `AnalogOutput.write`."""
         require_playable(volts, self._physical, self._config.limit_v, is_open=self._is_open)
         card, needed = self._card, np.asarray(volts, dtype=np.float64).size
         with card.changed:
@@ -274,7 +274,7 @@ class SoundCardOutput:
             card.unplayed += needed
 
     def arm(self) -> None:
-        """Play from the digitizer's start on."""
+        """Let the output start playing at the digitizer's start."""
         with self._card.changed:
             if not self._card.unplayed:
                 raise InstrumentError(

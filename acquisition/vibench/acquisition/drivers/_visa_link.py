@@ -1,4 +1,4 @@
-"""Opening VISA resources, with the reason if one cannot be opened."""
+"""Functions that open and list VISA resources, and explain why a resource cannot be opened."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from pyvisa.resources import MessageBasedResource
 from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
 from ..host.shipped import shipped
 
-# A later reply is a failure. The slowest known reply is the read-back of 8192 points.
+# Time limit of a reply [s]. The slowest known reply is the read-back of 8192 points.
 TIMEOUT_S = 3.0
 UDEV_RULES = "hardware_configs/70-vibench.rules"
 USB_DEVICES = Path("/sys/bus/usb/devices")
@@ -28,7 +28,7 @@ Link = MessageBasedResource
 def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) -> Link:
     """Open a VISA resource for messages that end in a newline.
 
-    Raises InstrumentLost when no such instrument answers; InstrumentBusy when another program holds it;
+    Raises InstrumentLost when no such instrument answers; InstrumentBusy when another program uses it;
     InstrumentError when the VISA library itself cannot be used.
     """
     manager = _manager(visa_library)
@@ -75,7 +75,7 @@ def _manager(visa_library: str) -> pyvisa.ResourceManager:
 
 
 def _absent(resource: str, error: Exception) -> InstrumentLost:
-    # A list of other devices would help, but the search of the network takes seconds: not in an emergency.
+    # A list of other devices would help, but a network search takes seconds, too long in an emergency.
     if _is_locked_out(resource):
         return InstrumentLost(
             f"{resource} is on the USB bus, and this account may not use it ({error}). Copy "
@@ -89,7 +89,7 @@ def _absent(resource: str, error: Exception) -> InstrumentLost:
 
 
 def _is_locked_out(resource: str) -> bool:
-    """Whether Linux shows a USB device that this account may not write to: libusb reports it as absent."""
+    """Whether Linux shows a USB device to which this account may not write; libusb reports it as absent."""
     named = _USB.match(resource)
     if named is None:
         return False
@@ -98,7 +98,7 @@ def _is_locked_out(resource: str) -> bool:
         try:
             found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))
             bus, number = (int((device / each).read_text()) for each in ("busnum", "devnum"))
-        except (OSError, ValueError):  # a hub's port, or one that was just unplugged
+        except (OSError, ValueError):  # a port of a hub, or a device that was just unplugged
             continue
         if found == wanted and not os.access(USB_NODES / f"{bus:03d}" / f"{number:03d}", os.W_OK):
             return True
