@@ -1,4 +1,4 @@
-"""Protocols of a bench's instruments, their values, and the plug-ins that provide them.
+"""Protocols of a bench's instruments, their data types, and the plug-ins that provide them.
 
 An instrument is a class that implements one of these protocols. Its package registers it as an entry point of
 the group ``vibench.generators``, ``vibench.digitizers``, ``vibench.outputs``, ``vibench.controllers`` or

@@ -40,7 +40,7 @@ class PlugInKind(StrEnum):
 
 _DRIVERS = "vibench.acquisition.drivers"
 _SENSORS = "vibench.acquisition.rig"
-# They are listed here, not in package metadata: a checkout with other drivers needs no new installation
+# Listed here, not in package metadata: a checkout with other drivers then needs no new installation
 # (docs/decisions/0053-instruments-by-plug-in.md).
 OURS = tuple(
     EntryPoint(name, target, kind)
@@ -65,11 +65,11 @@ OURS = tuple(
 FOUND_IN: Mapping[str, str] = MappingProxyType(
     dict.fromkeys(("branch_continuation", "controller", "lines"), "fast_loop")
 )
-"""Names that our extensions provide, each with its folder in ``extensions``."""
+"""Names that vibench's extensions provide, each with the folder of its extension in ``extensions``."""
 
 
 def missing_package(name: str) -> str | None:
-    """Return the advice which package to install for a name such as ``"branch_continuation"``.
+    """Return a sentence on the package to install for a name such as ``"branch_continuation"``.
 
     Returns None if no extension of vibench provides ``name``, a word of a plan or hardware configuration.
     """
@@ -84,14 +84,14 @@ def missing_package(name: str) -> str | None:
 
 
 def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
-    """Return the names that a hardware configuration may use, ours and those of installed packages."""
+    """Return the names that a hardware configuration may use: vibench's own and installed plug-ins."""
     return tuple(sorted({row.name for row in _rows(kind)}))
 
 
 def plug_in(kind: PlugInKind, name: str) -> Any:
-    """Load the object of an entry point.
+    """Load the object of an entry point, and return it.
 
-    Raises ConfigurationError when no package provides the name, two do, or the package cannot be imported.
+    Raises ConfigurationError when no package or more than one provides the name, or the import fails.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[Ent
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
-    """Load a driver, with a guard unless it is vibench's own; raises ConfigurationError as `plug_in` does.
+    """Return a driver, guarded unless it is vibench's own; raises ConfigurationError as `plug_in` does.
 
     ``kind`` is the group of entry points, ``name`` the name in the hardware configuration and ``promise`` the
     protocol of the entry point's object.
@@ -206,7 +206,7 @@ class Guarded:
 
 
 def _taken(hint: Any, value: Any) -> Any:
-    """Convert a value to the type ``hint``, data classes field by field; raises TypeError or ValueError."""
+    """Return a value converted to ``hint`` (data classes by field); raises TypeError or ValueError."""
     name = getattr(hint, "__name__", str(hint))
     if not is_dataclass(hint):
         return _taken_part(name, hint, value)
@@ -248,5 +248,5 @@ def _adapter(hint: Any) -> TypeAdapter[Any]:
 
 
 def _bare(given: Any) -> Any:
-    """Remove the guard of an instrument that is passed to a plug-in."""
+    """Return the instrument without its guard, to be passed to a plug-in."""
     return given.bare() if isinstance(given, Guarded) else given

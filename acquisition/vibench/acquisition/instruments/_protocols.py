@@ -33,7 +33,7 @@ class Identity:
 
 
 class Knob(FrozenModel):
-    """A setting made by hand that no instrument reports: the operator confirms it."""
+    """Setting made by hand that no instrument reports; the operator must confirm it."""
 
     instrument: str
     setting: str
@@ -42,7 +42,7 @@ class Knob(FrozenModel):
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A converter found by a search."""
+    """Data-acquisition device found by a search."""
 
     name: str
     """Value for ``daq.device`` in the hardware configuration."""
@@ -50,13 +50,13 @@ class FoundDevice:
     """Value for ``daq.product``."""
     serial: str
     inputs: tuple[str, ...]
-    """Values for ``daq.channels.physical``: the part after the slash."""
+    """Names of inputs; the part after the slash is a value for ``daq.channels.physical``."""
     outputs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Overload:
-    """An input above 95 % of its range: its channel, and the samples of the run."""
+    """Range of samples in which an input reaches 95 % of its full scale."""
 
     channel: str
     """Role of the channel, ``"m0_velocity"`` for example."""
@@ -67,15 +67,15 @@ class Overload:
 
 @dataclass(frozen=True)
 class Block:
-    """Samples of all channels from one read, without a gap to the block before."""
+    """Samples of all channels from one read; there is no gap after the previous block."""
 
     first_sample: int
-    """Position of the first sample in the run."""
+    """Number of the block's first sample in the run."""
     volts: Samples
     """Shape (channels, samples) [V] at the converter's input."""
     overloads: tuple[Overload, ...] = ()
     counts: Counts | None = None
-    """The converter's integers, recorded unchanged; times `Digitizer.volts_per_count` they are the volts.
+    """Integers of the converter, recorded unchanged; `Digitizer.volts_per_count` times these gives the volts.
     None if the converter gives only volts."""
 
 
@@ -87,15 +87,15 @@ def _not_zero(units: float) -> float:
 
 @dataclass(frozen=True)
 class SensorFacts:
-    """How a sensor turns its quantity into volts."""
+    """Conversion of a sensor from its quantity to volts."""
 
     quantity: str
-    """``"voltage"``, ``"acceleration"`` or ``"velocity"``: the quantity of the channel's role."""
+    """Quantity of the channel's role: ``"voltage"``, ``"acceleration"`` or ``"velocity"``."""
     unit: str
-    """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
+    """Unit of the quantity in UDUNITS notation: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     units_per_volt: Annotated[float, AfterValidator(_not_zero)]
     full_scale_v: Annotated[float, Field(gt=0, allow_inf_nan=True)]
-    """Largest output, peak [V]; infinite for a wire."""
+    """Largest output voltage, peak [V]; infinite for a wire."""
     name: str
     serial: str = ""
     delay_s: Annotated[float, Field(ge=0)] = 0.0
@@ -110,14 +110,14 @@ class Spacing(StrEnum):
     """Frequency over time."""
 
     LINEAR = "linear"
-    """The same number of hertz in every second."""
+    """Constant rate in hertz per second."""
     LOGARITHMIC = "logarithmic"
-    """The same time in every octave."""
+    """Constant time per octave."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A generator's own sweep, or the sweep that the computer approximates by frequency steps."""
+    """Sine sweep, made by the generator itself or approximated by the computer with frequency steps."""
 
     start_hz: float
     stop_hz: float
@@ -148,13 +148,13 @@ class GeneratorDescription:
     memory_points: tuple[int, int]
     """Fewest and most points of one period of a waveform."""
     usb_ids: tuple[tuple[int, int], ...] = ()
-    """Numbers of maker and product on the USB bus."""
+    """USB numbers of vendor and product, one pair for each variant."""
     longest_sweep_s: float = 0.0
     """Longest internal sweep [s]; 0 without one."""
 
 
 class FunctionGenerator(Protocol):
-    """A generator with a sine, one waveform memory, and an output relay.
+    """Generator with a sine, one waveform memory, and an output that can be switched off.
 
     Amplitudes are peak to peak at the terminal, in volts, as the instrument's panel shows them.
     """
@@ -175,10 +175,10 @@ class FunctionGenerator(Protocol):
         """Set up a sine. The output keeps its state."""
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Put one period (values -1 to 1, the full range being ``amplitude_vpp``) in memory and select it."""
+        """Load one period of values and select it; -1 to 1 is the full range ``amplitude_vpp``."""
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Set up a sine that stays at the start until `trigger`, sweeps, and stays at the stop.
+        """Set up a sweep: a sine at the start frequency, which `trigger` sweeps to the stop frequency.
 
         Raises LimitExceeded when the generator has no such internal sweep; see
         `GeneratorDescription.longest_sweep_s`.
@@ -191,7 +191,7 @@ class FunctionGenerator(Protocol):
         """Change the peak-to-peak amplitude during the drive."""
 
     def arm_burst(self, cycles: int) -> None:
-        """Play this many periods at each `trigger`, with 0 V before and after."""
+        """Play ``cycles`` periods at each `trigger`, with 0 V before and after."""
 
     def trigger(self) -> None:
         """Fire an armed burst, or begin a sweep."""
@@ -213,7 +213,7 @@ class FunctionGenerator(Protocol):
 
 
 class Digitizer(Protocol):
-    """A converter that samples voltages continuously, without gaps."""
+    """Converter that samples voltages continuously, without gaps."""
 
     @property
     def identity(self) -> Identity:
@@ -221,7 +221,7 @@ class Digitizer(Protocol):
 
     @property
     def sample_rate_hz(self) -> float:
-        """The real sample rate, read back from the hardware."""
+        """Actual sample rate, read back from the hardware [1/s]."""
 
     @property
     def roles(self) -> tuple[str, ...]:
@@ -253,14 +253,14 @@ class Digitizer(Protocol):
 
 
 class IdleOutput(StrEnum):
-    """Voltage of an output that gets no more samples."""
+    """Voltage of an output that receives no further samples."""
 
     ZERO = "goes to zero volts"
     HELD = "holds its last value"
 
 
 class AnalogOutput(Protocol):
-    """An output that plays samples written in advance, beginning with the digitizer's start."""
+    """Output that plays samples written in advance, starting together with the digitizer."""
 
     @property
     def identity(self) -> Identity:
@@ -268,7 +268,7 @@ class AnalogOutput(Protocol):
 
     @property
     def sample_rate_hz(self) -> float:
-        """The real sample rate."""
+        """Actual sample rate [1/s]."""
 
     @property
     def idle(self) -> IdleOutput:
@@ -286,7 +286,7 @@ class AnalogOutput(Protocol):
         LimitExceeded
             When a sample is beyond the limit of the bench. Nothing was written.
         DataLost
-            When the output ran empty: it has stopped.
+            When the output ran out of samples and has stopped.
         """
 
     def arm(self) -> None:
@@ -300,7 +300,7 @@ class AnalogOutput(Protocol):
 
 
 class RealTimeController(Protocol):
-    """An instrument that plays instead of the generator, with its own feedback loop."""
+    """Instrument with its own feedback loop, which plays instead of the generator."""
 
     @property
     def identity(self) -> Identity:
@@ -311,15 +311,15 @@ class RealTimeController(Protocol):
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:
-    """Read a block; refuse an empty one, because a caller that waits for samples would wait forever.
+    """Return the next block; refuse an empty block, because its caller would wait for samples forever.
 
-    Raises InstrumentError when the block is empty, has other channels, flags an unknown one, or contains
-    volts that are not finite; or the errors of `Digitizer.read`.
+    Raises InstrumentError when the block is empty, has a wrong number of channels, an overload of an unknown
+    channel, or volts that are not finite. Also raises the errors of `Digitizer.read`.
 
     Parameters
     ----------
     digitizer
-        A converter that is sampling.
+        Converter that is sampling.
     samples
         Number of samples of every channel.
     """
