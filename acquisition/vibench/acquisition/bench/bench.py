@@ -1,4 +1,4 @@
-"""The bench: all instruments of a rig, opened together or not at all, and left with the generator silent."""
+"""Bench: all instruments of a rig, opened together or not at all, and left with the generator silent."""
 
 import os
 import re
@@ -54,14 +54,14 @@ from ..rig import (
 )
 from .result import CheckResult
 
-# Only one program may use a bench. A lock ends with the process that holds it, even if that is killed.
+# Only one program may use a bench. A lock ends with the process that holds it, even if it is killed.
 #
 # Each instrument has a file in the user's own state folder and one in a folder that all users of the
 # computer share. The holder writes its process and user into the file, but only the system's lock counts.
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Text accepted from a lock file: anybody may write into it, and the text is shown in an error."""
+"""Text accepted from a lock file: anyone may write to the file, and an error shows the text."""
 
 
 class BenchLock:
@@ -72,7 +72,7 @@ class BenchLock:
 
     @classmethod
     def of(cls, rig: Rig) -> "BenchLock":
-        """Lock the instruments of a rig.
+        """Lock the instruments of a rig, and return the locks.
 
         Raises InstrumentBusy when another process has locked one of them, or a lock file cannot be locked.
         """
@@ -143,7 +143,7 @@ def _holder(descriptor: int) -> str:
 
 
 def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
-    """Load the virtual rig by name: a real bench must not load the simulation or depend on it."""
+    """Return the virtual rig, loaded by name: a real bench must not load or need the simulation."""
     made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
     return made
 
@@ -151,7 +151,7 @@ def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
 class RigPower:
     """Switches a virtual rig on and off, or locks a real one. Use it in a ``with``.
 
-    A virtual rig outlasts a bench on it: its rig time and its script of faults continue while the bench is
+    A virtual rig can outlast its bench: its rig time and its script of faults continue while the bench is
     closed and opened again.
     """
 
@@ -162,7 +162,7 @@ class RigPower:
 
     @property
     def connected(self) -> Rig:
-        """The rig with the addresses at which its instruments answer now."""
+        """Rig with the addresses at which its instruments can be reached now."""
         if self._virtual is None:
             return self.rig
         rig, virtual = self.rig, self._virtual
@@ -212,7 +212,7 @@ class RigPower:
 
 
 class _AimedDigitizer:
-    """A digitizer whose channel ``m0_velocity`` has the role of the mass that the beam is on."""
+    """Digitizer whose channel ``m0_velocity`` has the role of the mass at which the beam points."""
 
     def __init__(self, digitizer: Digitizer, role: Role) -> None:
         self._digitizer = digitizer
@@ -227,7 +227,7 @@ class _AimedDigitizer:
         return tuple(self._names.get(each, each) for each in self._digitizer.roles)
 
     def read(self, samples: int) -> Block:
-        """Read the next samples; overloads have the role of the mass."""
+        """Return the next samples; overloads have the role of that mass."""
         block = self._digitizer.read(samples)
         named = (
             replace(each, channel=self._names.get(each.channel, each.channel)) for each in block.overloads
@@ -236,7 +236,7 @@ class _AimedDigitizer:
 
 
 class BenchKind(StrEnum):
-    """Whether a bench measures with real instruments."""
+    """Whether the instruments of a bench are real or simulated."""
 
     REAL = "real"
     SIMULATED = "simulated"
@@ -245,8 +245,8 @@ class BenchKind(StrEnum):
 class Bench:
     """The open instruments of a rig. Use it in a ``with``, or `close` it.
 
-    Leaving silences generator and analogue output first, then closes everything. After an error inside the
-    ``with``, that error is raised; errors while leaving become notes on it.
+    Leaving the ``with`` silences generator and analogue output first, then closes everything. After an error
+    inside the ``with``, that error is raised; errors during leaving are added to it as notes.
     """
 
     def __init__(
@@ -267,7 +267,7 @@ class Bench:
         self.controller = controller
         self.confirmations = confirmations
         self.last_check: CheckResult | None = None
-        """The check that this bench was admitted on; see `vibench.acquisition.check`."""
+        """Bench check by which this bench was admitted; see `vibench.acquisition.check`."""
         self._power = power
         self._closing = closing
 
@@ -285,7 +285,7 @@ class Bench:
 
     @property
     def kind(self) -> BenchKind:
-        """Whether the instruments are simulated."""
+        """Whether the instruments are real or simulated."""
         return _kind(self.rig, self.digitizer)
 
     @contextmanager
@@ -304,7 +304,7 @@ class Bench:
             self._power.aim(Role.M0_VELOCITY)
 
     def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled [s]; a virtual rig at free pace needs no real time for it."""
+        """Wait while nothing is sampled [s]; a virtual rig at free pace does this without real time."""
         self._power.idle(duration_s)
 
     def close(self) -> None:
@@ -324,7 +324,7 @@ def open_bench(
     calibration: CalibrationRule | str = CalibrationRule.ENFORCED,
     power: RigPower | None = None,
 ) -> Bench:
-    """Open every instrument of a rig, with generator and analogue output silent.
+    """Open all instruments of a rig, with generator and analogue output silent, and return the bench.
 
     Parameters
     ----------
@@ -332,23 +332,23 @@ def open_bench(
         The rig, or the path of its TOML file. With a ``[virtual]`` table the simulated instruments
         are started as well, and stopped when the bench is left.
     confirm
-        How settings made by hand are confirmed; see `knobs`. Absent: at the terminal, and for a
-        virtual rig without asking.
+        Function that confirms settings made by hand; see `knobs`. None: ask at the terminal; for a
+        virtual rig, confirm without asking.
     calibration
-        Effect of an expired calibration; those of a virtual rig never expire.
+        Effect of an expired calibration; calibrations of a virtual rig never expire.
     power
-        Holder of the rig that outlasts this bench; absent, leaving the bench releases the rig.
+        Power of a rig that outlasts this bench; None: the rig is released with the bench.
 
     Raises
     ------
     ConfigurationError
-        When the file contains something that is not allowed.
+        When the file contains a value or key that is not allowed.
     CheckFailed
         When a calibration has expired, or a knob is not confirmed.
     InstrumentBusy
         When another program has this bench open.
     InstrumentError
-        When an instrument cannot be opened; the others are then closed again.
+        When an instrument cannot be opened; the other instruments are then closed again.
     """
     rig = config if isinstance(config, Rig) else load_rig(config)
     has_sensors = rig.virtual is None and not rig.plays_back
@@ -410,7 +410,7 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
         if error is None:
             raise
         error.add_note(f"While leaving the bench: {failure}")
-        # Each failure has the one before it as its context.
+        # Each failure has the previous failure as its context.
         earlier = failure.__context__
         while earlier is not None and earlier is not error:
             error.add_note(f"While leaving the bench: {earlier}")

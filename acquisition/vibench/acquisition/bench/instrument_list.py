@@ -21,7 +21,7 @@ class InstrumentList:
 
 
 def list_instruments(visa_library: str = "@py", server: str | None = None) -> InstrumentList:
-    """Search VISA and DAQmx; the error of a failed search becomes a remark.
+    """Return the instruments found by VISA and DAQmx; the error of a failed search becomes a remark.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
 
 
 def list_rig_instruments(rig: Rig) -> InstrumentList:
-    """Search with a rig's VISA library and DAQmx server; a virtual rig is switched on for the search."""
+    """Return what a rig's VISA library and DAQmx server find; a virtual rig runs during the search."""
     if rig.virtual is None:
         return list_instruments(rig.generator.visa_library, rig.daq.server)
     with simulated_rig(rig) as virtual:

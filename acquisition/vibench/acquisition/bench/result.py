@@ -18,7 +18,7 @@ class Verdict(StrEnum):
 
     OK = "ok"
     WARN = "warn"
-    """Look at the cause; measurements may be less accurate."""
+    """Find the cause; measurements may be less accurate."""
     FAIL = "fail"
     """Do not energise."""
 
@@ -35,17 +35,17 @@ class Finding(FrozenModel):
     expected: str
     verdict: Verdict
     number: float | None = None
-    """The value as a number, in ``unit``; absent where there is none."""
+    """Value as a number, in ``unit``; None if the value is not a number."""
     uncertainty: float | None = None
     """Standard uncertainty of the number."""
     unit: str = ""
     advice: str = ""
-    """Advice; empty if the finding is ok."""
+    """What to do; empty if the finding is ok."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Limits of a deviation: ok up to ``well``; above ``fail`` the bench must not be energised."""
+    """Limits of a deviation: ok up to ``well``, a warning up to ``fail``, above that a FAIL."""
 
     well: float
     fail: float
@@ -66,7 +66,7 @@ def finding_of(
     advice: str,
     uncertainty: float | None = None,
 ) -> Finding:
-    """Make a finding from a number; the advice is left out when the verdict is ok."""
+    """Return the finding for a number; the advice is left out when the verdict is ok."""
     spread = "" if uncertainty is None else f" +- {uncertainty:.1g}"
     return Finding(
         name=name,
@@ -121,19 +121,19 @@ _DAY = timedelta(days=1)
 
 
 class CheckResult(FrozenModel):
-    """Findings of a bench check, with the data that show whether it is still valid."""
+    """Findings of a bench check, with the data needed to decide whether the check is still valid."""
 
     rig: str
     """Name of the rig."""
     rig_digest: str
-    """Fingerprint of the configuration that was checked: see `rig_digest`."""
+    """SHA-256 of the checked configuration; see `rig_digest`."""
     checked: AwareDatetime
     verdict: Verdict
     findings: tuple[Finding, ...]
 
     @classmethod
     def of(cls, rig: Rig, report: BenchReport, checked: datetime) -> Self:
-        """Make the result from a report, its rig and its time."""
+        """Return the result for a report, its rig and its time."""
         return cls(
             rig=rig.name,
             rig_digest=rig_digest(rig),
@@ -153,7 +153,7 @@ class CheckResult(FrozenModel):
 
 
 def rig_digest(rig: Rig) -> str:
-    """Return a fingerprint of a rig's configuration: 64 hexadecimal digits."""
+    """Return the SHA-256 of a rig's configuration, without settings that need no new check."""
     content = rig.model_dump(mode="json", exclude={"check_valid_h": True, "virtual": _PACE})
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
