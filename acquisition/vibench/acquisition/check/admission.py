@@ -1,6 +1,6 @@
-"""Admission of a bench by a recent passed check of the same configuration.
+"""Admission of a bench, which requires a recent passed check of the same configuration.
 
-The last check of each rig is a JSON file in the user's state folder; changes since then are reported in
+The last check of each rig is a JSON file in the user's state folder; later changes are reported in
 decibels (gains) and ppm (clock).
 """
 
@@ -30,11 +30,11 @@ class CheckRule(StrEnum):
     """Bench check that is required before measurements."""
 
     FRESH = "fresh"
-    """A check passed within the last ``check_valid_h`` hours with the same configuration."""
+    """A check of the same configuration must have passed within the last ``check_valid_h`` hours."""
     NOW = "now"
-    """A new check."""
+    """A new check must pass."""
     WAIVED = "waived"
-    """No check; recordings contain the result of the last check, if there is one."""
+    """No check is required; recordings contain the result of the last check, if there is one."""
 
 
 FOLDER = "bench_checks"
@@ -42,7 +42,7 @@ _HASH_DIGITS = 8
 
 
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
-    """Return the path of a rig's last check: the name in letters and digits, and a hash of the name.
+    """Return the path of a rig's last check; it contains the rig's name and a hash of the name.
 
     With ``passed``, the path of the last check that did not fail.
     """
@@ -52,7 +52,7 @@ def archive_path(rig_name: str, *, passed: bool = False) -> Path:
 
 
 def last_check(rig_name: str) -> CheckResult | None:
-    """Return the last check of a rig; None if it is missing or unreadable by this version.
+    """Return the last check of a rig; None if it is missing, or this version cannot read it.
 
     ``rig_name`` is the name in its hardware configuration.
     """
@@ -60,7 +60,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 
 
 def last_passed(rig: Rig) -> CheckResult | None:
-    """Return the last check of a rig with its current configuration that did not fail; None without one."""
+    """Return the last check without FAIL of a rig in its current configuration; None if there is none."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
             return each
@@ -75,7 +75,7 @@ def _read(path: Path) -> CheckResult | None:
 
 
 def keep(result: CheckResult) -> None:
-    """Store a result atomically in place of the last one.
+    """Store a result atomically in place of the last result.
 
     Raises RecordingError when the state folder cannot be written.
     """
@@ -98,9 +98,9 @@ def _write(result: CheckResult, *, passed: bool) -> None:
 
 
 DRIFT_DB = Bounds(0.5, 3.0)
-"""Drift of a gain, from one check to the next on an unchanged configuration."""
+"""Drift of a gain between two checks of an unchanged configuration."""
 CLOCK_PPM = Bounds(20.0, inf)
-"""Drift [ppm] of the ratio of two clocks: oscillators age by some ppm a year."""
+"""Drift of the ratio of two clocks [ppm]; oscillators age by some ppm per year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "the configuration has not changed: look for a changed knob, a cable, a loose sensor or a failing "
@@ -110,9 +110,9 @@ _ADVICE = (
 
 
 def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, ...]:
-    """Compare every level of a check with the last one.
+    """Return findings on the changes of levels and clock since the last check.
 
-    Both have the same sine level, because the configuration is the same.
+    Both checks used the same sine level, because the configuration is the same.
     """
     before = {finding.name: finding for finding in last.findings}
     since = f"since {ago(at - last.checked)}"
@@ -153,7 +153,7 @@ Clock = Callable[[], datetime]
 
 
 def utc_now() -> datetime:
-    """Return the computer's time."""
+    """Return the computer's time in UTC."""
     return datetime.now(UTC)
 
 
@@ -165,20 +165,20 @@ def check_bench(
     *,
     new_reference: bool = False,
 ) -> CheckResult:
-    """Check a bench, compare with the last time that it passed, and keep the result; see `bench_report`.
+    """Check a bench, compare with its last passed check, and store the result; see `bench_report`.
 
     Parameters
     ----------
     bench
         The open bench.
     folder
-        Folder for recordings, whose disk is checked.
+        Folder for recordings; the free space of its disk is checked.
     clock
         Returns the current time.
     switch
-        Ends the check from another thread.
+        Switch by which another thread can stop the check.
     new_reference
-        Accept all changes since the last check.
+        Do not compare with the last passed check: its changes are accepted.
     """
     report, at = bench_report(bench, folder, switch), clock()
     last = None if new_reference else last_passed(bench.rig)
@@ -197,13 +197,13 @@ def require_fresh(
     clock: Clock = utc_now,
     switch: StopSwitch | None = None,
 ) -> CheckResult | None:
-    """Admit a bench by its last check or by a new one, whose result is stored in recordings.
+    """Admit a bench by its last check or a new check, and return that check for the recordings.
 
-    A virtual rig without a valid check is checked at once; a real one is never played without a request. A
-    recording that is played back needs no check.
+    A virtual rig without a valid check is checked at once; on a real bench nothing is played without a
+    request. A recording that is played back needs no check.
 
-    Raises CheckFailed when the last check is missing, old, failed or of another configuration (nothing was
-    played then), or when the new check fails. Raises InstrumentError when an instrument fails.
+    Raises CheckFailed when the last check is missing, too old, failed or for another configuration (nothing
+    was played then), or when the new check fails. Raises InstrumentError when an instrument fails.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def require_fresh(
     folder
         Folder for recordings.
     switch
-        Ends the new check from another thread.
+        Switch by which another thread can stop the new check.
     """
     if bench.rig.plays_back:
         return None
@@ -245,7 +245,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
 
 
 def require_on_record(bench: Bench) -> None:
-    """Admit a bench by its last check without playing anything; a virtual one needs none.
+    """Admit a bench by its last check without playing anything; a virtual bench needs no check.
 
     Raises CheckFailed when a real bench has no valid check.
     """
@@ -260,7 +260,7 @@ def require_on_record(bench: Bench) -> None:
 
 
 def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
-    """Return the reason why a check is not valid for a rig; None if it is."""
+    """Return the reason why a check is not valid for a rig; None if it is valid."""
     if last is None:
         return f"the bench {rig.name!r} was never checked on this account"
     when = f"the last check of {rig.name!r}, at {last.checked:%Y-%m-%d %H:%M %Z},"
@@ -283,7 +283,7 @@ def _require_passed(result: CheckResult) -> CheckResult:
 
 
 def _output_after(result: CheckResult) -> str:
-    """Return a clause on the measured state of the output."""
+    """Return a clause that states whether the output was measured as off."""
     left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
     if left is None or left.verdict is Verdict.FAIL:
         return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand,"

@@ -1,4 +1,4 @@
-"""Check of a whole bench: silence first, then a small sine, then silence again."""
+"""Check of a whole bench in silence, with a small sine, and in silence again."""
 
 import shutil
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from ..stopping.stop import Cause, StopSwitch
 from .loop import LoopCheck
 
 CHECK_SHARE = 0.02
-"""Largest level of the sine relative to the bench's amplitude limit, far below clipping."""
+"""Largest level of the sine as a fraction of the bench's amplitude limit, far below clipping."""
 # After this time a step has decayed in an AC coupling of 0.5 Hz.
 _SETTLE_S = 1.5
 _READ_S = 2.0
@@ -31,27 +31,27 @@ _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
 """RMS of a silent channel relative to its full scale."""
 _MEDIAN_OF_NORMAL = 0.6745
-"""Median of |normal variable| over its standard deviation."""
+"""Median magnitude of a normal variable, divided by its standard deviation."""
 _IN_MOMENTS = 0.2
-"""Ratio of usual noise to total rms, below which the noise is intermittent."""
+"""Noise is intermittent if the ratio of usual noise to total rms is below this."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Latency of one verified setting, which limits how fast the generator can be stopped."""
+"""Duration of one verified setting [s], which limits how fast the generator can be stopped."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Recording time that the disk should have space for, negative since more is better [h]."""
+"""Recording time for which the disk has space [h]; negated, because more is better."""
 
 
 def bench_report(
     bench: Bench, folder: Path, switch: StopSwitch | None = None, amplitude_vpp: float | None = None
 ) -> BenchReport:
-    """Check a bench before measurements; the generator is silent afterwards.
+    """Check a bench before measurements and return the findings; the generator is silent afterwards.
 
-    Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
+    All channels are read in silence, during a small sine at 160 Hz for some seconds, and in silence again.
 
-    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails, DataLost when the
-    converter leaves samples out, ConfigurationError when the bench plays a recording back. Everything else
-    that is wrong becomes a finding.
+    Raises CheckStopped when somebody stopped the check, InstrumentError when an instrument fails, DataLost
+    when the converter lost samples, and ConfigurationError when the bench plays a recording back. All other
+    faults become findings.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def bench_report(
     folder
         Folder for recordings.
     switch
-        Ends the check from another thread, within a block of samples.
+        Switch by which another thread can stop the check, within a block of samples.
     amplitude_vpp
         Amplitude of the sine [V]; by default at most 2 % of the amplitude limit, and too small for contact.
     """
@@ -89,7 +89,7 @@ def bench_report(
 
 
 class _BlockReader:
-    """Reads a bench in blocks; the check can be stopped between them."""
+    """Reader of a bench in blocks; the check can be stopped between two blocks."""
 
     def __init__(self, bench: Bench, switch: StopSwitch) -> None:
         self._bench = bench
@@ -98,7 +98,7 @@ class _BlockReader:
         self._advance: Callable[[], None] = lambda: None
 
     def in_silence(self) -> Samples:
-        """Read all channels while nothing plays, after the AC couplings have settled."""
+        """Return all channels while nothing plays, after the AC couplings have settled."""
         digitizer = self._bench.digitizer
         self._begin()
         try:
@@ -108,7 +108,7 @@ class _BlockReader:
             digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
-        """Play the sine without a ramp, like the check of a run, and read the settled channels."""
+        """Play the sine without a ramp, like the check of a run, and return the settled channels."""
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
         measuring = Phase(RunState.CHECKING, tone, _READ_S)

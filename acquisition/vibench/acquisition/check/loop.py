@@ -1,4 +1,4 @@
-"""Loop check by one sine: detection and levels in every channel."""
+"""Loop check with one sine: detection, levels and phases of the channels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,28 +19,28 @@ _WINDOWS = 20
 
 @dataclass(frozen=True)
 class SineFit:
-    """A least-squares sine."""
+    """Sine fitted by least squares."""
 
     amplitude: float
     uncertainty: float
     """Standard uncertainty of the amplitude, from the residual."""
     phase_rad: float
-    """Phase of a cosine, at the first sample."""
+    """Phase of the sine as a cosine, at the first sample."""
 
 
 @dataclass(frozen=True)
 class ClockRatio:
-    """Ratio of two clocks."""
+    """Deviation of the ratio of two clocks from 1."""
 
     ppm: float
     uncertainty_ppm: float
 
 
 def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> SineFit:
-    """Fit cosine, sine and a constant.
+    """Return the least-squares fit of a cosine, a sine and a constant.
 
-    The uncertainty is that of white noise, ``residual * sqrt(2 / n)`` (Kay, Fundamentals of
-    Statistical Signal Processing, vol. 1, example 3.14). ``volts`` spans more than one period.
+    The uncertainty assumes white noise: ``residual * sqrt(2 / n)`` (Kay, Fundamentals of Statistical Signal
+    Processing, vol. 1, example 3.14). ``volts`` must span more than one period.
     """
     angle = 2 * pi * frequency_hz * np.arange(volts.size) / sample_rate_hz
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
@@ -55,9 +55,9 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
 
 
 def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> ClockRatio:
-    """Return the deviation of a sine from ``frequency_hz`` [ppm].
+    """Return the relative deviation of a sine's frequency from ``frequency_hz`` [ppm].
 
-    Fits a straight line through the phases of twenty windows; its slope is the offset in frequency.
+    A straight line is fitted to the phases of twenty windows; its slope is the frequency deviation.
     """
     length = volts.size // _WINDOWS
     starts = np.arange(_WINDOWS) * length
@@ -74,22 +74,22 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
 
 
 DRIVE_DEVIATION = Bounds(0.02, 0.15)
-"""Deviation of the measured drive from the setting."""
+"""Relative deviation of the measured drive from the setting."""
 GAIN_DB = Bounds(1.0, 3.0)
 """Deviation of the amplifier's gain from the rig's model."""
 BASE_DB = Bounds(1.5, 3.0)
 """Deviation of the base's acceleration from the rig's model."""
 CLOCK_PPM = Bounds(100.0, 500.0)
-"""Deviation of the clock ratio: two oscillators of 50 ppm each."""
+"""Deviation of the clock ratio from 1, for two oscillators of 50 ppm each."""
 DETECTED = 10.0
-"""Least ratio of the sine to its uncertainty for detection."""
+"""Smallest ratio of amplitude to uncertainty of a detected sine."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Phase deviation of a channel from the rig's model; above 90 degrees its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""The same for m0, without FAIL, because the specimen is less well known than the shaker."""
+"""Phase deviation of m0; never a FAIL, because the specimen is less well known than the shaker."""
 LEFT_OVER = Bounds(0.02, 0.05)
-"""Largest remaining share of the drive with the output off."""
+"""Fraction of the drive that remains with the output off."""
 
 AMPLIFIER_GAIN = "amplifier gain"
 DRIVE_CLOCK = "drive's clock"
@@ -99,15 +99,15 @@ DRIVE_LEFT = "drive left after stop"
 
 
 def detection_name(role: Role) -> str:
-    """Return the name of the finding on whether a channel detects the sine."""
+    """Return the name of the finding that states whether a channel detects the sine."""
     return f"{role.value} hears the sine"
 
 
 class Lasting(Enum):
-    """Quantities that are compared between checks."""
+    """Kinds of quantities that are compared between checks."""
 
     GAIN = auto()
-    """In decibels."""
+    """Gain in decibels."""
     LEVEL = auto()
     CLOCK = auto()
 
@@ -142,7 +142,7 @@ class LoopCheck:
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
-        # Channels that do not detect the sine are reported already.
+        # Channels that do not detect the sine have been reported above.
         if self._detects(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):
@@ -245,7 +245,7 @@ class LoopCheck:
         )
 
     def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
-        """Compare a channel's phase over the drive with the model's; 180 degrees off mean a wrong sign."""
+        """Compare a channel's phase relative to the drive with the model; 180 degrees off is a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
         each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
         off_deg = each_deg[np.argmin(np.abs(each_deg))]
