@@ -1,4 +1,4 @@
-"""Options of the contract tests, in an entry point: with ``--pyargs`` a conftest is loaded too late."""
+"""Options of the contract tests, in an entry point: ``--pyargs`` loads a conftest too late for options."""
 
 import pytest
 

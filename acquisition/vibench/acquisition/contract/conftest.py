@@ -1,4 +1,4 @@
-"""The instrument under test and its bench, from the command line."""
+"""Instrument under test and its bench, as given on the command line."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
 from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
 
 LEVEL = 0.02
-"""Level of the tests, as a share of the bench's amplitude limit."""
+"""Signal level of the tests, as a fraction of the bench's amplitude limit."""
 SETTLING_S = 0.3
 _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
@@ -31,14 +31,14 @@ def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Read the given bench, or the first shipped virtual one that names the instrument."""
+    """Return the given bench, or the first shipped virtual one, if it names the instrument; else None."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in named_in(rig)[kind] else None
     for path in all_shipped("hardware_configs"):
         try:
             rig = load_rig(path)
-        except ConfigurationError:  # it needs a package that is not installed
+        except ConfigurationError:  # the bench needs a package that is not installed
             continue
         if rig.virtual is not None and name in named_in(rig)[kind]:
             return rig
@@ -46,7 +46,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in with this name; refuse a name that no test can use."""
+    """Return a bench for each kind of plug-in with this name; refuse a name without any bench."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
@@ -71,7 +71,7 @@ def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:
-    """Report an error of the command once, before the first test."""
+    """Report an error of the command line once, before the first test."""
     config.stash[_RIGS] = chosen_rigs(
         config.getoption("--vibench-instrument"), config.getoption("--vibench-bench")
     )
@@ -106,7 +106,7 @@ def refused() -> Iterator[None]:
 
 
 def heard_v(bench: Bench, duration_s: float) -> Samples:
-    """Wait for settling, then return the volts at the generator's terminal for ``duration_s``."""
+    """Return the voltage at the generator's terminal over ``duration_s``, after settling [V]."""
     count = int(duration_s * bench.digitizer.sample_rate_hz)
     bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))
     row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)
@@ -115,7 +115,7 @@ def heard_v(bench: Bench, duration_s: float) -> Samples:
 
 
 def line_v(volts: Samples, frequency_hz: float, rate_hz: float) -> float:
-    """Return the amplitude of one sine in a stretch, by least squares [V]."""
+    """Return the amplitude of one sine in a signal, by least squares [V]."""
     angle = 2 * np.pi * frequency_hz * np.arange(len(volts)) / rate_hz
     basis = np.stack((np.cos(angle), np.sin(angle), np.ones_like(angle)), axis=1)
     found, *_ = np.linalg.lstsq(basis, volts)

@@ -13,7 +13,7 @@ KIND = PlugInKind.GENERATOR
 TONE_HZ = 160.0
 SAME = 0.03
 QUIET = 0.05
-"""Largest level in silence, as a share of the played level."""
+"""Largest level in silence, as a fraction of the played level."""
 
 
 def level_vpp(bench: Bench) -> float:
@@ -22,7 +22,7 @@ def level_vpp(bench: Bench) -> float:
 
 
 def terminal_v(bench: Bench) -> float:
-    """Return the amplitude at the terminal of a sine at the test level [V]."""
+    """Return the terminal amplitude of a sine at the test level [V]."""
     return 0.5 * level_vpp(bench) * bench.rig.generator.terminal_factor()
 
 
@@ -77,7 +77,7 @@ def test_frequency_and_amplitude_change_while_it_plays(bench: Bench) -> None:
 
 
 def test_a_waveform_is_played_point_by_point_at_its_repetition(bench: Bench) -> None:
-    # Two lines of different size, reaching half of the full range: the setting applies to the full range.
+    # Two sines with a total peak of half the full range, because the setting applies to the full range.
     fewest, most = generator_driver(bench.rig.generator).describe(bench.rig.generator).memory_points
     points = max(fewest, min(most, 1024))
     turn = 2 * np.pi * np.arange(points) / points
@@ -152,7 +152,7 @@ def test_a_built_in_sweep_waits_for_its_trigger_and_ends_at_its_stop(bench: Benc
     rate_hz = bench.digitizer.sample_rate_hz
     volts = bench.digitizer.read(int(2.5 * rate_hz)).volts[row]
     rises = np.count_nonzero((volts[:-1] < 0) & (volts[1:] >= 0))
-    # Samples before the trigger are at the start frequency, those after the end at the stop frequency.
+    # Samples before the trigger have the start frequency; samples after the end have the stop frequency.
     swept = sweep.duration_s * (sweep.start_hz + sweep.stop_hz) / 2
     assert swept + 0.5 * sweep.start_hz - 2 <= rises <= swept + 0.5 * sweep.stop_hz + 2
     assert tone_v(bench, sweep.stop_hz) == pytest.approx(terminal_v(bench), rel=SAME)

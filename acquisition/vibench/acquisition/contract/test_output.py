@@ -32,7 +32,7 @@ def level_v(bench: Bench) -> float:
 
 @contextmanager
 def playing(bench: Bench) -> Iterator[None]:
-    """Play a tone as long as the samples that are written ahead."""
+    """Play a tone with the duration of the samples that are written ahead."""
     output = output_of(bench)
     stretch = output.ahead_samples // 2
     output.write(tone(output, level_v(bench), 0, stretch))
