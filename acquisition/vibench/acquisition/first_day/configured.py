@@ -1,4 +1,4 @@
-"""A configuration from a template and answers to questions, and the first tests of the bench."""
+"""Configuration of a bench from a template and answers to questions, and first tests of the bench."""
 
 import errno
 import json
@@ -43,7 +43,7 @@ class Found(Enum):
 
 @dataclass(frozen=True)
 class Question:
-    """One value of the configuration."""
+    """Question about one value of the configuration."""
 
     key: str
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
@@ -95,7 +95,7 @@ QUESTIONS = (
 
 
 def questions_for(text: str) -> tuple[Question, ...]:
-    """Return the questions that apply to a template; those on further sensors come before the last."""
+    """Return the questions for a template; questions on further sensors come before the last question."""
     roles = tomllib.loads(text).get("sensors", {})
     others = [
         Question(key, words.format(role.replace("_", " ")))
@@ -121,16 +121,16 @@ _CHANNEL = "daq.channels."
 
 
 def value_in(text: str, key: str) -> str:
-    """Return the template's value as text; empty if it has none for the key."""
+    """Return the template's value for a key as text; empty if the template has no value."""
     found = _place(text, key)
     return "" if found is None else found.group("value")
 
 
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
-    """Replace a value of the template by an answer, with a note on its source.
+    """Return the template with a value replaced by an answer, and a note on its source.
 
-    Raises ConfigurationError when the answer has another type than the value (text for a number or date),
-    or the template has no such table.
+    Raises ConfigurationError when the type of the answer is wrong (text for a number or date), or the
+    template has no table for the key.
     """
     found = _place(text, key)
     if found is not None:
@@ -154,7 +154,7 @@ def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
 
 
 def _guess_type(answer: str) -> str:
-    """Write an answer as a TOML number if possible, otherwise as text."""
+    """Return an answer as a TOML number if possible, otherwise as TOML text."""
     try:
         return _as_toml(answer)
     except ValueError:
@@ -162,7 +162,7 @@ def _guess_type(answer: str) -> str:
 
 
 def _as_toml(number: str) -> str:
-    """Write a number in TOML, which does not allow .5 and 010; raises ValueError if it is not a number."""
+    """Return a number as TOML, which does not allow .5 and 010; raises ValueError for other text."""
     value = float(number)
     try:
         tomllib.loads(f"number = {number}")
@@ -231,12 +231,12 @@ def _number(answer: str, key: str) -> str:
 
 
 Ask = Callable[[Question, Sequence[str], str], str]
-"""Asks a question, with proposals and the template's value; an empty answer keeps the value."""
+"""Asks a question, with proposals and the template's value; an empty answer keeps that value."""
 Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer, because nobody can be asked again."""
+    """Raise the error of an answer, because the question cannot be asked again."""
     raise error
 
 
@@ -245,7 +245,7 @@ _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECA
 
 
 def found_choices(question: Question, seen: InstrumentList) -> tuple[str, ...]:
-    """Return the instruments that the computer finds for a question."""
+    """Return the names of the found instruments that can answer a question."""
     match question.found:
         case Found.GENERATORS:
             return seen.visa_resources
@@ -264,11 +264,11 @@ def configure(
     questions: Sequence[Question] | None = None,
     refuse: Refuse = refuse_at_once,
 ) -> Rig:
-    """Ask all questions, write the configuration, and read it back.
+    """Ask all questions, write the configuration, read it back, and return it.
 
-    Without ``questions``, those that have a place in the template are asked. Comments of ``template`` say
-    CONFIRM for unchecked values. ``note``, with name and time, is added to each answer. ``refuse`` receives
-    the error of one answer or of all together; if it returns, the questions are asked again.
+    ``questions`` are by default those with a place in the template. Comments of ``template`` mark unchecked
+    values by CONFIRM. ``note``, with name and time, is added to each answer. ``refuse`` receives the error
+    of one answer or of all answers together; if it returns, the questions are asked again.
 
     Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
     """
@@ -299,7 +299,7 @@ def configure(
 def _valid_answer(
     text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
 ) -> str:
-    """Ask until the answer has the right type and is within its bounds; all are checked together later."""
+    """Ask until an answer has the right type and is within its bounds; return the changed text."""
     while answer := ask(question, choices, _default_answer(text, question.key)):
         try:
             _require_text(answer, question.key)
@@ -318,7 +318,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Return the template's value; for a number with its source, the number."""
+    """Return the template's value as the default answer; of a number with its source, only the number."""
     written = value_in(text, key)
     match tomllib.loads(f"held = {written}")["held"] if written else None:
         case {"value": number}:
@@ -388,15 +388,15 @@ _FROM = {
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, beside the shaker",
 }
 Confirmed = Callable[[str], str]
-"""Asks whether a wire connects two ends. The page shows the answer; an empty one ends the procedure."""
+"""Asks whether a wire connects two ends. The page shows the answer; an empty answer ends the procedure."""
 
 
 @dataclass(frozen=True)
 class DayPage:
-    """The record of a first day."""
+    """Page that records a first day."""
 
     text: str
-    """Markdown."""
+    """Text in Markdown."""
     verdict: Verdict
     """Worst verdict of the checks."""
 
@@ -404,9 +404,9 @@ class DayPage:
 def first_day(
     bench: Bench, config: Path, operator: str, confirmed: Confirmed, switch: StopSwitch | None = None
 ) -> DayPage:
-    """Confirm wires, measure the noise floor, play a first 5 mV, and make and store a bench check.
+    """Confirm wires, measure the noise floor, play a first 5 mVpp, check the bench; return the page.
 
-    The check at its usual level is played only without a FAIL at 5 mV. At the end the bench is silent.
+    The check at its usual level is made, and stored, only without a FAIL at 5 mVpp. The bench ends silent.
 
     Raises CheckFailed when a wire is not confirmed; nothing has been played then. Raises InstrumentError when
     an instrument fails.
