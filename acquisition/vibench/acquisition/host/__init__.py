@@ -1,5 +1,5 @@
-"""Services of the computer: TOML files, shipped files, work that may hang.
+"""Services of the host computer: TOML files, shipped files, work that may hang.
 
 `FrozenModel` is the base of every validated value; an error in a file is reported with file, key, what was
-given and what is allowed. Nothing here concerns measurements.
+given and what is allowed. This package does not deal with measurements.
 """

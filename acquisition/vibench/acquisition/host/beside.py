@@ -13,7 +13,7 @@ from ..stopping.stop import MEMORY_RESERVE
 class Beside:
     """Thread that runs jobs in order; it is started before anything is driven.
 
-    If memory runs out while a thread starts, CPython waits forever for that thread.
+    A later start could hang: if memory runs out while a thread starts, CPython waits for it forever.
     """
 
     def __init__(self, name: str) -> None:
@@ -21,11 +21,11 @@ class Beside:
         self.is_busy = self._is_closing = False
         """Whether a job is running or queued."""
         self._changed = Condition()
-        with suppress(RuntimeError):  # without a free thread, jobs are not done
+        with suppress(RuntimeError):  # if the system gives no thread, jobs are not done
             Thread(target=self._run, name=name, daemon=True).start()
 
     def do(self, job: Callable[[], None]) -> None:
-        """Queue a job and return at once. ``job`` raises nothing except MemoryError."""
+        """Queue a job and return at once. ``job`` may raise only MemoryError."""
         with self._changed:
             self._jobs.append(job)
             self.is_busy = True

@@ -11,7 +11,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def chosen(kind: type[Choice], given: Choice | str) -> Choice:
-    """Return the given member, or the one with the given value; another value raises ConfigurationError.
+    """Return the given member, or the member with the given value; raises ConfigurationError if none has it.
 
     >>> from enum import StrEnum
     >>> Ground = StrEnum("Ground", ["SAND", "CLAY"])

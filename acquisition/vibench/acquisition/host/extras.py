@@ -1,4 +1,4 @@
-"""Requirements of a command, and the error if the installation or the computer does not meet them."""
+"""Checks of what a command requires of installation and computer, with errors that say what to do."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -12,11 +12,11 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "sound": ("sounddevice",),
     "gui": ("PySide6", "pyqtgraph"),
 }
-"""Extra of `pyproject.toml`, with the modules that it installs."""
+"""Modules that each extra of `pyproject.toml` installs."""
 
 
 def need_extra(extra: str) -> None:
-    """Require that the libraries of an extra can be imported; import none of them.
+    """Require that the libraries of an extra are installed, without importing them.
 
     Raises MissingLibrary when one is not installed. ``extra`` is its name in `pyproject.toml`.
     """
@@ -29,8 +29,8 @@ def need_extra(extra: str) -> None:
 def need_space(megabytes: int, advice: str = "") -> None:
     """Require address space for the libraries and their threads: without it they hang or abort.
 
-    ``megabytes`` is the space [MB]. Raises ConfigurationError where the limit is lower; its last sentence is
-    ``advice``.
+    ``megabytes`` is the space [MB]. Raises ConfigurationError if the process has a lower limit; ``advice`` is
+    the last sentence of the error.
     """
     if sys.platform != "win32" and find_spec("resource") is not None:
         import resource  # noqa: PLC0415 - POSIX only
@@ -45,7 +45,7 @@ def need_space(megabytes: int, advice: str = "") -> None:
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
-    """Wrap the ``__getattr__`` of a public API whose names need an extra: the error names the extra.
+    """Return a ``__getattr__`` for an API that needs an extra: its import errors name the extra.
 
     ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the name in `pyproject.toml`.
     The wrapper raises MissingLibrary when a library of the extra is not installed.

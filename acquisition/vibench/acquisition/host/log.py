@@ -1,4 +1,4 @@
-"""Log of the messages to instruments and of the events of recordings; off by default."""
+"""Logger for messages to instruments and events of recordings; off by default."""
 
 import logging
 

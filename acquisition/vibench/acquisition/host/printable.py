@@ -1,9 +1,9 @@
-"""Printable form of text from a file, a folder or an instrument."""
+"""Functions that make text from a file, a folder or an instrument printable and short."""
 
 from unicodedata import category
 
 LONGEST_CLAUSE = 400
-"""Largest number of letters of a value in an error; without it, the error could be as long as a file."""
+"""Largest number of characters of a value in an error; otherwise an error could be as long as a file."""
 
 
 def printable(text: str) -> str:
@@ -15,7 +15,7 @@ def printable(text: str) -> str:
     Parameters
     ----------
     text
-        From a file, a folder or an instrument.
+        Text from a file, a folder or an instrument.
     """
     if text.isprintable():
         return text
@@ -26,12 +26,12 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
-    """Replace the middle of a long text by three dots.
+    """Return the text, with three dots in place of the middle if it is long.
 
     >>> shortened("0123456789", 7)
     '01...89'
 
-    ``text`` has any length; ``longest`` is the most letters of the result, the dots included.
+    ``text`` has any length; ``longest`` is the largest number of characters of the result, with dots.
     """
     if len(text) <= longest:
         return text

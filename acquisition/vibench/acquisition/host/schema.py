@@ -1,7 +1,7 @@
-"""JSON Schemas of the TOML files that people write, for editors that complete keys.
+"""JSON Schemas of the TOML files that users write, for editors that complete keys.
 
-Draft 4, because taplo, the language server of most editors for TOML, supports no later one. A schema never
-allows less than its model. It allows more where defaults or a named specimen may supply values.
+Draft 4 is used, because taplo, the TOML language server of most editors, supports no later draft. A schema
+never allows less than its model. It allows more where defaults or a named specimen may supply values.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,7 +17,7 @@ from ..errors import ConfigurationError
 VERSION = 1
 """Version of all schemas; it changes when old files become invalid."""
 FORMAT = "format_version"
-"""Key of a file's version; a file without this key has the present version."""
+"""Key of a file's version; a file without this key has the current version."""
 DRAFT = "http://json-schema.org/draft-04/schema#"
 _SPECIMEN = {"type": "string", "description": "Name or path of the specimen that this one starts from."}
 _RANGE = {
@@ -74,7 +74,7 @@ def _starts_from_another(part: Json) -> None:
 
 
 def _with_ranges(schema: Json) -> None:
-    """Allow ranges and lists of numbers and ranges for frequencies, and a former key for the specimen."""
+    """Allow a range, or a list of numbers and ranges, as frequencies, and the former key of the specimen."""
     _with_a_base(schema)
     several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
     schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}
@@ -166,6 +166,6 @@ def _older(part: Json) -> Json:
         part["anyOf"] = kept
         if part.get("default", ...) is None:
             del part["default"]
-    if "$ref" in part and len(part) > 1:  # draft 4 ignores other keys beside $ref
+    if "$ref" in part and len(part) > 1:  # draft 4 ignores other keys next to $ref
         part["allOf"] = [{"$ref": part.pop("$ref")}]
     return part

@@ -44,9 +44,9 @@ def all_shipped(folder: str) -> tuple[Path, ...]:
 
 
 def named(given: Path | str, folder: str) -> Path:
-    """Return the path of a user's file, or of the shipped file with a bare name like ``"quick"``.
+    """Return the path of a user's file, or of a shipped file given by its bare name such as ``"quick"``.
 
-    Raises ConfigurationError, with the names of the shipped files, when a bare name is neither.
+    Raises ConfigurationError, with the names of the shipped files, when a bare name fits neither.
 
     Parameters
     ----------

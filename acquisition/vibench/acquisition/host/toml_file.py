@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from vibench.sim import (
-    FrozenModel as FrozenModel,  # noqa: PLC0414 - every model of a file is validated like a specimen
+    FrozenModel as FrozenModel,  # noqa: PLC0414 - models of all files are validated like a specimen
     UnreadableTomlError,
     fault_in_words,
     toml_table,
@@ -27,9 +27,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_toml(path: Path, model: type[Model]) -> Model:
-    """Read a TOML file as ``model``; paths in it are relative to its folder.
+    """Read a TOML file as an instance of ``model``; paths in it are relative to its folder.
 
-    Validators get the file's folder as ``folder`` in their context.
+    Validators receive the file's folder as ``folder`` in their context.
 
     Raises ConfigurationError when the file is missing, is not TOML, or contains something that the model does
     not allow.
@@ -48,11 +48,11 @@ def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
 
 
 MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""Conversion of a file's content to the next version, by name of the model and version of the file."""
+"""Function that converts a file's content to the next version, by model name and version of the file."""
 
 
 def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
-    """Convert the content of a file to the present version.
+    """Return the content of a file, converted to the current version.
 
     Raises ConfigurationError when a later vibench wrote it, or the value is not a version.
     """
@@ -84,7 +84,7 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
 
 
 MOST_CLAUSES = 5
-"""Number of faults that one sentence names; further ones are counted."""
+"""Largest number of faults named in one error; further faults are only counted."""
 MOST_KEYS = 12
 LONGEST_SENTENCE = 1600
 
@@ -93,16 +93,16 @@ Place = tuple[str | int, ...]
 
 
 def complaints(error: ValidationError, content: object, within: Place = ()) -> str:
-    """Return one clause for each fault; all missing keys share one, and all unknown keys.
+    """Return a clause for each fault, one for all missing keys, and one for all unknown keys.
 
     Parameters
     ----------
     error
         Error of the model.
     content
-        Content of the file, needed to distinguish its keys from pydantic's names of types.
+        Content of the file, to distinguish its keys from the type names that pydantic adds to paths.
     within
-        Path to report; faults elsewhere are left out.
+        Path in the file; faults outside this path are left out.
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
     missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
@@ -149,7 +149,7 @@ def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
 def _of_the_file(fault: Any, content: object) -> list[bool]:
     """Return which parts of a fault's path are keys of the file; the others are types.
 
-    pydantic adds the type after a key of several types: ``frequency_hz``, ``Range``, ``step``. A key of the
+    pydantic adds the type after a key with several types: ``frequency_hz``, ``Range``, ``step``. A key of the
     file may have the name of a type.
     """
     place, found = fault["loc"], []
@@ -167,7 +167,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Rate how well a value fits a type: faults inside it, or in its size, are better than a wrong type."""
+    """Return how well a value fits a type: a fault inside it or in its size fits better than a wrong type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 
@@ -202,7 +202,7 @@ def _complaint(detail: Any) -> str:
 
 def _shown(value: object) -> str:
     longest = 60
-    # The whole text of a list of a million numbers would take too long.
+    # Formatting a whole list of a million numbers would take too long.
     match value:
         case list() | tuple() | dict():
             text = reprlib.repr(value)
@@ -223,7 +223,7 @@ Table = Mapping[str, Value]
 def toml_text(model: BaseModel) -> str:
     """Return ``model`` as TOML: tables for models, arrays of tables for tuples of models.
 
-    Absent values (None) are left out, as TOML has none; floats keep every digit.
+    None values are left out, because TOML has no null; floats keep all digits.
     """
     content: dict[str, Value] = model.model_dump(mode="json", exclude_none=True)
     return "\n".join(_table(content, ())).lstrip("\n") + "\n"
