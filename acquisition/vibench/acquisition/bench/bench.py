@@ -337,7 +337,7 @@ def open_bench(
     calibration
         Effect of an expired calibration; calibrations of a virtual rig never expire.
     power
-        Power of a rig that outlasts this bench; None: the rig is released with the bench.
+        `RigPower` that outlasts this bench; None: the rig is released with the bench.
 
     Raises
     ------

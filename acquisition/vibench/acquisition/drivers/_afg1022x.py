@@ -73,8 +73,8 @@ class AFG1022X(ScpiInstrument):
     def open(cls, config: GeneratorConfig) -> Self:
         """Find the generator, switch its output off, bring it into a known state, and return it.
 
-        Raises InstrumentLost when nothing answers, InstrumentBusy when another program holds the resource,
-        InstrumentError for another instrument; the output is then off, if it could be reached.
+        Raises InstrumentLost when nothing answers, InstrumentBusy when another program uses the resource,
+        InstrumentError for another instrument. The output is then off, if the generator could be reached.
         """
         generator = cls(config)
         leave = generator.disconnect  # another instrument gets no further commands
@@ -179,7 +179,7 @@ class AFG1022X(ScpiInstrument):
                 self.burst = "OFF"
 
     def start(self) -> None:
-        """Turn the output on, and read back that it is on."""
+        """Turn the output on, and verify this by reading back."""
         with self._changing():
             _ = self.playing  # with unknown settings it stays off
             self.output = "ON"

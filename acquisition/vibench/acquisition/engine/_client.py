@@ -82,7 +82,7 @@ def announced_engines() -> tuple[Announcement, ...]:
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Return scripts and checks that drive a bench without an engine, and engines that refuse connections."""
+    """Return bench programs without an engine, and engines that refuse connections; oldest first."""
     engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
@@ -203,7 +203,7 @@ def exchange(
     EngineGone
         When the connection has ended; it is closed then.
     AcquisitionError
-        When the engine refuses the request: its error.
+        When the engine refuses the request; this is the engine's own error.
     """
     usual_s = connection.gettimeout()
     patience_s = (usual_s or PATIENCE_S) + work_s
@@ -251,7 +251,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
 
     Every request over an attending connection shows that a viewer is present: an attended run
     continues only with at least two requests per second. Each method raises `EngineGone` when the engine's
-    process has ended, and the engine's own `AcquisitionError` when it refuses.
+    process has ended, and the engine's own `AcquisitionError` when it refuses the request.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -310,7 +310,7 @@ AGAIN_S = 1.0
 class Attendant:
     """Small separate process that sends heartbeats to an engine, and sleeps most of the time.
 
-    On a busy computer, a thread of a window can wait a second or more for Python's lock, but a process that
+    On a busy computer, a thread of a window can wait a second or more for Python's lock. A process that
     mostly sleeps gets a processor at once (decision 0068). The process ends with the parent program. It sends
     nothing while the system has stopped that program (Linux). Each heartbeat reports how long `live` has not
     been called.

@@ -144,7 +144,7 @@ class Messages:
 
 
 def message_parts(text: str) -> tuple[str, str, str]:
-    """Split "What happened. What was done; what to do next" into its parts; missing ones are empty."""
+    """Split "What happened. What was done; what to do next" into its parts; missing parts are empty."""
     what, _, rest = text.partition(". ")
     done, _, next_step = rest.partition("; ")
     return (f"{what.rstrip('.')}.", _sentence(done), _sentence(next_step))

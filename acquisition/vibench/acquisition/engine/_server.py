@@ -201,7 +201,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Most viewers; if there are more, the one with the oldest request is disconnected (a frozen one: 20 MB)."""
+"""Limit of viewers; beyond it, the one with the oldest request is disconnected (20 MB each if frozen)."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 

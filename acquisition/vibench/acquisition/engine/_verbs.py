@@ -2,8 +2,8 @@
 
 A verb is a method of `EngineVerbs`. Its parameters are the request, checked on both sides of the connection;
 its decorator gives the word in the message, the form of the answer, and the engine's states that permit it.
-Client and server use these declarations: a new verb needs such a method, and one with the same name and
-parameters on `RequestHandler`. The engine's token permits all requests.
+Client and server use these declarations: a new verb needs a method here, and a method with the same
+name and parameters in `RequestHandler`. The engine's token permits all requests.
 """
 
 import json

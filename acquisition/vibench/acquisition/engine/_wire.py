@@ -117,7 +117,7 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
 
 
 class EngineError(AcquisitionError):
-    """The engine refuses a request; the text says what state it is in and what is allowed."""
+    """The engine refuses a request; the text states the state of the engine and what is allowed."""
 
 
 class EngineGone(EngineError, ConnectionError):

@@ -43,7 +43,7 @@ class Found(Enum):
 
 @dataclass(frozen=True)
 class Question:
-    """Question about one value of the configuration."""
+    """Question about a value of the configuration."""
 
     key: str
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
@@ -406,7 +406,7 @@ def first_day(
 ) -> DayPage:
     """Confirm wires, measure the noise floor, play a first 5 mVpp, check the bench; return the page.
 
-    The check at its usual level is made, and stored, only without a FAIL at 5 mVpp. The bench ends silent.
+    The check at its usual level is made and stored only without a FAIL at 5 mVpp; then the bench is silent.
 
     Raises CheckFailed when a wire is not confirmed; nothing has been played then. Raises InstrumentError when
     an instrument fails.

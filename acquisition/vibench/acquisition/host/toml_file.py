@@ -167,7 +167,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Return how well a value fits a type: a fault inside it or in its size fits better than a wrong type."""
+    """Return how well a value fits a type: a fault inside it or in its size is less bad than a wrong type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 

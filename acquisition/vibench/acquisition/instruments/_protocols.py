@@ -146,7 +146,7 @@ class GeneratorDescription:
     """Smallest and largest setting at the configured load, peak to peak [V]."""
     highest_sine_hz: float
     memory_points: tuple[int, int]
-    """Fewest and most points of one period of a waveform."""
+    """Smallest and largest number of points in one period of a waveform."""
     usb_ids: tuple[tuple[int, int], ...] = ()
     """USB numbers of vendor and product, one pair for each variant."""
     longest_sweep_s: float = 0.0
@@ -276,7 +276,7 @@ class AnalogOutput(Protocol):
 
     @property
     def ahead_samples(self) -> int:
-        """Largest number of samples that can be written ahead of the one being played."""
+        """Largest number of samples that can be written ahead of the sample being played."""
 
     def write(self, volts: Samples) -> None:
         """Queue samples to be played; wait while the buffer is full.

@@ -298,7 +298,7 @@ class Journal:
         return self._gaps.append((first_sample, last_sample))
 
     def overload(self, overload: Overload) -> Batch:
-        """Add an overload, or extend the channel's last one if it continues.
+        """Add an overload, or extend the channel's last overload if it continues.
 
         If the table is full, the channel's last range is extended to include the new one, so that no
         overloaded sample is left out.

@@ -1,4 +1,4 @@
-"""Models that validate a recording's attributes and texts when it is opened."""
+"""Models that validate attributes and texts of a recording when it is opened."""
 
 import json
 import math
@@ -56,9 +56,9 @@ def _unknown_as_none(value: object) -> object:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Unknown = BeforeValidator(_unknown_as_none)
-"""Converter of NaN, which marks an unknown number in the file, to None."""
+"""Validator that turns NaN, which marks an unknown number in the file, into None."""
 Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
-"""Sample rate; allowed are one sample in two weeks to a terahertz [1/s]."""
+"""Sample rate, from one sample in two weeks to a terahertz [1/s]."""
 
 
 class _AbstractFacts(BaseModel):

@@ -137,7 +137,7 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
     sample_rate_hz
         Sample rate [Hz].
     dropouts
-        Drop-outs found in it.
+        Drop-outs found in this velocity.
     """
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 5:
         return velocity.size
@@ -164,7 +164,7 @@ def _apart(places: Places, distance: float) -> list[Places]:
 
 
 def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
-    """Return drop-outs that together explain all of these runs of sharp corners; empty if none can.
+    """Return drop-outs that together explain all of these runs of sharp corners; empty if impossible.
 
     The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the two
     edges of one drop-out could be taken for two drop-outs, with its constant level as motion between them.

@@ -1,6 +1,6 @@
 """Overview: the smallest and largest count of every 128 samples, for plots of whole recordings.
 
-It is computed when a recording is finished, and stored in the group ``overview``, so that a viewer opens
+It is computed when a recording is finished, and stored in the group ``overview``. A viewer then opens
 long recordings as fast as short ones. Without an overview, the viewer reads the whole file once.
 """
 

@@ -48,7 +48,7 @@ _LOCKED_OTHERWISE = "file locking flag values don't match"
 
 
 def open_hdf5(path: Path) -> h5py.File:
-    """Open a recording for reading; it may still be growing.
+    """Return the HDF5 file of a recording, opened for reading; it may still be growing.
 
     Raises RecordingError, with the reason, when the file is not a readable recording.
     """

@@ -3,7 +3,7 @@
 A manifest lists two checksums for every group and dataset: one of its attributes, type and shape, one of its
 data. The SHA-256 of the manifest is the seal. With a key, the seal is also signed (HMAC, RFC 2104). Without a
 signature it shows only accidental changes: anyone can compute a new seal, but a signature needs the key.
-``docs/recording-format.md`` shows how to check it without this package; reasons: decision 0031.
+``docs/recording-format.md`` shows how to check a seal without this package; reasons: decision 0031.
 """
 
 import hashlib
@@ -181,7 +181,7 @@ def require_reachable(file: h5py.File | str, error: Exception) -> None:
 
 
 def seal_of(file: h5py.File) -> str:
-    """Return the seal of a recording, unchecked; empty without one."""
+    """Return the seal stored in a recording, without checking it; empty if there is none."""
     return str(read_attributes(file[layout.SEAL]).get(SHA256, "")) if layout.SEAL in file else ""
 
 

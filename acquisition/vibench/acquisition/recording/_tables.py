@@ -70,7 +70,7 @@ class Segment:
     label: str
     first_sample: int
     last_sample: int
-    """Inclusive; one less than ``first_sample`` when the segment is empty."""
+    """Number of the last sample; one less than ``first_sample`` when the segment is empty."""
     is_complete: bool
     """False when the recording ended before the segment did."""
     numbers: Mapping[str, Number]

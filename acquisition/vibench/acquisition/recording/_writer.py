@@ -259,7 +259,7 @@ class RecordingWriter:
         try:
             self.finish(state, f"{type(error).__name__}: {error}".removesuffix(": "))
         except RecordingError as second:
-            # The first error is the cause; this one must not hide it.
+            # The first error is the cause; an error of finishing must not hide it.
             error.add_note(str(second))
 
     def _check(self, block: Block) -> None:
