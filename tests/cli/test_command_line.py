@@ -193,6 +193,7 @@ def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_p
         (("--log-level", "loud", "doctor"), "'--log-level': 'loud' is not one of 'warning', 'info', 'debug'"),
         (("analyse", "x.h5", "--draws=-3"), "-3"),
         (("analyse", "x.h5", "--draws", "1e9"), "'1e9'"),
+        (("analyse", "x.h5", "--draws", "1000000000"), "1000000000"),
         (("analyse", "x.h5", "--draws", "many"), "'many' is not a number"),
     ],
 )

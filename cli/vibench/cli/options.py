@@ -96,10 +96,13 @@ def option(
     name: str = "",
     panel: str | None = None,
     min: int | None = None,  # noqa: A002
+    max: int | None = None,  # noqa: A002
 ) -> OptionInfo:
     """Return an option that is not a field of a model; give ``name`` if it differs from the parameter."""
     names = (name,) if name else ()
-    made: OptionInfo = typer.Option(*names, metavar=metavar, help=text, rich_help_panel=panel, min=min)
+    made: OptionInfo = typer.Option(
+        *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max
+    )
     return made
 
 
