@@ -16,34 +16,34 @@ from .steadiness import Phasors
 
 @dataclass(frozen=True)
 class ControlAction:
-    """The next phase, and notes for its first sample."""
+    """The next phase to play, and the notes to write at its first sample."""
 
     phase: Phase | None
-    """None if there are only notes: nothing is sampled."""
+    """None to write notes only, without sampling."""
     notes: tuple[FeedbackNote, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """The samples of a phase, from its beginning, or after its last gap, to its end."""
+    """Samples of a phase, from its beginning or from its last gap to its end."""
 
     first_sample: int
     volts: Samples
-    """Shape (channels, samples) [V]."""
+    """Voltages at the inputs, shape (channels, samples) [V]."""
     coefficients: tuple[Any, ...] = ()
     """Coefficients that a real-time controller measured during the phase."""
 
 
 Result = TypeVar("Result")
 Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
-"""Yields actions and receives the samples of each; returns the result."""
+"""Generator that yields actions, is sent the samples of each, and returns a result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
 """Samples sent back after an action without a phase."""
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
-    """Join the blocks of a phase; restart at a block before which samples are missing (the run was held)."""
+    """Return the joined blocks of a phase, from its last gap on; gaps arise when the run is held."""
     if not blocks:
         return SILENCE
     joined: list[Block] = []
@@ -55,13 +55,13 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""A smaller error, as a share of the tolerance, is not corrected: every change disturbs the motion."""
+"""Smallest corrected error, as a fraction of the tolerance; every correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which an error is significant."""
 _GAIN = 0.8
-"""Share of the error, in decibels, that is corrected at once: the specimen responds slowly."""
+"""Fraction of an error in decibels that is corrected at once; below 1, as the specimen responds slowly."""
 _BATCHES = 8
-"""Number of batches for the uncertainty of a mean: single periods of chaos are not independent."""
+"""Number of batches for the uncertainty of a mean; single periods of chaos are not independent."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class MeasuredLevel:
 
 
 def measured_level(base: Phasors) -> MeasuredLevel:
-    """Average the fundamental over drive periods, shape (periods,); batches give its uncertainty."""
+    """Return the mean fundamental of ``base``, shape (periods,), with its uncertainty from batches."""
     if not len(base):
         return MeasuredLevel(0.0, 0.0)
     mean = complex(np.mean(base))
@@ -92,16 +92,16 @@ def measured_level(base: Phasors) -> MeasuredLevel:
 
 @dataclass(frozen=True)
 class LevelControl:
-    """Quasi-static control of the level, once for every measured stretch."""
+    """Quasi-static control of the base level, with one correction per measurement."""
 
     level: BaseLevel
     most_vpp: float
-    """Largest setting that the plan allows [V]."""
+    """Largest amplitude setting that the plan allows [Vpp]."""
     least_vpp: float
-    """Smallest setting that the generator accepts [V]."""
+    """Smallest amplitude setting that the generator accepts [Vpp]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Return the next setting [V]; unchanged if the level is held, or if the error may be chance."""
+        """Return the next setting [Vpp]; unchanged if the error is small or may be due to chance."""
         if measured.amplitude <= 0.0:
             return setting_vpp
         error = abs(measured.amplitude / target - 1)

@@ -22,7 +22,7 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = {
     "held_noise": equalise_noise,
     "held_response": hold_response,
 }
-"""For each kind: a function of the loop and the plan that returns the controller."""
+"""By kind of excitation: function that returns the controller for a loop and a plan."""
 
 
 def feedback_controller(
@@ -30,8 +30,8 @@ def feedback_controller(
 ) -> Controller[None]:
     """Return the controller of a measurement with feedback, from its ramp up to its ramp down.
 
-    Yields the next phase; the samples of each phase, shape (channels, n) [V], are sent back. Raises
-    ConfigurationError, before anything is yielded, when the rig lacks a channel that feedback needs, or no
+    The controller yields one phase after another and is sent the samples of each, shape (channels, n) [V].
+    Raises ConfigurationError, before any phase, when the rig lacks a channel that feedback needs, or no
     package offers the controller.
 
     Parameters

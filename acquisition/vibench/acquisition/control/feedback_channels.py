@@ -1,4 +1,4 @@
-"""The three channels that feedback uses, in their units."""
+"""The three channels that feedback uses, converted from volts to their units."""
 
 from dataclasses import dataclass
 from math import pi
@@ -18,29 +18,29 @@ _DERIVATIVES = {Role.M0_ACCELERATION: -1, Role.M0_DISPLACEMENT: 1}
 
 @dataclass(frozen=True)
 class FeedbackChannels:
-    """Rows and scales of drive, base and m0 in the samples."""
+    """Rows of drive, base and m0 in the samples, and their scales and corrections."""
 
     drive: int
-    """Row of the drive's channel."""
+    """Row of the drive voltage in the samples."""
     base: int
     response: int
     drive_units_per_volt: float
-    """Drive [V] per volt at the input, with the divider."""
+    """Drive voltage per volt at the input, including the divider [V/V]."""
     base_units_per_volt: float
-    """[m/s2 per V]"""
+    """Base acceleration per volt at the input [m/s2 per V]."""
     response_units_per_volt: float
-    """SI units of the sensor of m0 per volt."""
+    """Quantity of m0's sensor, in its SI unit, per volt at the input."""
     response_delay_s: float
-    """Delay of this sensor; corrected in every phase [s]."""
+    """Delay of m0's sensor, for which all its phase angles are corrected [s]."""
     base_cut_hz: float
-    """-3 dB frequency of the channel's coupling, corrected in every phase; 0 for DC [Hz]."""
+    """-3 dB frequency of the base channel's AC coupling, whose effect is corrected; 0 for DC [Hz]."""
     response_cut_hz: float
     sample_rate_hz: float
     response_derivatives: int = 0
-    """Times that the signal of m0 is differentiated for a velocity: -1 for an acceleration."""
+    """Number of differentiations from m0's signal to its velocity; -1 (integration) for an acceleration."""
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
-        """Return drive [V], base acceleration [m/s2] and the sensor of m0, each of shape (samples,).
+        """Return drive [V], base acceleration [m/s2] and the signal of m0, each of shape (samples,).
 
         Drop-outs of a vibrometer are bridged.
         """
@@ -54,7 +54,7 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return the velocity of m0 over its sensor's signal; at 0 Hz 0, except for velocity sensors."""
+        """Return m0's velocity divided by its sensor's signal; 0 at 0 Hz except for a velocity sensor."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
@@ -68,21 +68,21 @@ class FeedbackChannels:
     ) -> complex:
         """Return the displacement of m0 over that of the base; zero if the base does not move.
 
-        For another ``harmonic`` of m0 (also 1/2 or 1/3), its amplitude is divided by the amplitude of
-        the base's fundamental, and ``harmonic`` times the base's phase is subtracted from its phase.
+        Another ``harmonic`` of m0 (also 1/2 or 1/3) is divided by the amplitude of the base's fundamental,
+        and ``harmonic`` times the phase of the base is subtracted from its phase.
         """
         if not np.any(base):
             return 0j
         acceleration = complex(np.mean(base)) * (1.0 - 1j * self.base_cut_hz / frequency_hz)
         velocity = complex(np.mean(response)) * (1.0 - 1j * self.response_cut_hz / (harmonic * frequency_hz))
-        # The displacement of the base is opposite to its acceleration.
+        # The displacement of the base is in antiphase with its acceleration.
         turned = 2 * pi * frequency_hz * self.response_delay_s - np.angle(-acceleration)
         moved = -2j * pi * frequency_hz * np.exp(1j * harmonic * turned) / harmonic
         return complex(moved * velocity / abs(acceleration))
 
 
 def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> FeedbackChannels:
-    """Find the channels that feedback needs; raises ConfigurationError when one is missing."""
+    """Return the channels that feedback needs; raises ConfigurationError when one is missing."""
     drive, base, response = (
         _row(channels, *roles) for roles in ((Role.DRIVE_VOLTAGE,), (Role.BASE_ACCELERATION,), RESPONSE_ROLES)
     )
@@ -113,21 +113,21 @@ def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
 
 
 _REMEMBERED_S = 0.1
-"""Length of stored samples [s]: a drop-out is recognised and bridged from the motion before it."""
+"""Duration of stored samples [s]; a drop-out is recognised and bridged from the motion before it."""
 
 
 class BridgedRows:
-    """Bridges drop-outs in a stream of samples; holds samples back while they may begin a drop-out."""
+    """Bridges drop-outs in a stream of samples; delays samples that may be the start of a drop-out."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
         self._rows = np.empty((3, 0))
         self._first = 0
         self._next = 0
-        """Number of the next sample to be passed on."""
+        """Number of the next sample to be returned."""
 
     def take(self, first_sample: int, rows: Samples) -> tuple[int, Samples]:
-        """Add samples, shape (3, n), response last; return first number and rows of those passed on."""
+        """Add samples, shape (3, n), response last; return those released, with the first one's number."""
         if first_sample != self._first + self._rows.shape[1]:
             self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
         self._rows = np.concatenate([self._rows, rows], axis=1)
@@ -144,22 +144,22 @@ class BridgedRows:
         return first, handed_on
 
     def skip(self) -> None:
-        """Drop waiting samples, which belong to an earlier phase."""
+        """Discard the delayed samples, which belong to an earlier phase."""
         self._next = self._first + self._rows.shape[1]
 
 
 LEAST_ANSWER = 0.05
-"""Share of the linear model's acceleration below which the loop is taken to be open. A specimen at
-resonance may reduce the motion of a light table to about a fifth."""
+"""Measured over modelled base acceleration below which the feedback loop is taken to be open. A specimen at
+resonance may reduce the motion of a light table to about 0.2 of the linear model."""
 
 
 def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
-    """Raise LimitExceeded when the base hardly moves, so that the run ramps down.
+    """Raise LimitExceeded, which ramps the run down, when the base hardly moves.
 
     Parameters
     ----------
     acceleration
-        Amplitude of the base's fundamental, as measured [m/s2].
+        Measured amplitude of the base's fundamental [m/s2].
     """
     modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:

@@ -1,6 +1,6 @@
-"""Locating a jump: return to the branch before it, then halve the interval.
+"""Locate a jump: return to the branch before the jump, then halve the frequency interval.
 
-To leave a persistent branch, the motion on it is stopped by lowering the drive.
+If the motion stays on the other branch, the drive is lowered until that motion stops.
 """
 
 from collections.abc import Sequence
@@ -27,13 +27,13 @@ from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
-"""Factor of one step down; the lowest setting is a ninth of the present one."""
+"""Factor by which each of `RUNGS` steps lowers the setting, to about 1/9 in total."""
 _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
 
 def decay_motion(loop: SineLoop) -> Controller[None]:
-    """Lower the setting step by step, wait, and raise it to its earlier value."""
+    """Lower the setting in steps, wait, and raise it again to its earlier value."""
     now = loop.setting
     for rung in range(1, RUNGS + 1):
         loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
@@ -45,18 +45,18 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""Most searches; another one begins when the motion leaves its branch earlier than before."""
+"""Largest number of brackets for one jump; a new one starts if the motion leaves its branch earlier."""
 
 
 class _Return(Enum):
     BACK = auto()
     NOT_FOUND = auto()
     LEFT = auto()
-    """The branch was found, and left again before its end."""
+    """The motion returned to the branch, but left it again before its end."""
 
 
 class _Pace(Enum):
-    """How frequencies are changed on the way forward."""
+    """How the drive follows a branch forward to its end."""
 
     GLIDE = auto()
     STEP = auto()
@@ -82,13 +82,13 @@ class _JumpSearch:
                 self.after = point
 
     def left(self, place: int, point: SettledPoint) -> None:
-        """Note that the branch was left at its point number ``place``."""
+        """Shorten the branch: the motion left it at index ``place``, and ``point`` was measured there."""
         del self.branch[place:]
         self.after = point
 
 
 class JumpLocator:
-    """Locates one jump of a pass."""
+    """Search for one jump in a pass."""
 
     def __init__(
         self, controller: SettlingController, plan: SettledSine, direction: str, number: int
@@ -104,12 +104,12 @@ class JumpLocator:
     def localise(
         self, points: Sequence[SettledPoint], after: SettledPoint
     ) -> Controller[tuple[SettledPoint, bool]]:
-        """Narrow the bracket between the last of ``points`` and ``after``; end at ``after``'s frequency.
+        """Narrow the bracket from the last of ``points`` to ``after``, then go to the frequency of ``after``.
 
-        Return the point there, and whether a jump led to it.
+        Return the point reached there, and whether it is on the new branch behind a jump.
 
-        A response that only changes steeply is not a jump: its difference shrinks with the bracket. If both
-        branches exist at ``after``, the search may end on either, which is noted.
+        A steep change is not a jump: its difference shrinks with the bracket. If both branches exist at the
+        frequency of ``after``, the search may end on either; the note states which.
         """
         search = _JumpSearch(list(points), after, JumpSide.AFTER)
         found, why = yield from self._bisect(search)
@@ -129,7 +129,7 @@ class JumpLocator:
         return search.bracket, JumpSearchEnd.ELSEWHERE
 
     def _halve(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
-        """Halve the bracket until it is narrow enough; None when the motion left its branch earlier."""
+        """Halve the bracket until it is narrow enough; return None if the motion left its branch early."""
         seek = locate_jump(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
@@ -151,9 +151,9 @@ class JumpLocator:
             return search.bracket, JumpSearchEnd.LOCALISED
 
     def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
-        """Go back along the pass until its branch is found again, then forward to the branch's end.
+        """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
-        The way forward is one fast glide; if that leaves the branch, a second one in steps shows where.
+        The way forward is one fast glide. If it leaves the branch, a second attempt in steps finds where.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
@@ -174,7 +174,7 @@ class JumpLocator:
     def _left(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward; return place and point where the motion has left the branch, or None."""
+        """Go forward; return index and point at which the motion has left the branch, or None if it stays."""
         for place in steps:
             found = yield from self._move_to(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
@@ -182,7 +182,7 @@ class JumpLocator:
         return None
 
     def _rejoin(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
-        """Go back in growing steps until a response of the branch is found; return its place."""
+        """Go back in growing steps until the motion is on the branch; return the index there, or None."""
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():
@@ -195,7 +195,7 @@ class JumpLocator:
         return None
 
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
-        """Stop the motion at the branch's first frequency: a branch that began from rest is reached again."""
+        """Stop the motion at the branch's first frequency; return 0 if it restarts on the branch, or None."""
         yield from decay_motion(self._controller.loop)
         found = yield from self._controller.settled()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
@@ -220,7 +220,7 @@ class JumpLocator:
         return found.point
 
     def _is_late(self) -> bool:
-        """Whether the time left is too short for one more step and the way to the end."""
+        """Return whether too little time is left for one more step and the way to the end."""
         step_s = self._plan.settling.longest_wait_s
         return self._controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 
@@ -241,7 +241,7 @@ class JumpLocator:
 
 
 def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
-    """Carry out all passes, from the first ramp up to the last ramp down."""
+    """Run all passes of a settled sine, from the ramp up to the ramp down."""
     controller = SettlingController(loop, plan.settling, plan.base_level)
     passes = tuple(plan.passes())
     yield from start(loop, passes[0][1][0], plan.base_level)
@@ -254,7 +254,7 @@ def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
 
 
 class Pass:
-    """One pass through the frequencies, and its branch."""
+    """One pass through the frequencies; it counts the branches."""
 
     def __init__(
         self, controller: SettlingController, plan: SettledSine, number: int, direction: str
@@ -264,10 +264,10 @@ class Pass:
         self._number = number
         self._direction = direction
         self._branch = 1
-        """Number of the branch in this pass: one more after every jump."""
+        """Number of the present branch in this pass, from 1; each jump increases it by 1."""
 
     def carry_out(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
-        """Visit and record every frequency; locate the jumps between them."""
+        """Go to every frequency and record there; locate the jumps in between."""
         points: list[SettledPoint] = []
         searched = 0
         search = self._plan.jumps

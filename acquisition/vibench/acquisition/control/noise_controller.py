@@ -1,4 +1,4 @@
-"""Equalised noise at the base: the gain of every line is measured and corrects the next drive."""
+"""Equalised noise at the base: the measured gain of every line corrects the next drive."""
 
 from dataclasses import dataclass
 from math import log10, sqrt
@@ -18,27 +18,27 @@ from .feedback_channels import LEAST_ANSWER
 from .sine_loop import SineLoop
 
 _NEWEST = 0.5
-"""Weight of the newest gains relative to earlier ones, because impacts make them scatter."""
+"""Weight of the newest gains in the average with earlier ones; single gains scatter due to impacts."""
 _MOST_CHANGE = 4.0
-"""Largest change of the squared gain of a line from one realisation to the next."""
+"""Largest factor by which a line's squared gain changes from one realisation to the next."""
 
 
 @dataclass(frozen=True)
 class MeasuredDensities:
-    """Densities at the lines of one realisation, averaged over the plan's resolution."""
+    """Power spectral densities at the lines of one realisation, averaged over ``resolution_hz``."""
 
     drive: Samples
-    """[V2/Hz]"""
+    """Density of the drive voltage [V2/Hz]."""
     base: Samples
-    """[(m/s2)2/Hz]"""
+    """Density of the base acceleration [(m/s2)2/Hz]."""
     response: Samples
-    """[(m/s)2/Hz]"""
+    """Density of m0's velocity [(m/s)2/Hz]."""
     kurtosis: float
-    """Kurtosis of the base's acceleration: 3 for Gaussian noise."""
+    """Kurtosis of the base acceleration; 3 for Gaussian noise."""
 
 
 class Equaliser:
-    """Estimated gains of every line: from drive to base, and from base to m0."""
+    """Estimates of the squared gains of every line, from drive to base and from base to m0."""
 
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
@@ -53,16 +53,16 @@ class Equaliser:
 
     @property
     def target(self) -> Samples:
-        """Target of the base: the spectrum, lowered where m0 would exceed its limit [(m/s2)2/Hz]."""
+        """Target density of the base: the spectrum, lowered where m0 would exceed its limit [(m/s2)2/Hz]."""
         if self._to_response is None or not self._plan.response_limits:
             return self._plan.density
         limit = density_at(self._plan.response_limits, self.frequency_hz)
         return np.minimum(self._plan.density, limit / np.maximum(self._to_response, 1e-300))
 
     def waveform(self, number: int, level_db: float) -> Waveform:
-        """Return the next period of the drive for the present gains.
+        """Return one period of the next drive, computed from the present gains.
 
-        Raises LimitExceeded when it needs more than the plan's largest setting.
+        Raises LimitExceeded when the drive needs more than the plan's largest setting.
         """
         plan = self._plan
         density = self.target * 10 ** (level_db / 10) / self._gain
@@ -78,9 +78,9 @@ class Equaliser:
         return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
 
     def hear(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
-        """Update the gains with the densities of a realisation.
+        """Update the gains from the signals of a realisation, and return its densities.
 
-        Raises LimitExceeded when the base hardly answers.
+        Raises LimitExceeded when the base moves far less than the model predicts.
         """
         heard = MeasuredDensities(
             self._density(drive),
@@ -98,7 +98,7 @@ class Equaliser:
         return heard
 
     def require_below_abort(self, heard: MeasuredDensities) -> None:
-        """Raise LimitExceeded when the base or m0 is above its abort line."""
+        """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at any line."""
         most = 10 ** (self._plan.abort_db / 10)
         lines = [("base", "(m/s2)2/Hz", heard.base, self._plan.density)]
         if self._plan.response_limits:
@@ -115,11 +115,11 @@ class Equaliser:
                 )
 
     def off_db(self, heard: MeasuredDensities, level_db: float) -> Samples:
-        """Return the difference of the base from the target of this realisation, line by line [dB]."""
+        """Return the deviation of the base density from the target of this realisation, per line [dB]."""
         return np.asarray(10 * np.log10(np.maximum(heard.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
-        """Return the density at the lines, averaged over the resolution; whole periods avoid leakage."""
+        """Return the density at the lines, averaged over ``resolution_hz``; whole periods avoid leakage."""
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
@@ -138,7 +138,7 @@ class Equaliser:
 
 
 def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
-    """Equalise at levels that rise to the spectrum, then record, and continue to equalise."""
+    """Equalise at levels that rise to the full spectrum; then record, and continue to equalise."""
     equaliser = Equaliser(loop, plan)
     yield from loop.listen_to_silence()
     segments = [step.segment for step in plan.steps()]
@@ -175,7 +175,7 @@ def _note(
 
 
 def _average(values: Samples, width: int) -> Samples:
-    """Average over neighbours; at the ends over those available."""
+    """Return the mean of each value over ``width`` neighbours; near the ends, over those available."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     places = np.arange(values.size)
     first = np.maximum(places - width // 2, 0)

@@ -10,79 +10,79 @@ from ..plan import LOOK_PERIODS
 from .settling_controller import SettledState
 
 _GAIN = 0.3
-"""Share of the phase error that the loop corrects at each look."""
+"""Fraction of the phase error that the loop corrects after each measurement (look)."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""If more than this share of an error remains after a look, the gain grows by this factor, up to this
-value.
+"""If more than ``_SLOW`` of an error remains after a look, the gain grows by the factor ``_GROWTH``, up to
+``_LARGEST_GAIN``.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
-"""Trial changes of the logarithm of the half-width from one level to the next."""
+"""Trial values for the change of the half-width's logarithm from one level to the next."""
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
-"""The same for a super- or subharmonic, whose first half-width is known only roughly."""
+"""Trial values for super- and subharmonics, whose first half-width is known only roughly."""
 _SURE_RAD = radians(12.0)
-"""Unexplained drift of the phase that counts as much as a change of the half-width by a factor of e."""
+"""Unexplained phase drift that weighs as much in the fit as a half-width changed by the factor e."""
 _STEEPER = 0.5
-"""Largest relative growth of a backbone's bend from level to level."""
+"""Largest assumed relative change of ``bend_hz`` from one level to the next."""
 _EXPLAINED_RAD = radians(3.0)
-"""Rms of the unexplained drift above which the motion counts as another one."""
+"""Rms unexplained phase drift above which the specimen is taken to have changed to another motion."""
 
 
 @dataclass(frozen=True)
 class LearntMode:
-    """Properties of a mode that the phase-locked loop has estimated."""
+    """Properties of a mode, as estimated by the phase-locked loop."""
 
     narrowest_hz: float
-    """Half-width of the resonance in the first search; contacts and hard springs only widen it. Zero for a
-    super- or subharmonic."""
+    """Half-width in the first search: a lower bound, because contacts and hard springs only widen a resonance
+    (zero for a super- or subharmonic)."""
     half_width_hz: float
     bend_hz: float = 0.0
-    """Change of the resonance for a growth of the level by a factor of e; zero if unknown."""
+    """Change of the resonance frequency when the level grows by the factor e; 0 if unknown."""
     steeper_hz: float = 0.0
-    """Expected change of ``bend_hz`` towards the next level."""
+    """Expected change of ``bend_hz`` from this level to the next."""
 
 
 @dataclass(frozen=True)
 class TrackedPlace:
-    """State at the end of a level."""
+    """State at the end of a level, from which the next level starts."""
 
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """None until a level has locked: the next level is then searched."""
+    """None until the loop has locked at a level; without it, the next level is searched."""
 
 
 class PhaseLaw:
-    """The law of the phase-locked loop (decisions 0064 and 0074).
+    """Control law of the phase-locked loop (decisions 0064 and 0074).
 
-    During a look of length L, the phase of the motion over the drive drifts by ``2 pi L (r - f) - h e``: f is
-    the frequency, r the resonance, e the phase error in radians, and h = 2 pi L w the decay of the mode, with
-    its half-width w. The frequency is changed by g times the resulting r - f, so that the error falls by the
-    share g at every look. If it falls too slowly, g is raised in the term ``g w e``. For the n-th harmonic,
-    r and w refer to the drive (the mode's, divided by n), and L is n times as long. For a subharmonic of
-    order n, e is the error of n times its phase, r and w refer to the drive, and a look has n times as many
-    drive periods.
+    A look is one measurement of the loop, of length L. During a look the phase of the motion over the drive
+    changes by ``2 pi L (r - f) - h e``: f is the drive frequency, r the resonance, e the phase error [rad], w
+    the half-width of the mode, and h = 2 pi L w its decay. The loop changes f by g times the r - f that
+    follows, so that each look reduces the error by the fraction g. If the error falls too slowly, g is raised
+    in the term ``g w e``. For harmonic n, L is replaced by n L, and r and w are the mode's values divided by
+    n. For a subharmonic of order n, e is the error of n times its phase, r and w refer to the drive, and a
+    look has n times as many drive periods.
 
     A bent resonance moves while the motion grows to a new level. The level of the motion follows the base
-    with the decay of the mode, and r changes with the logarithm of that level, as estimated from earlier
-    levels. This change is added to the frequency in advance.
+    at the decay rate of the mode; r changes with the logarithm of that level, at a rate known from earlier
+    levels. The frequency is corrected for this change in advance.
     """
 
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
         self._plan = plan
         self._turns = plan.harmonic * plan.subharmonic * LOOK_PERIODS
-        """Factor on a look's phase: order of a harmonic, drive periods of a subharmonic."""
+        """Number of drive periods in a look, times n for harmonic n."""
         self._last = last
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
         self._grown = last.base_m_per_s2
-        """Level of the base at which the present motion would be settled [m/s2]."""
+        """Base level for which the present amplitude of the motion is the settled one [m/s2]."""
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []
-        """Frequency [Hz], error of the phase [rad] and level [m/s2] of each look."""
+        """Frequency [Hz], phase error [rad] and base level [m/s2] of each look."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look; return the phase error [rad] and the remaining relative change of the motion."""
+        """Add a look; return its phase error [rad] and the motion's expected remaining relative change."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
@@ -96,17 +96,17 @@ class PhaseLaw:
         return error_rad, max(left, bends)
 
     def next_hz(self, frequency_hz: float, base: float) -> float:
-        """Return the next frequency, in the plan's band; ``base`` is the next level of the base [m/s2]."""
+        """Return the next frequency within the plan's range [Hz]; ``base`` is the next base level [m/s2]."""
         foreseen_hz = self._bend_hz * (1.0 - self._kept(frequency_hz)) * log(base / self._grown)
         widest_hz = self._plan.widest_step_hz
         step_hz = min(max(foreseen_hz + self._off_hz(frequency_hz), -widest_hz), widest_hz)
         return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
 
     def learnt(self, found: SettledState, error_rad: float) -> LearntMode:
-        """Return the half-width that explains the drift of the phase from look to look, and the bend.
+        """Return the mode with the half-width that best explains the phase drift of all looks, and its bend.
 
-        If no value near the earlier half-width explains it, the motion is another one, and the estimate
-        stays.
+        If no half-width near the earlier one explains the drift, the motion is another one. The half-width
+        is then kept, and the bend set to zero.
         """
         grown, bend_hz = log(found.base.amplitude / self._last.base_m_per_s2), self._mode.bend_hz
         if abs(grown) > self._plan.level_tolerance:
@@ -115,7 +115,7 @@ class PhaseLaw:
         turned = 2 * pi * self._turns / frequency_hz.mean()
 
         def unexplained(width_hz: float) -> float:
-            """Mean square of the remaining drift [rad2]."""
+            """Return the mean square of the phase drift that a half-width leaves unexplained [rad2]."""
             levels, level = [], log(self._last.base_m_per_s2)
             for each in np.log(base):
                 level += (1.0 - exp(-turned * width_hz)) * (each - level)
@@ -136,11 +136,11 @@ class PhaseLaw:
         return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
 
     def _off_hz(self, frequency_hz: float) -> float:
-        """Return the change of frequency that corrects the phase of the newest looks [Hz]."""
+        """Return the frequency change that corrects the phase error, from the newest two looks [Hz]."""
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Before the first look only the level changed: the phase is taken as unchanged.
+        # Before the first look only the level changed, so the earlier phase error is taken as equal.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -148,24 +148,24 @@ class PhaseLaw:
         return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
 
     def _kept(self, frequency_hz: float) -> float:
-        """Return the share of a motion that has not decayed after a look."""
+        """Return the fraction of a transient that remains after one look."""
         return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)
 
 
 _NEAR_DEG = 35.0
-"""Errors up to this are on the straight part of the phase, which gives the slope."""
+"""Largest phase error on the straight part of the phase curve, which gives the slope [degrees]."""
 _FEWEST = 2
 _NEAREST = 3
-"""Number of nearest tries for a slope that changes with frequency."""
+"""Number of tries nearest to the resonance that give the slope if it changes with frequency."""
 _STEEPEST_DEG = 85.0
-"""Larger errors are replaced by this: the tangent of a right angle is infinite."""
+"""Upper limit on phase errors in the fit, because the tangent of 90 degrees is infinite [degrees]."""
 _BEND = 0.15
 """Largest relative difference between the slope of the straight part and the slope at the resonance."""
 
 
 @dataclass(frozen=True)
 class PhaseError:
-    """Phase minus its target at a frequency [degrees], with its random standard uncertainty."""
+    """Phase minus its target at one frequency [degrees], with the standard uncertainty due to scatter."""
 
     frequency_hz: float
     error_deg: float
@@ -174,7 +174,7 @@ class PhaseError:
 
 @dataclass(frozen=True)
 class PhaseResonance:
-    """The frequency of the phase resonance."""
+    """Frequency of a phase resonance, and slope of the phase there."""
 
     frequency_hz: float
     uncertainty_hz: float
@@ -183,13 +183,13 @@ class PhaseResonance:
 
     @property
     def half_width_hz(self) -> float:
-        """Half of the half-power width: damping ratio times frequency, from the slope of the phase [Hz]."""
+        """Half of the half-power bandwidth (damping ratio times frequency), from the slope [Hz]."""
         return 180 / (pi * abs(self.slope_deg_per_hz)) if self.slope_deg_per_hz else 0.0
 
 
 @dataclass
 class PhaseSearch:
-    """Searches the frequency at which a falling phase crosses its target."""
+    """Search for the frequency at which a phase that falls with frequency crosses its target."""
 
     low_hz: float
     high_hz: float
@@ -197,10 +197,10 @@ class PhaseSearch:
     """Largest step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
-    """Whether the phase follows a linear mode; if not, only the nearest tries give its slope."""
+    """Whether the phase is that of a linear mode; if not, only the nearest tries determine its slope."""
 
     def next_hz(self) -> float:
-        """Return the next frequency to try, after at least one."""
+        """Return the next frequency to try [Hz]; needs at least one earlier try."""
         last = self.tries[-1]
         if len(self.tries) == 1:
             step_hz = 0.5 * self.widest_step_hz
@@ -215,7 +215,7 @@ class PhaseSearch:
         return self._bounded(self._outwards(last))
 
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
-        """Return the zero of a line through the tries near the resonance.
+        """Return the resonance: the zero of a line fitted to the tries near it.
 
         ``sensor_phase_deg`` is the standard uncertainty of the phase that all tries share [degrees].
         """
@@ -231,13 +231,13 @@ class PhaseSearch:
         # In a mode the tangent of the error is a straight line over frequency; the phase itself is not.
         error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
         if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
-            # All at one frequency, or all beyond a right angle: the crossing is not determined.
+            # All tries have one frequency, or all errors are too large: the crossing is not determined.
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
-        # The same change of phase changes the tangent more, the further out it is.
+        # The tangent magnifies phase errors by 1 / cos^2, so each point has the weight cos^4.
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # Start from the best try, because other modes bend the line away from its crossing.
+        # Extrapolate from the best try, because other modes bend the line away from its own crossing.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)
@@ -255,7 +255,7 @@ class PhaseSearch:
 
 
 def _between(low: PhaseError, high: PhaseError) -> float:
-    """Return the secant's zero, away from both ends so that the bracket shrinks from either side."""
+    """Return the secant's zero, but not close to either end, so that the bracket shrinks from both sides."""
     share = low.error_deg / (low.error_deg - high.error_deg)
     edge = 0.05
     return low.frequency_hz + min(max(share, edge), 1 - edge) * (high.frequency_hz - low.frequency_hz)

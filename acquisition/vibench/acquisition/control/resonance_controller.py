@@ -1,4 +1,4 @@
-"""Tracking a phase resonance from level to level: searched once, then followed by a phase-locked loop."""
+"""Track a phase resonance from level to level: search it once, then follow it by a phase-locked loop."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from .sine_loop import SineLoop, move, start
 from .steadiness import ORDERS, Periods
 
 _UNKNOWNS = 8
-"""Real unknowns of the fit: frequency, damping, and a complex polynomial of degree two."""
+"""Number of real unknowns in the fit: frequency, damping, and a complex polynomial of degree two."""
 _SURE = 2.0
-"""Smallest ratio of a damping to its standard uncertainty."""
+"""Smallest accepted ratio of a damping to its standard uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -32,23 +32,23 @@ class Mode:
     frequency_hz: float
     """Undamped natural frequency [Hz]."""
     frequency_u_hz: float
-    """Standard uncertainty, from the residuals [Hz]."""
+    """Standard uncertainty of the frequency, from the residuals of the fit [Hz]."""
     damping_ratio: float
 
 
 def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
-    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None without a mode.
+    """Fit one mode: T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2, with real a and complex b.
 
-    There is none with too few points, a damping within its uncertainty, or a frequency outside the points.
+    Return None with too few points, a damping within its uncertainty, or a frequency outside the points.
 
-    The polynomial on the right contains the mode's residue, the motion of the base itself and the flanks of
-    other modes; a constant error of all phases only rotates it. The method is Levy's linear least squares,
-    reweighted by the fitted denominator.
+    The polynomial on the right contains the residue of the mode, the base motion itself and the flanks of
+    other modes. An error common to all phases only rotates this polynomial. The method is Levy's linear
+    least squares, reweighted by the fitted denominator.
 
     Parameters
     ----------
     frequency_hz, transmissibility
-        Shape (points,), around the resonance.
+        Frequencies [Hz] and complex transmissibilities T around the resonance, each of shape (points,).
     """
     if 2 * len(frequency_hz) <= _UNKNOWNS:
         return None
@@ -74,7 +74,7 @@ def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.com
 def _solve(
     s: NDArray[np.complex128], answer: NDArray[np.complex128], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    # a1 s T + a2 T - (b0 + b1 s + b2 s^2) = -s^2 T, real and imaginary parts apart.
+    # Solve a1 s T + a2 T - (b0 + b1 s + b2 s^2) = -s^2 T, real and imaginary parts separately.
     powers = np.stack([np.ones_like(s), s, s**2], axis=1)
     columns = np.concatenate([(s * answer)[:, None], answer[:, None], -powers, -1j * powers], axis=1)
     weighted = weight[:, None] * columns
@@ -88,27 +88,27 @@ def _solve(
 
 
 _LOST_RAD = pi / 4
-"""Phase error beyond which the loop is no longer on the resonance."""
+"""Phase error above which the loop has lost the resonance."""
 _CORRECTED = 0.5
-"""Relative standard uncertainty of the correction for the remaining phase."""
+"""Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Largest remaining change of the motion over the phase tolerance [rad]; the second is for slow motions."""
+"""Allowed remaining change of a locked motion over the phase tolerance; 0.5 for super- and subharmonics."""
 _LOOKS_LOCKED = 3
-"""Looks in a row with phase and level within tolerance that count as locked."""
+"""Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
-"""Smallest relative step of a search: with a smaller one, it is between the two sides of a jump."""
+"""Smallest relative frequency step of a search; a smaller step means that the phase jumps."""
 _BATCHES = 8
 _KNOWN = 4.0
 """Ratio of a motion to its standard error above which its phase is defined."""
 _FURTHEST = 1.5
-"""Distance of the furthest flank point from the resonance, in half-widths."""
+"""Largest distance of a flank point from the resonance, in half-widths."""
 
 
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
-    """Lock on to the resonance at every level and record there; continue to the next level from there."""
+    """Lock on to the resonance at every level and record there; each level starts where the last ended."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
-        # The tracked order may be a hundredth of the whole motion, which would seem settled too early.
+        # The tracked order may be 1 % of the whole motion, which would then seem settled too early.
         loop.settling_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
@@ -152,7 +152,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level; return the number of updates and the result, None off resonance."""
+    """Control phase and level; return the number of looks, and the result or None if off resonance."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
@@ -176,8 +176,8 @@ def _lock(
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
     """Return the factor of the first change of the setting towards a new level.
 
-    A specimen reduces the motion of a light table only after its own motion has grown. Until then the base
-    follows the whole change of the setting, so the first change must be smaller.
+    A specimen reduces the motion of a light table, but only after its own motion has grown. Until then the
+    base follows the whole change of the setting, so the first change must be smaller.
     """
     bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)
     share = min(1.0, bare_vpp / loop.setting.setting_vpp)
@@ -190,7 +190,7 @@ def _search(
 ) -> Controller[TrackedPlace]:
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Such a motion settles slowly: unsettled tries would give a wrong slope of the phase.
+        # Super- and subharmonics settle slowly, and unsettled tries would give a wrong slope of the phase.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     controller = SettlingController(loop, rule, level)
@@ -202,7 +202,7 @@ def _search(
         states.append((yield from controller.settled()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
-        # Where a harmonic is noise its phase is random, and while it settles the phase changes.
+        # The phase is random if the harmonic is only noise, and changes while the motion settles.
         rests = plan.is_fundamental or states[-1].judgement.steadiness is Steadiness.PERIODIC
         is_known = rests and error.uncertainty_deg <= plan.phase_tolerance_deg
         if not any(_is_there(plan, each) for each in states[-2:]):
@@ -213,7 +213,7 @@ def _search(
             break
         next_hz = search.next_hz()
         if plan.low_hz < next_hz < plan.high_hz:
-            # The converter's clock measures trial frequencies, the generator's clock sets them.
+            # Convert a frequency measured with the converter's clock to one set with the generator's clock.
             next_hz *= states[-1].frequency_hz / states[-1].drive_hz
         if next_hz == frequency_hz:
             lock = LockResult.AT_THE_EDGE
@@ -228,7 +228,7 @@ def _search(
     if lock is LockResult.LOCKED and plan.is_fundamental:
         flanks = yield from _flanks(controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
-        # Back from the flanks before the recording: the next level begins where this one ends.
+        # Return to the resonance before the recording, because the next level starts where this one ends.
         move(loop, found.frequency_hz, level)
         found = yield from controller.settled()
     yield from record_settled(controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
@@ -237,8 +237,8 @@ def _search(
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
-    # Contacts bend the flanks, so the first width, measured without contacts, is kept. The width of a
-    # superharmonic also depends on the distance to the first contact: it is not a bound.
+    # Contacts bend the flanks, so the width of the first level, measured without contacts, is kept. The width
+    # of a super- or subharmonic also depends on the distance to the first contact and is no lower bound.
     narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
@@ -246,20 +246,20 @@ def _search(
 
 @dataclass(frozen=True)
 class Tracked:
-    """Result of one level."""
+    """Result of tracking at one level."""
 
     resonance: PhaseResonance
     mode: Mode | None
     lock: LockResult
     tries: int
     periods: int
-    """Number of drive periods up to this result."""
+    """Number of drive periods that the result took."""
 
 
 def _flanks(
     controller: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance
 ) -> Controller[list[SettledState]]:
-    """Measure on both sides, up to one and a half half-widths away."""
+    """Return settled states on both flanks, up to `_FURTHEST` half-widths from the resonance."""
     found: list[SettledState] = []
     pairs = plan.flank_pairs
     for place in (*range(-pairs, 0), *range(1, pairs + 1)):
@@ -279,29 +279,29 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
 
 
 def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
-    """Whether the motion can be the tracked one: a subharmonic does not repeat every drive period."""
+    """Return whether the motion may be the tracked one; a subharmonic does not repeat every drive period."""
     return plan.subharmonic == 1 or found.judgement.period != 1
 
 
 def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
-    """Return the uncertainty of the phase from both sensors' phases and sensitivities [degrees].
+    """Return the uncertainty of the phase due to both sensors' phases and sensitivities [degrees].
 
-    For a super- or subharmonic it includes the possible remaining change of its motion; a subharmonic
-    settles too slowly to be seen from one look to the next, so the whole tolerance counts.
+    For a super- or subharmonic it includes the possible remaining change of the motion. A subharmonic settles
+    so slowly that its change per look is invisible, so at least the settling tolerance is included.
     """
     if not plan.is_fundamental:
         remaining = found.judgement.remaining if isfinite(found.judgement.remaining) else 1.0
         if plan.subharmonic > 1:
             remaining = max(remaining, plan.settling.tolerance)
         return plan.subharmonic * hypot(plan.harmonic * plan.sensor_phase_deg, degrees(remaining))
-    # The phase of a difference of two motions also depends on their ratio.
+    # The phase of the relative motion also depends on the ratio of both sensitivities.
     turned = plan.motion(found.harmonics) - found.transmissibility
     size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
     return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
 
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
-    """Compare the phase of m0 relative to the base with the target; batches give its uncertainty."""
+    """Return the phase of m0 over the base minus its target; the scatter of batches is its uncertainty."""
     count = periods.count // 2
     newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES
@@ -312,15 +312,15 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
-    # Subtract the base's phase times the order from each harmonic; rotate and scale the batches so that their
-    # mean is the value found before.
+    # Subtract order times base phase from the phase of each harmonic. Then rotate and scale the batches so
+    # that their mean equals ``found.harmonics``.
     away = np.angle(base * base.mean().conjugate())
     orders = np.arange(1, ORDERS) / plan.subharmonic
     ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]
     ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
     ratios = np.array([plan.motion(each) for each in ratios])
     if abs(ratios.mean()) <= _KNOWN * float(np.std(ratios, ddof=1)) / sqrt(_BATCHES):
-        # The phases of noise have a bounded spread, which would give too small an uncertainty.
+        # The phase of pure noise has a bounded spread, which would give too small an uncertainty.
         return PhaseError(found.drive_hz, error_deg, 180.0)
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))

@@ -1,4 +1,4 @@
-"""Waiting until a motion has settled, while the base is brought to its level and held there."""
+"""Wait until a motion has settled, while the base is brought to its level and held there."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class SettledPoint:
     frequency_hz: float
     response: float
     period: int = 1
-    """Period of the motion, in drive periods; 0 without a period."""
+    """Number of drive periods after which the motion repeats; 0 if it does not."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,13 @@ class LocatedJump:
 
 
 Seek = Generator[float, SettledPoint, LocatedJump]
-"""Yields a frequency to reach on the branch before the jump, and receives the settled point there."""
+"""Yields a frequency to reach on the branch before the jump, and is sent the settled point there."""
 
 
 def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
     """Halve the bracket until it is no wider than ``resolution_hz``.
 
-    The caller approaches each frequency from the side of ``before``; `side` then assigns it to an end.
+    The caller approaches each frequency from ``before``; `side` decides which end the new point replaces.
     """
     while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
         middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)
@@ -74,28 +74,28 @@ def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float)
 
 
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
-    """Return the side of a jump to which a response between its ends belongs.
+    """Return whether a point between the ends of a jump belongs before or after the jump.
 
-    It belongs before the jump if it is nearer to the response before than to the one after, and no further
-    from it than these two are apart. A jump to a third branch counts as after.
+    It belongs before if its response is nearer to that of ``before`` than to that of ``after``, and no
+    further from it than these two are apart. A jump to a third branch counts as after.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
 
 
 def ratio(one: SettledPoint, other: SettledPoint) -> float:
-    """Larger over smaller response; 1 when they are equal, infinite when one of them is zero."""
+    """Return the larger over the smaller response; 1 if they are equal, infinite if one of them is zero."""
     if min(one.response, other.response) <= 0.0:
         return 1.0 if one.response == other.response else inf
     return float(2.0 ** abs(log(one.response / other.response, 2)))
 
 
 def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
-    """Whether a motion is the one that was found before at the same frequency.
+    """Return whether a point is on the same branch as an earlier point at the same frequency.
 
-    It has the same period, or neither has one. Branches differ by at least ``factor``; half of that, in
-    decibels, separates them. Two measurements of one chaotic motion differ more than those of a periodic
-    one: they may differ by the whole factor.
+    Both must have the same period, or none. The responses of branches differ by at least ``factor``, so half
+    of it in decibels is the limit. Repeated measurements of a chaotic motion scatter more than those of a
+    periodic one: their limit is the whole factor.
     """
     if point.period != expected.period:
         return False
@@ -104,33 +104,33 @@ def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> 
 
 _SURE = 2.0
 _SAME_LEVEL = 0.004
-"""Relative tolerance of the level when a single order of the response is judged."""
+"""Relative tolerance of the level if settling is judged by a single order of the response."""
 _PROMPT = 0.7
-"""Part of a correction made at once while the specimen still responds to the last one."""
+"""Exponent that reduces a correction made while the specimen still responds to the last one."""
 
 
 @dataclass(frozen=True)
 class SettledState:
-    """Result at one frequency after waiting."""
+    """Result at one frequency when the wait has ended."""
 
     frequency_hz: float
     """Commanded frequency [Hz]."""
     drive_hz: float
-    """Frequency in the converter's time [Hz]."""
+    """Drive frequency by the converter's clock [Hz]."""
     setting_vpp: float
     waited_s: float
     judgement: Judgement
     base: MeasuredLevel
-    """Acceleration of the base's fundamental [m/s2]."""
+    """Acceleration amplitude of the base's fundamental [m/s2]."""
     held: Held
     harmonics: tuple[complex, ...]
-    """Displacement of m0, first and higher orders of its period, over that of the base's fundamental."""
+    """Displacement of m0, orders 1 to 4 of its period, over the base displacement at the drive frequency."""
     drives: int = 1
-    """Drive periods in one period of m0."""
+    """Number of drive periods in one period of m0."""
 
     @property
     def transmissibility(self) -> complex:
-        """Displacement of m0 over that of the base, at the drive's frequency."""
+        """Displacement of m0 over that of the base, at the drive frequency."""
         return self.harmonics[self.drives - 1]
 
     @property
@@ -140,19 +140,19 @@ class SettledState:
 
     @property
     def point(self) -> SettledPoint:
-        """The values that a search for a jump needs."""
+        """Frequency, response and period, as a search for a jump needs them."""
         return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
 
     @property
     def note(self) -> SettledNote:
-        """Values for the note; the same numbers are stored with the segment."""
+        """Note on this result; its numbers are also stored with the segment."""
         found = self.judgement
         return SettledNote(
             frequency_hz=self.frequency_hz,
             motion=found.steadiness,
             period=found.period,
             waited_s=round(self.waited_s, 3),
-            # With too few periods for a value, the scatter is set to the size of the motion.
+            # If there are too few periods to measure the scatter, it is set to the size of the motion.
             scatter=found.scatter if isfinite(found.scatter) else 1.0,
             noise=found.noise if isfinite(found.noise) else 0.0,
             setting_vpp=self.setting_vpp,
@@ -164,14 +164,14 @@ class SettledState:
 
 @dataclass(frozen=True)
 class SettlingController:
-    """Waits until the motion at one frequency has settled, or the longest wait is over."""
+    """Waits until the motion at one frequency has settled, or until the longest wait has passed."""
 
     loop: SineLoop
     rule: Settling
     level: BaseLevel | None
 
     def settled(self) -> Controller[SettledState]:
-        """Wait at the present frequency; correct the setting whenever the level is off."""
+        """Wait until the motion has settled, correct the level meanwhile, and return the result."""
         waited_s = 0.0
         while True:
             stretch_s = look_s(self.loop.motion_hz)
@@ -188,12 +188,12 @@ class SettlingController:
                 return found
 
     def measured(self) -> MeasuredLevel:
-        """Measure the base over the newer half of the periods since the last change."""
+        """Return the level of the base over the newer half of the periods since the last change."""
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
 
     def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
-        """Return the next setting towards the level at ``frequency_hz`` [V]; scatter is ignored."""
+        """Return the next setting towards the level at ``frequency_hz`` [Vpp], without regard to scatter."""
         assert self.level is not None
         control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
@@ -221,7 +221,7 @@ class SettlingController:
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
         level = self.level
         if self.loop.settling_order is not None:
-            # The phase of one order depends on the level, so all compared periods need the same level.
+            # The phase of a single order depends on the level, so all compared periods need the same level.
             level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
         control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
         next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
@@ -231,9 +231,9 @@ class SettlingController:
         return True
 
     def found(self, waited_s: float) -> SettledState:
-        """Judge the periods since the last change."""
+        """Return the result from the periods since the last change of the drive."""
         loop, periods = self.loop, self.loop.periods
-        # A slow motion has only just settled, so only its newest periods count.
+        # A motion judged by one order settles slowly, so only its newest periods are used.
         newest = periods.last(
             max(self.rule.periods, periods.count // 2) if loop.settling_order is None else self.rule.periods
         )
@@ -262,7 +262,7 @@ class SettlingController:
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Whether the level is known well enough to be called held; it may also be out of reach."""
+        """Return whether the level is known well, and is either held or out of the drive's reach."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
@@ -297,7 +297,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
                 level=held,
             )
         )
-        # All pieces since the last change form one mean, because chaos needs a long mean.
+        # Average over all pieces since the last change, because chaotic motion needs a long average.
         next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)
@@ -308,7 +308,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
 def record_settled(
     controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
 ) -> Controller[None]:
-    """Record a settled motion as a segment, and note its level."""
+    """Record a settled motion as a segment, and write a note on it."""
     yield from _record_held(controller, segment, duration_s)
     _note(controller, found, segment)
 
@@ -316,7 +316,7 @@ def record_settled(
 def record_and_judge(
     controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
 ) -> Controller[SettledState]:
-    """Record a motion as a segment that is long enough to judge it."""
+    """Record a motion long enough to judge whether it has settled; return the result."""
     shortest_s = (controller.rule.periods + 2) / controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
     yield from _record_held(controller, segment, duration_s)
@@ -374,7 +374,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Begin, continue or end a stretch outside the tolerance."""
+    """Start, extend or end a frequency range with the level outside its tolerance; return the open one."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

@@ -1,4 +1,4 @@
-"""One sine at a time, played and measured: the actions of all controllers."""
+"""Play one sine at a time and measure the motion: the actions that controllers share."""
 
 from collections import deque
 from collections.abc import Generator
@@ -21,25 +21,25 @@ from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
 from .steadiness import ORDERS, Periods, Phasors, Stroboscope
 
 _SURE = 4.0
-"""Number of standard uncertainties above which a trend is extrapolated, not averaged."""
+"""Ratio of a trend to its standard uncertainty above which the trend is extrapolated."""
 _FEWEST = 3
-"""Smallest number of steps for a trend and its scatter."""
+"""Smallest number of steps needed to estimate a trend and its scatter."""
 
 
 @dataclass(frozen=True)
 class _Answer:
     time_s: float
     gain: complex
-    """Measured value over that of the rig's linear model."""
+    """Measured base acceleration over that of the rig's linear model."""
     level: complex
-    """Measured value over its target."""
+    """Measured base acceleration over its target."""
 
 
 class GainEstimator:
-    """Recent gain of the base, relative to the linear model of the rig.
+    """Recent gain from setting to base motion, relative to the linear model of the rig.
 
-    In chaos the fundamental of a few periods is mostly chance, so recent steps (the track) are averaged. If
-    the gain changes steadily, as over a resonance, a line through the track is extrapolated.
+    In a chaotic motion the fundamental of a few periods is mostly chance, so recent steps (the track) are
+    averaged. If the gain changes steadily, as near a resonance, a line through the track is extrapolated.
     """
 
     def __init__(self, memory_s: float) -> None:
@@ -47,12 +47,12 @@ class GainEstimator:
         self._answers: deque[_Answer] = deque()
 
     def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
-        """Add the periods of a step, shape (periods,).
+        """Add the base phasors of a step, shape (periods,).
 
         Parameters
         ----------
         modelled, target
-            Base acceleration of the linear model at this setting, and the one to be held [m/s2].
+            Base acceleration that the linear model predicts at this setting, and that to be held [m/s2].
         """
         if not len(base):
             return
@@ -63,18 +63,18 @@ class GainEstimator:
 
     @property
     def is_known(self) -> bool:
-        """Whether anything has been measured."""
+        """Whether at least one step has been measured."""
         return bool(self._answers)
 
     @property
     def level(self) -> float:
-        """Return the mean amplitude over the track, as a share of its target."""
+        """Mean amplitude of the base over the track, as a fraction of its target."""
         if not self._answers:
             return 1.0
         return float(abs(np.mean([each.level for each in self._answers])))
 
     def gain_at(self, time_s: float) -> float:
-        """Predict the magnitude of the gain; 1, as in the model, without measurements."""
+        """Return the predicted magnitude of the gain; 1, as in the model, without measurements."""
         if not self._answers:
             return 1.0
         gain = np.array([each.gain for each in self._answers])
@@ -94,14 +94,14 @@ class GainEstimator:
 
 @dataclass(frozen=True)
 class DriveSetting:
-    """Frequency and level of the generator."""
+    """Frequency and amplitude setting of the generator."""
 
     frequency_hz: float
     setting_vpp: float
 
 
 class SineLoop:
-    """Sets the drive, and evaluates the motion once a period."""
+    """Sets the drive, and evaluates the motion once per period."""
 
     def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self.measurement = measurement
@@ -112,37 +112,37 @@ class SineLoop:
         self.channels = channels
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
-        """Largest setting of the plan [V]."""
+        """Largest amplitude setting of the plan [Vpp]."""
         self.drives = 1
-        """Drive periods in one period of the motion; set before anything is played."""
+        """Number of drive periods in one period of the motion; set before anything is played."""
         self.settling_order: int | None = None
-        """Order of the response that alone decides whether the motion has settled; set before anything is
-        played."""
+        """Only order of the response by which settling is judged; None for all orders. Set before anything
+        is played."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)
-        """Smallest setting of the source [V]."""
+        """Smallest amplitude setting of the generator [Vpp]."""
         self.setting = DriveSetting(0.0, self.least_vpp)
         self.elapsed_s = 0.0
         """Duration of all samples so far [s]."""
 
     @property
     def periods(self) -> Periods:
-        """Periods since the last change, of m0 as velocities [m/s]."""
+        """Periods since the last change of the drive, with the response of m0 as a velocity [m/s]."""
         found = self._scope.periods()
         return Periods(found.base, found.response * self._to_velocity)
 
     @property
     def drive_hz(self) -> float:
-        """Frequency of the drive in the converter's time [Hz]."""
+        """Frequency of the drive by the converter's clock [Hz]."""
         return self._scope.clock.frequency_hz
 
     @property
     def motion_hz(self) -> float:
-        """One over the period of the motion [Hz]."""
+        """Frequency at which the motion repeats [Hz]."""
         return self.setting.frequency_hz / self.drives
 
     @property
     def noise(self) -> float:
-        """Largest rms noise of m0's velocity in the orders at the present frequency [m/s]."""
+        """Upper bound on the rms noise of m0's velocity in the orders of the present frequency [m/s]."""
         rms = Stroboscope.noise_of(self._silence, self.motion_hz, self.channels.sample_rate_hz)
         return rms * float(np.max(np.abs(self._to_velocity)))
 
@@ -152,14 +152,14 @@ class SineLoop:
         return self.channels.velocity_over_response(orders_hz)
 
     def listen_to_silence(self) -> Controller[None]:
-        """Record silence, which shows the noise of the response."""
+        """Sample without drive, to measure the noise of the response."""
         samples = yield from self.run_phase(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.channels.rows(samples)
-        # The first half lets the bench check ring out.
+        # During the first half, the vibration from the bench check decays.
         self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
-        """Change the drive from the next phase on."""
+        """Change frequency and setting of the drive from the next phase on."""
         if frequency_hz != self.setting.frequency_hz:
             self._scope = self.channels.stroboscope(frequency_hz, self.drives)
             self._rows.skip()
@@ -167,28 +167,28 @@ class SineLoop:
         self.forget()
 
     def bounded_vpp(self, setting_vpp: float) -> float:
-        """Limit a setting to the generator's smallest and the plan's largest [V]."""
+        """Return a setting limited to the generator's smallest and the plan's largest [Vpp]."""
         return min(max(setting_vpp, self.least_vpp), self.most_vpp)
 
     def forget(self) -> None:
-        """Evaluate only later periods."""
+        """Discard the periods so far, so that only later ones are evaluated."""
         self._scope.forget()
 
     def note(self, note: FeedbackNote) -> None:
-        """Add a note to the next phase."""
+        """Keep a note, to be written at the start of the next phase."""
         self._notes.append(note)
 
     def ramp_up(self) -> Controller[None]:
-        """Start the drive."""
+        """Ramp the drive up."""
         yield from self.run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
-        """End the drive, and write all pending notes."""
+        """Ramp the drive down, and write all pending notes."""
         yield from self.run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
         yield from self.say()
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
-        """Continue the drive for a while, and evaluate it."""
+        """Continue the drive for ``duration_s`` and evaluate the motion."""
         samples = yield from self.run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
         first_sample, rows = samples.first_sample, np.stack(self.channels.rows(samples))
@@ -203,7 +203,7 @@ class SineLoop:
             yield ControlAction(None, self._take_notes())
 
     def run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
-        """Carry out a phase, with the pending notes at its first sample."""
+        """Play a phase and return its samples; pending notes are written at its first sample."""
         return (yield ControlAction(phase, self._take_notes()))
 
     def _take_notes(self) -> tuple[FeedbackNote, ...]:
@@ -217,11 +217,11 @@ class SineLoop:
 
 
 _GLIDE_MEMORY_S = 0.5
-"""Time over which a glide averages the gain of the base [s]."""
+"""Time over which the gain is averaged while the frequency moves [s]."""
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up at a frequency to the level, by the rig's model; without level, to the plan's setting."""
+    """Ramp up to the setting that the rig's model needs for ``level``; without it, to the plan's setting."""
     wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
     yield from _start_at(loop, frequency_hz, wanted_vpp)
 
@@ -233,7 +233,7 @@ def _start_at(loop: SineLoop, frequency_hz: float, wanted_vpp: float) -> Control
 
 
 def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
-    """Go to another frequency in steps of at most ``step_hz``: a large step would disturb the motion."""
+    """Move to ``frequency_hz`` in steps of at most ``step_hz``, because a large step disturbs the motion."""
     begin_hz = loop.setting.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
     estimator = GainEstimator(_GLIDE_MEMORY_S)
@@ -245,7 +245,7 @@ def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz:
 
 
 def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
-    """Change the frequency; the setting follows the rig's model from its present value."""
+    """Change the frequency, and with a level scale the setting as the rig's model predicts."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
         setting_vpp *= _bare_vpp(loop, level, frequency_hz)
@@ -256,7 +256,7 @@ def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
 def track(
     loop: SineLoop, frequency_hz: float, level: BaseLevel | None, estimator: GainEstimator, duration_s: float
 ) -> None:
-    """Play another frequency for ``duration_s``, at the setting predicted for its middle."""
+    """Change the frequency for ``duration_s``, at the setting predicted for the middle of that time."""
     if level is None or not estimator.is_known:
         move(loop, frequency_hz, level)
         return
@@ -266,7 +266,7 @@ def track(
 
 
 def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) -> None:
-    """Add the last samples to the track."""
+    """Add the newest periods to the estimator's track; without a level, do nothing."""
     if level is None:
         return
     now = loop.setting
@@ -279,7 +279,7 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
 
 
 def _model_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Return the setting that the bare table needs for the level at the present frequency [V]."""
+    """Return the setting that the bare table needs for the level at the present frequency [Vpp]."""
     return _bare_vpp(loop, level, loop.setting.frequency_hz)
 
 
@@ -288,7 +288,7 @@ def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
 
 
 def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
-    """Change frequency and setting; the latter by at most the allowed step of the level."""
+    """Change frequency and setting; with a level, the setting by at most the factor ``most_change``."""
     if level is not None:
         now_vpp = loop.setting.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
@@ -297,12 +297,12 @@ def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseL
 
 
 _PROMPT = 0.8
-"""Part of the error, in decibels, that is corrected at once."""
+"""Fraction of an error in decibels that is corrected at once."""
 _IN_A_ROW = 2
 
 
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Begin quietly, bring m0 to its amplitude at each frequency, record, ramp down (decision 0066)."""
+    """Ramp up to a low level; bring m0 to its amplitude and record at each frequency (decision 0066)."""
     passes = tuple(plan.passes())
     yield from _start_at(loop, passes[0][1][0], plan.start_share * loop.most_vpp)
     for direction, frequencies_hz in passes:
@@ -325,7 +325,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
-        # Only the newest look counts: earlier ones belong to another setting.
+        # Use only the newest measurement, because earlier ones belong to another setting.
         if in_a_row == 0:
             loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
         else:
@@ -333,7 +333,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
-    """Return amplitudes of the newer periods: response [m], m0 over base, base acceleration [m/s2]."""
+    """Return response [m], ratio of m0 to base, and base acceleration [m/s2], from the newer periods."""
     periods, frequency_hz = loop.periods, loop.setting.frequency_hz
     newer = slice(periods.count // 2, None)
     base, response = periods.base[newer], periods.response[newer, 1]

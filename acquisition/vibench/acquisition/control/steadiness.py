@@ -1,4 +1,4 @@
-"""Tests whether a motion sampled once a period repeats after k periods, or has steady statistics."""
+"""Tests whether a motion, sampled once per period, repeats after k periods or has steady statistics."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -12,19 +12,19 @@ from ..excitation.feedback import Settling
 from ..instruments import Samples
 from ..recording import Steadiness
 
-# A sample of the motion is its Fourier coefficients over one period of the recorded drive. The generator's
-# clock in the converter's time gives the beginning of each drive period.
+# One sample of the motion consists of its Fourier coefficients over one drive period. The generator's clock,
+# estimated from the recorded drive, gives the beginning of each drive period in the converter's time.
 
 _MEMORY = 40
-"""Number of blocks for the frequency; a line through their phases is then accurate enough."""
+"""Number of blocks whose phases give the frequency; enough for an accurate straight-line fit."""
 
 
 class DriveClock:
-    """Follows one tone on the recorded drive channel.
+    """Frequency and phase of one tone, estimated from the recorded drive channel.
 
-    Generator and converter have separate clocks with a difference of some ten parts in a million: a tenth of
-    a turn after 40 s at 260 Hz. So the commanded frequency is only approximate. The phase of every block is
-    fitted, and a line through the phases gives the frequency.
+    The clocks of generator and converter differ by about ten parts in a million: a tenth of a cycle after
+    40 s at 260 Hz. The commanded frequency is therefore only approximate. The phase of every block is fitted,
+    and a line through the phases gives the frequency.
     """
 
     def __init__(self, near_hz: float, sample_rate_hz: float) -> None:
@@ -33,12 +33,12 @@ class DriveClock:
         self._centres_s: deque[float] = deque(maxlen=_MEMORY)
         self._phases: deque[float] = deque(maxlen=_MEMORY)
         self.frequency_hz = near_hz
-        """Frequency of the drive in the converter's time, as far as known [Hz]."""
+        """Present estimate of the drive frequency, by the converter's clock [Hz]."""
         self.phase_cycles = 0.0
-        """Cycles of the drive's sine at sample 0, modulo 1."""
+        """Phase of the drive's sine at sample 0, in cycles modulo 1."""
 
     def follow(self, drive: Samples, first_sample: int) -> None:
-        """Add the drive of a block, any unit, shape (samples,): two periods at least."""
+        """Add a block of the drive signal, at least two periods long, in any unit, shape (samples,)."""
         count = len(drive)
         centre_s = (first_sample + 0.5 * (count - 1)) / self._rate_hz
         offset_s = (np.arange(count) - 0.5 * (count - 1)) / self._rate_hz
@@ -54,7 +54,7 @@ class DriveClock:
         self._draw_line()
 
     def starts_s(self, first_s: float, last_s: float) -> Samples:
-        """Return the times between two times at which the drive rises through zero [s]."""
+        """Return the times from ``first_s`` to ``last_s`` at which the drive rises through zero [s]."""
         first = np.ceil(self.frequency_hz * first_s + self.phase_cycles - 1e-6)
         last = np.floor(self.frequency_hz * last_s + self.phase_cycles)
         return np.asarray((np.arange(first, last + 1) - self.phase_cycles) / self.frequency_hz)
@@ -72,21 +72,21 @@ class DriveClock:
 Phasors = NDArray[np.complex128]
 
 ORDERS = 5
-"""Mean and the first four harmonics of a period: they distinguish periods."""
+"""Number of Fourier orders of a period: mean and four harmonics, enough to tell periods apart."""
 
 
 @dataclass(frozen=True, eq=False)
 class Periods:
-    """One row for each period of the motion, of one or several drive periods.
+    """Fourier coefficients of the motion, one row per period of one or several drive periods.
 
     Phases are relative to an upward zero crossing of the drive, so that the coefficient of a sine is real. If
-    a period has several drive periods, any of their crossings may be the reference.
+    a period has several drive periods, the crossing of any of them may be the reference.
     """
 
     base: Phasors
-    """The base channel at the drive's frequency, unit of the channel, shape (periods,)."""
+    """Base channel at the drive frequency, in the unit of the channel, shape (periods,)."""
     response: Phasors
-    """Orders 0 to 4 of the response channel, unit of the channel, shape (periods, 5)."""
+    """Orders 0 to 4 of the response channel, in the unit of the channel, shape (periods, 5)."""
 
     @property
     def count(self) -> int:
@@ -99,7 +99,7 @@ class Periods:
 
 
 class Stroboscope:
-    """Divides blocks into periods of ``drives`` periods of the drive; keeps the rest for the next block."""
+    """Splits blocks into motion periods of ``drives`` drive periods; the rest waits for the next block."""
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz
@@ -112,7 +112,7 @@ class Stroboscope:
         self._response: list[Phasors] = []
 
     def add(self, first_sample: int, drive: Samples, base: Samples, response: Samples) -> None:
-        """Add a block, each channel of shape (samples,), which must follow the last one without a gap."""
+        """Add a block that follows the last one without a gap; each channel has the shape (samples,)."""
         block = np.stack([drive, base, response])
         if self._left.size == 0:
             self._first = first_sample
@@ -137,13 +137,13 @@ class Stroboscope:
         return Periods(np.concatenate(self._base), np.concatenate(self._response))
 
     def forget(self) -> None:
-        """Start again with the next period, after a change of the drive."""
+        """Discard all periods so far, after a change of the drive."""
         self._base.clear()
         self._response.clear()
 
     @staticmethod
     def noise_of(signal: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-        """Return the rms that a channel in silence, shape (samples,), shows in the orders of a frequency."""
+        """Return the rms noise of a silent channel, shape (samples,), in the orders of ``frequency_hz``."""
         turns = frequency_hz / sample_rate_hz
         count = int((len(signal) - 1) * turns)
         if count < 1:
@@ -155,17 +155,17 @@ class Stroboscope:
 
     def _keep_from(self, start_s: float) -> None:
         self._begun_s = start_s
-        # One sample more: the phase of the next block may shift the start a little to the left.
+        # Keep one more sample, because the next block may shift the estimated start slightly to the left.
         keep = max(0, int(start_s * self._rate_hz) - 1 - self._first)
         self._left = self._left[:, keep:]
         self._first += keep
 
 
 def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phasors:
-    """Fourier coefficients over each of the periods that begin at ``starts`` (in fractional samples).
+    """Return the Fourier coefficients over each period that begins at ``starts`` (in fractional samples).
 
-    The integral up to a place between two samples is a cubic through both of its values and slopes,
-    so that a period need not be a whole number of samples. ``turns`` are cycles per sample.
+    Between two samples the integral is interpolated by a cubic with its values and slopes at both. A period
+    therefore need not be a whole number of samples. ``turns`` are cycles per sample.
     """
     sample = np.arange(len(signal))
     low = np.minimum(starts.astype(np.int64), len(signal) - 2)
@@ -177,7 +177,7 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (rotated[1:] + rotated[:-1]))])
         at_starts = _hermite(integral, rotated, low, part)
         scale = 1.0 if order == 0 else 2.0
-        # 1j: a drive A sin(...) that begins at each start has the real coefficient A.
+        # The factor 1j makes the coefficient of A sin(...) equal to A if the sine begins at a start.
         turned = np.exp(2j * pi * order * turns * starts[:-1]) * (1j if order else 1.0)
         found[:, order] = scale * np.diff(at_starts) / length * turned
     return found
@@ -196,49 +196,49 @@ def _hermite(value: Phasors, slope: Phasors, low: NDArray[np.int64], part: Sampl
 
 _THIRDS = 3
 _FEWEST_TURNS = 2
-"""Repetitions of a long period in each third of the window, needed for a mean."""
+"""Smallest number of repetitions of a period in each third of the window."""
 _SURE = 2.0
-"""Smallest distance of a value from its limit, in standard uncertainties."""
+"""Number of standard uncertainties that a value must be away from its limit."""
 _CERTAIN = 5.0
-"""Standard errors above which a mean is not noise."""
+"""Number of standard errors above which a mean is not attributed to noise."""
 _BLOCKS = 12
-"""Number of blocks that a stationarity test compares."""
+"""Number of blocks compared by a test of stationarity."""
 _SIGNIFICANCE = 0.01 / 8
-"""Significance of one test; eight statistics are tested, so a steady motion fails once in a hundred times."""
+"""Significance level of each of eight tests, so that a stationary motion fails in 1 % of cases."""
 _NOISE_MARGIN = 1.5
 """Factor on the noise measured in silence."""
 _SLOWEST = 0.9
-"""Largest ratio of two changes that is extrapolated; at this ratio the remaining change is nine times the
-last.
+"""Largest ratio of two successive changes in an extrapolation; the remaining change is then nine times the
+last change.
 """
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """Result for a series of periods; values are shares of the motion's rms size."""
+    """Whether and how a series of periods has settled; values are relative to the motion's rms."""
 
     steadiness: Steadiness
     period: int
-    """Number of drive periods after which it repeats; 0 when it does not."""
+    """Number of drive periods after which the motion repeats; 0 if it does not."""
     scatter: float
-    """Rms distance of the points from their means, at that period (or at period 1)."""
+    """Rms distance of points from their means when grouped by the period; by period 1 without one."""
     scatter_u: float
     """Standard uncertainty of the scatter."""
     noise: float
-    """Part of the scatter due to the channel's noise; nothing smaller can be seen."""
+    """Part of the scatter due to noise of the channel; a smaller scatter cannot be measured."""
     remaining: float
-    """Extrapolated remaining change of the means; for an aperiodic motion their last change."""
+    """Expected remaining change of the means, extrapolated; for an aperiodic motion, their last change."""
 
 
 def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
-    """Judge the newest periods of a motion.
+    """Return the judgement of a motion's newest periods by the criteria of ``rule``.
 
     Parameters
     ----------
     points
         Fourier coefficients of each drive period, shape (periods, orders).
     noise
-        Rms of the coefficients of all orders without drive, in the unit of the points.
+        Rms of all orders together without drive, in the unit of the points.
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)
@@ -262,10 +262,10 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
 
 
 def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> Judgement:
-    """Convert the period of a judgement to drive periods; each of the ``points`` spans ``drives`` of them.
+    """Return a judgement with its period in drive periods; each of the ``points`` spans ``drives`` of them.
 
-    A motion that repeats after one drive period has only noise at the orders in between, even if a
-    subharmonic is weak. A hum that is also present in silence is noise.
+    The motion repeats after one drive period if the orders between the harmonics of the drive contain only
+    noise. Hum that is also present in silence counts as noise.
     """
     between = points[:, np.arange(points.shape[1]) % drives != 0]
     mean = between.mean(axis=0)
@@ -298,7 +298,7 @@ def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
 
 
 def _differ(points: Phasors, period: int, allowed: float) -> bool:
-    """Whether the clusters of a longer period are further apart than the allowed width of one."""
+    """Return whether the clusters of a longer period are further apart than the allowed width of one."""
     centres = points.reshape(-1, period, points.shape[1]).mean(axis=0)
     away = centres - centres.mean(axis=0)
     size = float(np.mean(np.sum(np.abs(points) ** 2, axis=1)))
@@ -306,7 +306,7 @@ def _differ(points: Phasors, period: int, allowed: float) -> bool:
 
 
 def _remaining(early: float, late: float, by_chance: float) -> float:
-    """Extrapolate two changes of a mean as a geometric series, unless chance explains the last one."""
+    """Return the geometrically extrapolated remaining change; the last change if that may be chance."""
     if late <= _SURE * by_chance:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
@@ -315,20 +315,20 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # The means of thirds also differ by chance; the limit includes the noise.
+    # The means of the thirds also differ by chance; ``allowed`` includes the noise.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
 def _limit(figures: Judgement, tolerance: float) -> float:
-    """Return the largest scatter of a motion that still counts as repeating."""
+    """Return the largest scatter with which a motion still counts as repeating."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
 
 def _stationary(points: Phasors, found: Judgement) -> Judgement:
-    """Test whether the statistics of blocks are steady: no trend, and no step between the halves."""
+    """Return the judgement by statistics of blocks: steady without a trend or a step between halves."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
-    # The first order, or the single one that is judged.
+    # Use order 1, or the only order if a single one is judged.
     fundamental = blocks[:, :, min(1, blocks.shape[2] - 1)].mean(axis=1)
     power = np.log(np.mean(np.sum(np.abs(blocks) ** 2, axis=2), axis=1))
     away = blocks - blocks.mean(axis=1, keepdims=True)
@@ -342,7 +342,7 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
 
 
 def _has_no_trend(figure: Samples) -> bool:
-    """Kendall's rank correlation with time (the reverse-arrangements test of Bendat and Piersol)."""
+    """Return whether Kendall's tau finds no trend (reverse-arrangements test of Bendat and Piersol)."""
     if float(np.ptp(figure)) == 0.0:
         return True
     return float(kendalltau(np.arange(len(figure)), figure).pvalue) > _SIGNIFICANCE
@@ -351,5 +351,5 @@ def _has_no_trend(figure: Samples) -> bool:
 def _halves_agree(figure: Samples) -> bool:
     first, second = np.array_split(figure, 2)
     spread = sqrt((float(first.var(ddof=1)) + float(second.var(ddof=1))) / len(first))
-    # Student's t at 0.125 % (two-sided) with ten degrees of freedom.
+    # The factor 4.4 is Student's t at 0.125 % (two-sided) with ten degrees of freedom.
     return abs(float(first.mean() - second.mean())) <= 4.4 * spread
