@@ -2,6 +2,6 @@
 
 A run is a state machine that yields progress after every block. Samples read are its only clock. Each block
 is checked against the limits of the rig (docs/decisions/0024-limits-while-running.md) and recorded without
-a gap. Whatever fails, the drive is silenced and the recording states how it ended. Generators and analogue
-outputs have a common interface (`Drive`).
+a gap. After any failure the drive is silenced, and the recording states how the run ended. Generators and
+analogue outputs have a common interface, `Drive`.
 """

@@ -10,11 +10,11 @@ from ..instruments import Block, Digitizer, read_block
 from ..recording import EventKind, RecordingWriter
 
 BLOCK_S = 0.1
-"""Longest time between two checks of the limits and of the switch [s]; ten reads a second suit NI-DAQmx."""
+"""Longest time between two checks of limits and stop switch [s]; NI-DAQmx suits ten reads per second."""
 
 
 class AcquisitionLoop:
-    """Acquisition loop, whose clock is the number of samples read: waiting means reading."""
+    """Reads and records blocks. The clock is the number of samples read, so waiting means reading."""
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
         """``advance`` is called after every block."""
@@ -24,9 +24,9 @@ class AcquisitionLoop:
         self.segment: Segment | None = None
         """Segment that is being recorded."""
         self.samples = 0
-        """Samples recorded so far."""
+        """Number of samples recorded so far."""
         self.lost_samples = 0
-        """Samples lost by the converter, which are marked in the recording."""
+        """Number of samples lost by the converter; the recording marks them."""
         self._due_s = 0.0
 
     @property
@@ -35,29 +35,29 @@ class AcquisitionLoop:
         return self.samples / self._digitizer.sample_rate_hz
 
     def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
-        """Read and record blocks for another ``duration_s``, minus a lead.
+        """Read and record blocks for another ``duration_s``; yield each block.
 
         The end is the sample nearest to the sum of all durations so far, so that rounding does not
-        accumulate. A lead [s] is read with the next stretch.
+        accumulate. The last ``lead_s`` [s] are left for the next call.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
-        # The end moves when the consumer of the blocks is slow.
+        # The end is computed again for every block, because a slow consumer of the blocks delays it.
         while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield self._next(min(longest, goal - self.samples))
 
     def time_s(self) -> float:
-        """Return the planned end of everything so far, delays included [s]."""
+        """Return the sum of all durations so far, including delays [s]."""
         return self._due_s
 
     @property
     def waiting_s(self) -> float:
-        """Return the age of the last sample read [s]."""
+        """Age of the last sample read [s]."""
         return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
 
     def catch_up(self) -> Iterator[Block]:
-        """Read all waiting samples, and delay everything after them accordingly."""
+        """Read all waiting samples, and delay the rest of the plan by their duration."""
         # Only once, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
@@ -67,9 +67,9 @@ class AcquisitionLoop:
             waiting -= min(longest, waiting)
 
     def pass_time(self, duration_s: float) -> Iterator[Block]:
-        """Read for another ``duration_s`` as in `read_for`, but leave samples unread that waited before.
+        """Read until another ``duration_s`` has been converted; samples that waited before stay unread.
 
-        If more time has passed already, everything after it is delayed accordingly.
+        If more time has passed already, the rest of the plan is delayed accordingly.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
@@ -79,7 +79,7 @@ class AcquisitionLoop:
         while sampled < goal:
             yield self._next(min(piece, goal - self.samples))
             sampled = self._sampled
-        # Less than half a sample is the rounding of the goal, which must not accumulate.
+        # Ignore up to half a sample, which is the rounding of the goal and must not accumulate.
         self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
 
     @property
@@ -88,7 +88,7 @@ class AcquisitionLoop:
         return self.samples + self._digitizer.waiting_samples
 
     def linger(self, duration_s: float) -> Block:
-        """Read and record an additional block, and delay everything after it accordingly."""
+        """Read and record an additional block, and delay the rest of the plan by its duration."""
         self._due_s += duration_s
         return self._next(round(duration_s * self._digitizer.sample_rate_hz))
 
@@ -101,7 +101,7 @@ class AcquisitionLoop:
         return block
 
     def cut(self) -> None:
-        """Start the next stretch now, even if the last one is incomplete and samples wait."""
+        """Let the next duration start now, even if the last one is incomplete and samples wait."""
         self._due_s = self._sampled / self._digitizer.sample_rate_hz
 
     def enter(self, segment: Segment | None) -> None:
@@ -119,6 +119,6 @@ class AcquisitionLoop:
         self._sink.log(kind, text, self.samples)
 
     def log_limit_trip(self, error: LimitExceeded) -> None:
-        """Add an event with the values of a passed limit at its sample."""
+        """Add an event with the values of an exceeded limit at the sample that exceeded it."""
         if error.trip is not None:
             self._sink.log(EventKind.LIMIT, json.dumps(asdict(error.trip)), error.trip.sample)

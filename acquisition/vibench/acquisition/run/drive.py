@@ -1,4 +1,4 @@
-"""Signal source of a run: a function generator, or an analogue output for non-repeating signals."""
+"""Signal source of a run: function generator, analogue output or real-time controller."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
@@ -13,19 +13,19 @@ from .stream_drive import StreamDrive
 
 
 class Drive(Protocol):
-    """Plays phases in sequence while the run reads.
+    """Plays phases in sequence while the run reads samples.
 
-    A drive never waits: it yields the time to read until its next action, because samples read are the only
-    clock. Coming phases are announced to it, because some drives write samples in advance.
+    A drive never waits. It yields the time for which to read until its next action, because samples read are
+    the only clock. Coming phases are announced, because some drives write samples in advance.
     """
 
     @property
     def drive_source(self) -> DriveSource:
-        """The instrument that plays."""
+        """Kind of instrument that plays."""
 
     @property
     def pause_s(self) -> float:
-        """Silence between an announcement and its effect [s]."""
+        """Silence between the announcement of phases and their start [s]."""
 
     @property
     def coefficients(self) -> tuple[Any, ...]:
@@ -33,24 +33,24 @@ class Drive(Protocol):
 
     @property
     def is_commanded(self) -> bool:
-        """Whether each change is a command that takes time during sampling."""
+        """Whether each change of the signal needs a command, which takes time while sampling continues."""
 
     @property
     def setting_vpp(self) -> float:
-        """Current amplitude setting, peak to peak [V]; 0 in silence."""
+        """Present amplitude setting, peak to peak [V]; 0 in silence."""
 
     @property
     def is_playing(self) -> bool:
-        """Whether a signal plays that must be ramped down."""
+        """Whether a signal is playing that must be ramped down."""
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Prepare before the digitizer starts; the first of ``coming`` starts with its first sample."""
+        """Prepare the drive; the first of ``coming`` starts at the digitizer's first sample."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Announce the phases after all previous ones; they start after `pause_s`."""
+        """Announce the phases that follow all previous ones; they start after `pause_s`."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Play a phase; yield how long to read until the next command [s]."""
+        """Play a phase; yield the times for which to read until the next command [s]."""
 
     @property
     def can_hold(self) -> bool:
@@ -59,20 +59,20 @@ class Drive(Protocol):
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
         """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`.
 
-        ``clock_s`` returns the time [s]; when reading is slow, it advances by more than was yielded.
+        ``clock_s`` returns the time [s]; if reading is slow, it advances by more than the yielded times.
         """
 
     def cut(self) -> None:
-        """Switch off at once without a ramp. Legal at any time."""
+        """Switch off at once without a ramp. May be called at any time."""
 
     def silence(self) -> None:
-        """Ramp down as fast as possible, and switch off at once if that fails. Legal at any time."""
+        """Ramp down as fast as possible; if that fails, switch off at once. May be called at any time."""
 
 
 def drive_for(bench: Bench, measurement: Measurement) -> Drive:
-    """Return the drive for a measurement.
+    """Return the drive that plays a measurement.
 
-    Raises ConfigurationError when the bench has none.
+    Raises ConfigurationError when the bench has no suitable drive.
     """
     source = require_played(measurement, bench.rig)
     if source is not DriveSource.GENERATOR and bench.rig.generator.dead_man_s is not None:
@@ -88,7 +88,7 @@ def drive_for(bench: Bench, measurement: Measurement) -> Drive:
 
 
 def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
-    """Return the configured dead man's switch; raises ConfigurationError if it is not possible."""
+    """Return the configured dead man's switch; raise ConfigurationError if the signal does not allow it."""
     longest_s = bench.rig.generator.dead_man_s
     if longest_s is None:
         return None

@@ -19,18 +19,18 @@ class Progress:
 
     state: RunState
     segment: Segment | None
-    """The named range of the recording that the block belongs to."""
+    """Segment of the recording that contains the block."""
     block: Block
     elapsed_s: float
     """Time recorded so far [s]."""
     total_s: float
-    """Planned time from the first sample to the last [s]."""
+    """Planned duration of the whole recording [s]."""
     amplitude_vpp: float
-    """Setting of the generator, peak to peak [V]; 0 while its output is off."""
+    """Amplitude setting of the generator, peak to peak [V]; 0 while its output is off."""
     frequency_hz: float | None = None
-    """Frequency of the sine that is played; None for anything else."""
+    """Frequency of the sine that is played [Hz]; None for other signals."""
     until: UntilNote | None = None
-    """Bounds of results, for a recording that lasts until they are met."""
+    """Bounds of the results so far, if the recording lasts until they are small enough."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Outcome:
     state: RunState
     reason: str
     path: Path
-    """The recording."""
+    """Path of the recording."""
     cause: Cause | None = None
     """Cause of an early end; None for a completed plan."""
 
 
 class Ending:
-    """Cause and text of the end of a run."""
+    """Cause and description of the end of a run."""
 
     def __init__(self) -> None:
         self.state = RunState.FAILED
@@ -54,16 +54,16 @@ class Ending:
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
-        """Note that the plan was completed, with bounds of results and lost samples."""
+        """Note that the plan was completed; ``known`` states bounds of results."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 
     def is_stopped(self, reason: str, cause: Cause) -> None:
-        """Note that the run was stopped."""
+        """Note that the run was stopped on request."""
         self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
 
     def is_failed(self, error: Exception, reason: str) -> None:
-        """Note a failure; an earlier cause stays first."""
+        """Note a failure; an earlier cause of the end remains the cause."""
         if self._cause is None:
             self.reason, self._cause = reason, _cause_of(error)
         else:
@@ -94,7 +94,7 @@ class Ending:
             digitizer.stop()
         except AcquisitionError as failure:
             self._add(failure)
-            if not has_failed_already:  # otherwise the first failure is the cause and stays first
+            if not has_failed_already:  # otherwise the first failure remains the cause
                 raise
 
     def _finish(self, sink: RecordingWriter) -> None:

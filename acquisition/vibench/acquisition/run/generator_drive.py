@@ -13,25 +13,25 @@ from ..instruments import FunctionGenerator, Sweep
 from ..plan import FEWEST_STAIRS, DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
 QUIET = 1.25
-"""Level 0 of a full-range waveform, where ramps start and end, relative to the generator's smallest
-setting."""
+"""Setting at level 0, where ramps start and end, over the generator's smallest setting (for a waveform of
+full range)."""
 
 
 GUARD_S = 0.02
-"""Pause between the end of a burst and the next trigger [s]. A trigger during a burst is not documented for
-every firmware, and reading times vary by some milliseconds."""
+"""Pause between the end of a burst and the next trigger [s]. The effect of a trigger during a burst is not
+documented for every firmware, and reading times vary by some milliseconds."""
 CHECK_MARGIN_S = 0.5
-"""Extra length of a check's burst, for commands and the reading of samples [s]."""
+"""Additional length of the burst for a check, for commands and the reading of samples [s]."""
 LITTLE = 0.98
-"""Ratio of levels below which the amplitude is lowered before the frequency changes."""
+"""Ratio of new to old level below which the amplitude is lowered before the frequency changes."""
 MOST_CYCLES = 50_000
 _BLIND_S = 0.1
-"""Duration of a ramp without counting samples [s]."""
+"""Duration of a ramp that does not count samples [s]."""
 _ROUNDING_S = 1e-9
 
 
 class DeadMan:
-    """Dead man's switch: a sine in bursts, each triggered by the running process.
+    """Dead man's switch: a sine in bursts, which ends unless the process triggers the next burst.
 
     See docs/decisions/0030-dead-man.md.
     """
@@ -43,9 +43,9 @@ class DeadMan:
         self._left_s = 0.0
 
     def arm(self, frequency_hz: float, check_s: float = 0.0) -> None:
-        """Prepare bursts of whole periods; the output is off or quiet.
+        """Prepare bursts of whole periods while the output is off or quiet.
 
-        A check of ``check_s`` is one longer burst, because a gap would change its results.
+        A check of ``check_s`` is played as one longer burst, because a gap would change its results.
         """
         longest_s = max(self._longest_s, check_s + CHECK_MARGIN_S if check_s else 0.0)
         cycles = max(1, min(MOST_CYCLES, int(longest_s * frequency_hz)))
@@ -58,7 +58,7 @@ class DeadMan:
         self._left_s = self._period_s
 
     def pieces(self, duration_s: float) -> Iterator[float]:
-        """Divide a duration so that each burst is triggered after the end of the last."""
+        """Yield the parts of a duration; trigger each burst after the end of the last one."""
         while duration_s > _ROUNDING_S:
             piece_s = min(duration_s, self._left_s)
             yield piece_s
@@ -69,13 +69,13 @@ class DeadMan:
 
 
 class GeneratorDrive:
-    """A `Drive` whose commands take effect at once; each phase is commanded at its start."""
+    """A `Drive` whose commands take effect at once; a phase's first command is sent at its start."""
 
     drive_source = DriveSource.GENERATOR
     is_commanded = True
     coefficients = ()
     pause_s = 0.0
-    """A generator needs no announcement."""
+    """Zero, because a generator needs no announcement [s]."""
 
     def __init__(
         self, generator: FunctionGenerator, measurement: Measurement, dead_man: DeadMan | None = None
@@ -93,29 +93,29 @@ class GeneratorDrive:
 
     @property
     def can_hold(self) -> bool:
-        """Whether the signal continues by itself: not bursts and sweeps."""
+        """Whether the signal continues without further commands; False for bursts and sweeps."""
         return self._dead_man is None and not isinstance(self._play, Sweep)
 
     @property
     def setting_vpp(self) -> float:
-        """The amplitude setting while the output is on [V]; 0 while it is off."""
+        """Amplitude setting while the output is on [Vpp]; 0 while it is off."""
         return self._setting_vpp if self._is_on else 0.0
 
     @property
     def is_playing(self) -> bool:
-        """Whether the output is on, and above the quiet level."""
+        """Whether the output is on, at a level above 0."""
         return self._is_on and self._level > 0.0
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Note the duration of the first check; the output is off."""
+        """Store the duration of the check's tone; the output is off."""
         checking = takewhile(lambda phase: phase.state is RunState.CHECKING, coming)
         self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Do nothing: a generator prepares nothing."""
+        """Do nothing, because a generator prepares nothing in advance."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Send the commands of a phase; after each, yield the time to read until the next one [s]."""
+        """Send the commands of a phase; after each, yield the time to read until the next command [s]."""
         match phase.state:
             case RunState.CHECKING | RunState.ARMED:
                 self._sound(phase.play)
@@ -134,7 +134,7 @@ class GeneratorDrive:
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
         """Ramp down from the current level in as many steps as time allows; yield the length of each [s].
 
-        Steps whose time has passed are skipped, but no step exceeds the largest of a slow generator.
+        Steps whose time has passed are skipped, but no step exceeds 1/`FEWEST_STAIRS` of the ramp.
         """
         top, count, began_s, stair = self._level, self._stairs_within(ramp_s), clock_s(), 0
         while stair < count:
@@ -148,10 +148,10 @@ class GeneratorDrive:
         self._stop()
 
     def silence(self) -> None:
-        """Ramp down as fast as the generator takes commands, then turn the output off, whatever happens.
+        """Ramp down as fast as the generator takes commands, then turn the output off in any case.
 
-        For exits without sampling. About 20 commands of a few milliseconds make a short ramp; on a slow
-        generator, four.
+        Used when the run ends without sampling. The ramp has about 20 commands of a few milliseconds each, or
+        four on a slow generator.
         """
         try:
             with suppress(AcquisitionError):  # if the ramp fails, stop() still switches off
@@ -160,7 +160,7 @@ class GeneratorDrive:
             self._stop()
 
     def _sound(self, play: Play | None) -> None:
-        """Play the small tone of the check without a ramp, or nothing."""
+        """Play the small tone of the check without a ramp; for anything else, turn the output off."""
         match play:
             case Tone(frequency_hz, _):
                 if not self._is_on:
@@ -172,9 +172,9 @@ class GeneratorDrive:
                     self._stop()
 
     def _begin(self, play: Play | None) -> None:
-        """Change the signal, between tones with continuous phase; turn the output on if needed.
+        """Change the signal, and turn the output on if needed.
 
-        All other changes must happen at level 0.
+        Changes between tones keep the phase continuous; all other changes must be made at level 0.
         """
         if play != self._play:
             self._load(play)
@@ -182,7 +182,7 @@ class GeneratorDrive:
             self._begin_bursts(play)
 
     def _begin_bursts(self, play: Play | None, check_s: float = 0.0) -> None:
-        """Turn the output on; with a dead man's switch, trigger the first burst."""
+        """Turn the output on; with a dead man's switch, also trigger the first burst."""
         match play:
             case Tone(frequency_hz, _) if self._dead_man is not None:
                 self._dead_man.arm(frequency_hz, check_s)
@@ -213,9 +213,9 @@ class GeneratorDrive:
         self._setting_vpp = self._due_vpp
 
     def _change_tone(self, old: Tone, new: Tone) -> None:
-        """Lower the amplitude before the frequency changes, or raise it after, to never exceed the level.
+        """Change amplitude and frequency: lower the amplitude first, or raise it last, for safety.
 
-        For small changes, as between steps of a sweep, the frequency changes first, so that it is on time.
+        A small decrease, as between steps of a sweep, comes last too, so that the frequency is on time.
         """
         if new.level < LITTLE * old.level:
             self._generator.set_amplitude(self._due_vpp)
@@ -231,12 +231,12 @@ class GeneratorDrive:
             yield from self._pieces(ramp_s / count)
 
     def _stairs_within(self, ramp_s: float) -> int:
-        """Return the number of settings that fit into a time, from the duration of the last."""
+        """Return the number of ramp steps that fit into ``ramp_s``, from the duration of the last command."""
         made = self._stairs if self._setting_takes_s == 0.0 else int(ramp_s / self._setting_takes_s)
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Set before the command, so that the output counts as on if the command fails half-way.
+        # Set before the command is sent, so that the output counts as on if the command fails half-way.
         self._is_on = True
         self._generator.start()
 
@@ -263,7 +263,7 @@ class GeneratorDrive:
 
     @property
     def _due_vpp(self) -> float:
-        """Setting for the current level and signal [V]."""
+        """Amplitude setting for the present level and signal [Vpp]."""
         planned_vpp = self._amplitude_vpp * full_level(self._play)
         quiet_vpp = min(planned_vpp, self._quiet_vpp())
         return quiet_vpp + self._level * (planned_vpp - quiet_vpp)
@@ -272,7 +272,7 @@ class GeneratorDrive:
         quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]
         match self._play:
             case Waveform(values):
-                # Generators stretch a waveform to their full range: their setting is then this much lower.
+                # Generators scale a waveform to their full range, so their own setting is lower by its peak.
                 return quiet_vpp / float(np.max(np.abs(values)))
             case _:
                 return quiet_vpp

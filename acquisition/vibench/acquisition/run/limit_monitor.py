@@ -1,4 +1,4 @@
-"""Limit monitor of a measurement: checks every block, and displacements integrated from it."""
+"""Limit monitor of a measurement: checks every block, including displacements integrated from it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from ..plan import InRunLimits, OnChange, OnOverload
 from ..rig import Channel, Rig, Role, suspended_mass_kg
 
 HIGH_PASS_HZ = 2.0
-"""Corner of every high pass: it makes a sine of 10 Hz 0.2 % too small, and a sine of 5 Hz 2.5 %."""
+"""Corner of every high-pass filter [Hz]. It attenuates a sine by 0.2 % at 10 Hz and by 2.5 % at 5 Hz."""
 
 
 class _Section:
-    """A second-order filter with state between blocks."""
+    """A second-order filter that keeps its state from block to block."""
 
     def __init__(self, numerator: tuple[float, ...], sample_rate_hz: float) -> None:
         corner = 2 * pi * HIGH_PASS_HZ
@@ -27,8 +27,8 @@ class _Section:
 
     def run(self, values: Samples) -> Samples:
         if self._state is None:
-            # Start from the mean of the first block. Its first value could be a peak of ringing from the
-            # last run, and the filter would swing for a second.
+            # Start from the mean of the first block. Its first value could be a peak of the last run's
+            # decay, to which the filter would respond for a second.
             self._state = lfilter_zi(self._b, self._a) * float(np.mean(values))
         out, self._state = lfilter(self._b, self._a, values, zi=self._state)
         return np.asarray(out)
@@ -44,32 +44,32 @@ def _high_pass(sample_rate_hz: float) -> _Section:
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """Motion of the base in the samples of a block."""
+    """Motion of the base at each sample of a block."""
 
     velocity: Samples
-    """[m/s]"""
+    """Velocity at each sample [m/s]."""
     displacement: Samples
-    """[m]"""
+    """Displacement at each sample [m]."""
 
 
 class BaseTracker:
-    """Integrates the base acceleration twice, each time with a second-order high pass."""
+    """Integrates the base acceleration twice, each time with a second-order high-pass filter."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._to_velocity = _integrator(sample_rate_hz)
         self._to_displacement = _integrator(sample_rate_hz)
 
     def follow(self, acceleration: Samples) -> BaseMotion:
-        """Add the next samples [m/s2], without a gap."""
+        """Return the base motion for the next samples [m/s2], which must follow without a gap."""
         velocity = self._to_velocity.run(acceleration)
         return BaseMotion(velocity, self._to_displacement.run(velocity))
 
 
 class SpecimenTracker:
-    """Tracks the displacement of the main mass relative to the base, which stretches the springs.
+    """Displacement of m0 relative to the base, which stretches the springs.
 
-    Missing integrations of m0's sensor are replaced by high passes, so that both motions have the same
-    phase.
+    If m0's sensor needs fewer integrations than the base acceleration, high-pass filters replace them, so
+    that both motions have the same phase.
     """
 
     def __init__(self, sample_rate_hz: float, role: Role = Role.M0_VELOCITY) -> None:
@@ -78,9 +78,9 @@ class SpecimenTracker:
         self._to_displacement = (_high_pass if role is Role.M0_DISPLACEMENT else _integrator)(sample_rate_hz)
 
     def follow(self, mass: Samples, base: BaseMotion, is_blind: NDArray[np.bool_]) -> Samples:
-        """Return the displacement of the mass relative to the base [m] for the next samples of its sensor.
+        """Return the displacement of m0 relative to the base [m] for the next samples of its sensor.
 
-        Where the sensor exceeds its range (``is_blind``), no motion is assumed.
+        Where the sensor exceeds its range (``is_blind``), no relative motion is assumed.
         """
         moved = self._to_velocity.run(np.where(is_blind, 0.0, mass))
         if self._role is Role.M0_DISPLACEMENT:
@@ -89,22 +89,22 @@ class SpecimenTracker:
 
 
 RMS_S = 1.0
-"""Averaging time of the rms current [s], since the limit is thermal."""
+"""Averaging time of the rms current [s]; its limit is thermal."""
 REACTION = 1.1
-"""Tolerance of the force on the table above the coil's limit, for the reaction of the specimen."""
+"""Allowed force on the table over the coil's limit; above 1 to allow for the reaction of the specimen."""
 SETTLING_S = 0.5
-"""Start-up time [s] in which integrated quantities are not checked: an AC-coupled input drifts after its
-current is switched on, which integrates to metres. The run is at the low level of its check then, and
-measured quantities are checked from the first sample."""
+"""Time after the start in which integrated quantities are not checked [s]. An AC-coupled input drifts after
+its current is switched on, and the drift integrates to metres. The run is then still at the low level of its
+check. Measured quantities are checked from the first sample."""
 _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 
 @dataclass(frozen=True)
 class _MonitoredQuantity:
-    """One quantity over a block, with its limit."""
+    """Values of one quantity over a block, with its limit."""
 
     role: Role
-    """Its source channel."""
+    """Channel from which the quantity is computed."""
     what: str
     values: Samples
     limit: float
@@ -115,8 +115,8 @@ class _MonitoredQuantity:
 class LimitMonitor:
     """Checks the limits, and raises an error when the run must end.
 
-    It is part of the loop that reads the samples, independent of windows and other processes. Blocks must
-    be consecutive; after a gap it restarts.
+    The monitor is part of the loop that reads the samples, independent of windows and other processes. Blocks
+    must be consecutive; after a gap, the monitor restarts.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class LimitMonitor:
         self._begin(0)
 
     def require_safe(self, block: Block) -> None:
-        """Raise LimitExceeded, with its `LimitTrip`, when a block passes a limit; the run then ramps down."""
+        """Raise LimitExceeded, with a `LimitTrip`, when a block exceeds a limit; the run then ramps down."""
         if not block.volts.shape[1]:
             return
         if block.first_sample != self._next_sample:
@@ -146,7 +146,7 @@ class LimitMonitor:
             raise self._overloaded(block, block.overloads[0])
 
     def note_change(self, text: str, sample: int) -> None:
-        """Report a change of the specimen at a sample; the next block raises it if the plan requires."""
+        """Note a change of the specimen; if the plan requires it, the next block raises LimitExceeded."""
         if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
             trip = LimitTrip(
                 channel=self._response.value,
@@ -171,7 +171,7 @@ class LimitMonitor:
         self._mean_square_a2 = 0.0
 
     def _monitored_quantities(self, block: Block) -> Iterator[_MonitoredQuantity]:
-        """Return all quantities with limits, measured ones first."""
+        """Yield all quantities that have limits, the measured ones first."""
         rows = {
             channel.role: volts * channel.units_per_volt
             for channel, volts in zip(self._channels, block.volts, strict=True)
@@ -210,7 +210,7 @@ class LimitMonitor:
             )
 
     def _table(self, acceleration: Samples, base: BaseMotion) -> _MonitoredQuantity:
-        """Return the force on the table: mass times acceleration, and the force of its suspension."""
+        """Return the force on the table: mass times acceleration plus the suspension's forces."""
         shaker = self._rig.shaker
         force = (
             suspended_mass_kg(shaker) * acceleration
@@ -234,7 +234,7 @@ class LimitMonitor:
         yield _MonitoredQuantity(
             role, "the amplifier voltage", voltage, clip_v, "V", f"clipping of the {rig.amplifier.model}"
         )
-        # The coil's inductance is neglected, which overestimates the current by 3 % at 1 kHz.
+        # Neglecting the inductance of the coil overestimates the current by 3 % at 1 kHz.
         current = (voltage - shaker.force_constant_n_per_a * base.velocity) / shaker.coil_resistance_ohm
         peak, force, limiter = shaker.limits.current_a, shaker.limits.force_n, rig.amplifier.current_limit_a
         yield _MonitoredQuantity(
@@ -311,7 +311,7 @@ class LimitMonitor:
 
 
 def _blind(block: Block, role: Role) -> NDArray[np.bool_]:
-    """Return the samples of a block in which a sensor exceeds its range."""
+    """Return for each sample of a block whether the sensor exceeds its range."""
     is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
     for overload in block.overloads:
         if overload.channel == role.value:

@@ -22,12 +22,12 @@ from .silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
 from .until import UntilWatch
 
 DELAY_SAMPLES = 40
-"""Approximate delay of a delta-sigma converter's filter in samples (NI 9234: 38.4); it shifts cycles while
-the frequency changes."""
+"""Approximate delay of a delta-sigma converter's filter in samples (NI 9234: 38.4). While the frequency
+changes, the delay shifts the count of cycles."""
 
 
 CLEAR = 0.3
-"""Share of the amplitude beyond which a sample is clearly above or below zero."""
+"""Fraction of the amplitude above which a sample is clearly positive or negative."""
 
 
 class Heard(Protocol):
@@ -38,7 +38,7 @@ class Heard(Protocol):
 
 
 class GlideWatch:
-    """Counts the cycles of the recorded drive by its rising edges, and compares them with the plan."""
+    """Counts the cycles of the recorded drive in a stepped sweep, and compares them with the plan."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
@@ -46,9 +46,9 @@ class GlideWatch:
         self.begin()
 
     def begin(self) -> None:
-        """Reset for another glide."""
+        """Reset for another sweep."""
         self._first: tuple[float, float] | None = None
-        """Planned cycles at the first edge, and the frequency there [Hz]."""
+        """Planned cycles at the first upward zero crossing, and the frequency there [Hz]."""
         self._last_hz = 0.0
         self._next_sample = -1
         self._planned = 0.0
@@ -57,7 +57,7 @@ class GlideWatch:
         self._more = 0.0
         self._offset_v = 0.0
         self._before: tuple[float, float] | None = None
-        """Time and voltage of the last sample that was clearly above or below zero."""
+        """Time and voltage of the last sample that was clearly positive or negative."""
 
     def take(
         self,
@@ -66,9 +66,9 @@ class GlideWatch:
         duration_s: float,
         course: Callable[[float], float] | None = None,
     ) -> None:
-        """Add the record of a tone of the glide.
+        """Add the recorded ``blocks`` of one step of the sweep.
 
-        ``course`` returns the cycles since the start, if the frequency is constant only on average.
+        ``course`` returns the planned cycles since the step's start, if its frequency is not constant.
         """
         if not blocks:
             return
@@ -89,7 +89,7 @@ class GlideWatch:
         self._last_hz = frequency_hz
 
     def _rises(self, block: Block, frequency_hz: float) -> Samples:
-        """Return the times at which the drive rises through zero [s], ignoring noise around zero."""
+        """Return the times at which the drive rises through zero [s]; noise around zero is ignored."""
         volts, rate_hz = block.volts[self._row], self.sample_rate_hz
         low, high = float(volts.min()), float(volts.max())
         if volts.size * frequency_hz >= rate_hz:
@@ -104,7 +104,7 @@ class GlideWatch:
 
     @property
     def more_cycles(self) -> float:
-        """Return the additional cycles of the drive; 0 within the effect of the converter's delay."""
+        """Cycles of the drive beyond its plan; 0 if the converter's delay can explain them."""
         if self._first is None:
             return 0.0
         delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._first[1])
@@ -112,7 +112,7 @@ class GlideWatch:
 
 
 class SweepWatch:
-    """Compares a sweep by the generator with its planned course, block by block."""
+    """Compares a generator's own sweep with its planned course, block by block."""
 
     def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
         self._glide = glide
@@ -129,42 +129,42 @@ class SweepWatch:
 
 
 HOLD_LONGEST_S = HOLD_ROOM_S
-"""Longest total hold of a run [s], limited by the space of its recording."""
+"""Longest total hold of a run [s], limited by the space in its recording."""
 
 
 LATEST = 0.5
-"""Largest delay of a command in a glide that is not noted, in steps."""
+"""Largest delay of a command in a stepped sweep that is not logged, as a fraction of its step."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
-"""Duration of late steps in a row that counts as a fault [s]."""
+"""Duration of consecutive late steps above which the run fails [s]."""
 LEARNT = 0.05
-"""Least share of a delay by which later commands are sent earlier; larger for the first ones."""
+"""Smallest fraction of a delay by which later commands are sent earlier; larger for the first steps."""
 LONGEST_LEAD = 0.25
-"""Longest lead of a command, as a share of its step."""
+"""Largest lead of a command, as a fraction of its step."""
 TOLD_CYCLES = 0.1
-"""Deviation of the drive at the end of a glide above which an event is noted [cycles]."""
+"""Deviation of the drive at the end of a sweep above which an event is logged [cycles]."""
 MOST_MADE_UP = 3.0
-"""Largest frequency correction for lost cycles, relative to the step between two frequencies."""
+"""Largest frequency correction for lost cycles, over the planned step between two frequencies."""
 LEAST_LEFT = 0.2
-"""Smallest share of a step in which cycles are corrected."""
+"""Shortest time for a correction, as a fraction of the step; also the largest relative correction."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
 class _Pace(Enum):
-    """Start time of a phase and its pieces."""
+    """Time from which a phase and its parts are counted."""
 
     AFTER_THE_COMMAND = auto()
-    """The end of its first command, for settling."""
+    """The end of the phase's first command; for settling."""
     OF_THE_COMMANDS = auto()
-    """The plan, or the end of the last command if later, for ramps."""
+    """The planned time, or the end of the last command if that is later; for ramps."""
     OF_THE_PLAN = auto()
-    """The plan, for glides."""
+    """The planned time; for stepped sweeps."""
     OF_ITSELF = auto()
-    """No time base: no command is due, or commands take no time."""
+    """The end of the previous phase: no command is due, or commands take no time."""
 
 
 class Stopped(Exception):
-    """The run was requested to end."""
+    """Raised when the run was requested to end."""
 
     def __init__(self, request: StopRequest) -> None:
         super().__init__(request.reason)
@@ -174,8 +174,8 @@ class Stopped(Exception):
 class PhaseRunner:
     """The sampling part of a run: phases, holds, and the ramp of an early end.
 
-    After every block it checks the limits and the switch: it raises LimitExceeded, RunStalled or
-    `Stopped`, and the run then ramps down.
+    After every block the limits and the stop switch are checked. If the run must end, LimitExceeded,
+    RunStalled or `Stopped` is raised, and the run ramps down.
     """
 
     def __init__(
@@ -213,10 +213,10 @@ class PhaseRunner:
         return self._drive.coefficients
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
-        """Play a phase; its samples go ``into`` a list as well, if one is given.
+        """Play a phase and yield progress; its blocks are also appended to ``into``, if given.
 
-        A phase begins when its command has been carried out, however long that takes. A drive that glides
-        from step to step of one segment keeps to the time of its plan instead, and fails when it cannot.
+        A phase begins when its command has been carried out, however long that takes. Steps of a sweep within
+        one segment start at their planned times instead; the run fails if they cannot.
         """
         self._enter(phase.state)
         pace, commanded = self._pace_of(phase), phase
@@ -228,9 +228,9 @@ class PhaseRunner:
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
             self._planned_hz = self._glided_hz
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
-            yield from self._catch_up()  # its first sample is at the trigger
+            yield from self._catch_up()  # the first sample must be at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # a segment excludes the time in which its successor is commanded
+            self.loop.enter(None)  # exclude the time of the next command
         waits = self._drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
@@ -247,13 +247,13 @@ class PhaseRunner:
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
     def _drive_checks(self, phase: Phase) -> Heard | None:
-        """Return the consumers of the blocks of a phase whose drive is checked against the plan."""
+        """Return a consumer of the phase's blocks that checks the drive against the plan, or None."""
         if not self._may_glide(phase):
             return None
         return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []
 
     def _may_glide(self, phase: Phase) -> bool:
-        """Return whether a phase may be a tone of a recorded sweep by commands."""
+        """Return whether a phase may be a step of a recorded sweep that is played by commands."""
         return self._drive.is_commanded and phase.state is RunState.RECORDING
 
     def _pace_of(self, phase: Phase) -> "_Pace":
@@ -270,14 +270,14 @@ class PhaseRunner:
     def _with_lost_cycles(self, phase: Phase, late_s: float) -> Phase:
         """Return the phase with its frequency corrected for the cycles lost before it.
 
-        While a command is late, the previous tone continues, and the drive loses the difference of the two
-        frequencies times the delay. Cycles that one step cannot correct are left to the next.
+        While a command is late, the previous tone continues. The cycles lost are the difference of the two
+        frequencies times the delay. Cycles that one step cannot correct are left to the next step.
         """
         if not isinstance(phase.play, Tone):
             return phase
         planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
         self._lost_cycles += (planned_hz - self._glided_hz) * late_s
-        # Relative to the plan's step, so that corrections do not accumulate.
+        # The limit follows from the planned step, so that corrections do not accumulate.
         most_hz = min(MOST_MADE_UP * abs(planned_hz - self._planned_hz), LEAST_LEFT * planned_hz)
         wanted_hz = self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s)
         more_hz = min(max(wanted_hz, -most_hz), most_hz) if left_s > 0 else 0.0
@@ -286,7 +286,7 @@ class PhaseRunner:
         return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
 
     def _note_lost_cycles(self) -> None:
-        """Note any deviation of the recorded drive from its plan at the end of a glide."""
+        """Log a deviation of the recorded drive from its plan at the end of a sweep."""
         more, self._lost_cycles = self._glide.more_cycles, 0.0
         self._glide.begin()
         if abs(more) > TOLD_CYCLES:
@@ -296,10 +296,10 @@ class PhaseRunner:
     def _require_pace(self, phase: Phase) -> float:
         """Return the delay of this command [s], and send later commands earlier accordingly.
 
-        Delays above half a step are noted; several in a row raise DriveLate.
+        Delays above half a step are logged; several in a row raise DriveLate.
 
-        Samples are handed over some milliseconds after they are converted, so that a command that waits for
-        them is late; over a sweep of 200 Hz that would be a cycle or two. The next ones are given earlier.
+        Samples arrive some milliseconds after conversion, so a command that waits for them is late. Over a
+        sweep of 200 Hz this would amount to a cycle or two, so later commands are sent earlier.
         """
         late_s = self.loop.waiting_s - self._lead_s
         self._glides += 1
@@ -337,8 +337,8 @@ class PhaseRunner:
     ) -> Iterator[Progress]:
         """Ramp down from the current state without limit checks; an open segment stays incomplete.
 
-        A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of each [s]. Waits for
-        measured silence; raises InstrumentError without it.
+        A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of the ramp for a stop
+        level [s]. Records until silence is measured; raises InstrumentError if it is not.
         """
         self._look = self._silence.take
         self.loop.log(EventKind.END, reason)
@@ -346,7 +346,7 @@ class PhaseRunner:
         if self._drive.is_playing:
             self._enter(RunState.RAMPING_DOWN)
         if level is StopLevel.OFF:
-            self._drive.cut()  # before the converter is asked, which may not answer
+            self._drive.cut()  # before reading, because the converter may not answer
         self.loop.cut()
         while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level), self.loop.time_s):
@@ -362,7 +362,7 @@ class PhaseRunner:
         self._silence.require_silence()
 
     def _listened(self) -> Iterator[Progress]:
-        """Continue recording until the measured drive is silent."""
+        """Continue to record until the measured drive is silent, or for `LONGEST_S`."""
         give_up_s = self.loop.elapsed_s + LONGEST_S
         yield from self._read(LISTEN_S)
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
@@ -377,8 +377,8 @@ class PhaseRunner:
     def _held(self) -> Iterator[Progress]:
         """Hold the run, monitored and recorded, until it is resumed or stopped.
 
-        Signals that must be fed cannot be held, and the recording has space for `HOLD_LONGEST_S`; after that
-        the run is ramped down.
+        Signals that must be fed with samples cannot be held. The recording has space for `HOLD_LONGEST_S`;
+        after that, the run is ramped down.
         """
         if not self._drive.can_hold:
             source = self._drive.drive_source.value
@@ -395,13 +395,13 @@ class PhaseRunner:
         self._enter(before)
 
     def _go_on(self, block: Block) -> None:
-        """Raise the cause of an early end: a limit, a stall, or a request."""
+        """Raise an exception if the run must end early: a limit, a stall, or a request."""
         self._limit_monitor.require_safe(block)
         if (request := self._switch.request) is not None:
             raise RunStalled(request.reason) if request.cause is Cause.FAULT else Stopped(request)
 
     def _report_progress(self, block: Block) -> Progress:
-        """Add requested events, and return the progress."""
+        """Write requested events to the recording, and return the progress."""
         loop = self.loop
         for text in self._switch.take_marks():
             loop.log(EventKind.MARK, text)

@@ -1,4 +1,4 @@
-"""Run a measurement: check, ramp up, settle, record, ramp down, and always silence."""
+"""Run a measurement: check, ramp up, settle, record, ramp down, and silence the drive in any case."""
 
 import math
 from collections import deque
@@ -45,15 +45,15 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""Least ratio of the step of a glide to the time that a setting takes, since that time varies."""
+"""Smallest ratio of a sweep's step to the time of its commands; above 1, because that time varies."""
 _MOST_COMMANDS = 2
-"""Commands for one change of tone: amplitude and frequency."""
+"""Largest number of commands for one change of tone: amplitude and frequency."""
 
 
 def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:
-    """Refuse a glide with too short steps; return the time that commands add to settled tones [s].
+    """Refuse a sweep with too short steps; return the time that commands add to settled tones [s].
 
-    Raises ConfigurationError when a step is shorter than the generator takes for a setting, measured now.
+    Raises ConfigurationError when a step is shorter than `ROOM` times the measured time of its commands.
     """
     step_s = measurement.excitation.glide_step_s
     if step_s is not None:
@@ -71,7 +71,7 @@ def require_time_for_commands(measurement: Measurement, generator: FunctionGener
 
 
 def _commands_of_a_step(measurement: Measurement) -> int:
-    """Return the commands per step: frequency, and amplitude if that may change."""
+    """Return the number of commands per step: frequency, and amplitude if it may change."""
     if isinstance(measurement.excitation, AbstractFeedback):
         return _MOST_COMMANDS
     levels = {
@@ -96,7 +96,7 @@ def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] |
 
 
 def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> RecordingHeader:
-    """Return the header of the recording of ``planned_s`` of ``measurement`` on ``bench``."""
+    """Return the header of a recording of ``measurement`` on ``bench``, planned for ``planned_s``."""
     rig = bench.rig
     steps = bench.digitizer.volts_per_count
     sample_rate_hz = bench.digitizer.sample_rate_hz
@@ -115,7 +115,7 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
 
 
 def _origin(bench: Bench) -> Origin:
-    """Return the origin of samples: simulated for a virtual rig or simulated instruments."""
+    """Return the origin of the samples: simulated if the rig or any instrument is simulated."""
     origins = {identity.origin for identity in bench.identities.values()}
     simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in origins
     return Origin.SIMULATED if simulated else Origin.REAL
@@ -151,21 +151,21 @@ CreateRecording = Callable[[Path, RecordingHeader], RecordingWriter]
 
 
 class Run(ClosedOnLeaving):
-    """Run of one measurement: iterate it to play, check and record, block by block.
+    """Run of one measurement: iterate over it to play, check and record, block by block.
 
-    `RunState` has the diagram of its states. However the run ends (plan done, cancelled, limit,
-    failed instrument, full disk, keyboard, abandoned iterator), the generator is silent afterwards
-    and the recording is finished and says why. Leave it through a ``with``, so that an abandoned
+    `RunState` shows the diagram of the states. However the run ends (plan done, cancelled, limit,
+    failed instrument, full disk, keyboard, abandoned iterator), the generator is silent afterwards.
+    The recording is finished and states the reason. Use a ``with`` statement, so that an abandoned
     run ends at once::
 
         with Run(bench, measurement, path) as run:
             for progress in run:
                 print(progress.state, progress.elapsed_s)
 
-    Iterating raises LimitExceeded (before anything moves when the plan passes a limit, later when a
-    measured value does), CheckFailed when the bench does not answer at low level as it should, RunStalled
-    when it read no samples for too long, and InstrumentError, DataLost or RecordingError when an instrument
-    or the disk fails.
+    Iterating raises LimitExceeded when the plan exceeds a limit (before anything moves) or a measured value
+    does. It raises CheckFailed when the bench responds at low level otherwise than expected, RunStalled when
+    no samples were read for too long, and InstrumentError, DataLost or RecordingError when an instrument or
+    the disk fails.
     """
 
     def __init__(
@@ -177,9 +177,9 @@ class Run(ClosedOnLeaving):
         create: CreateRecording = create_recording,
         switch: StopSwitch | None = None,
     ) -> None:
-        """``switch`` lets others hold or end the run."""
+        """``switch`` lets other threads hold or end the run."""
         self.switch = StopSwitch() if switch is None else switch
-        """Holds or ends the run within a block, from any thread or signal handler."""
+        """Switch to hold or end the run within a block, from any thread or signal handler."""
         self._bench = bench
         self._measurement = measurement
         self._path = path
@@ -279,7 +279,7 @@ class Run(ClosedOnLeaving):
             raise
 
     def _admitted(self) -> RecordingWriter:
-        """Check everything before anything moves; then start the recording."""
+        """Check plan and bench before anything moves; then create the recording and return its writer."""
         self._state = RunState.CHECKING
         try:
             require_checkable(self._bench.channels)
@@ -315,7 +315,7 @@ class Run(ClosedOnLeaving):
             playing = phases(self._measurement)
         if self._until is not None:
             playing = self._until.phases(self._measurement)
-        # An output writes ahead, so it reads the same phases earlier than the run.
+        # An analogue output writes in advance, so it reads the same phases earlier than the run.
         playing, announced = tee(playing)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
@@ -339,14 +339,14 @@ class Run(ClosedOnLeaving):
         loop.enter(None)
 
     def _note_known(self, loop: AcquisitionLoop) -> None:
-        """Note the bounds of each stretch; the reason of the end states the last."""
+        """Log the bounds of each finished stretch; the reason of the run's end repeats the last."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)
             self._known = f"; {note.sentence}"
 
     def _begin(self, coming: Iterable[Phase]) -> None:
-        """Start sampling, and with it an output that shares the digitizer's trigger."""
+        """Start sampling, and with it an analogue output that shares the digitizer's trigger."""
         self._guard.begin()
         self._drive.arm(coming)
         self._bench.digitizer.start()
@@ -379,7 +379,7 @@ class Run(ClosedOnLeaving):
 
 
 def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
-    """Perform actions one by one; the samples of each determine the next."""
+    """Carry out a controller's actions; the samples of each determine the next."""
     try:
         action = next(controller)
         while True:
@@ -394,7 +394,7 @@ def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[P
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Ignore the progress."""
+    """Do nothing: the default for ``on_progress``."""
 
 
 def run_measurement(
@@ -408,10 +408,10 @@ def run_measurement(
 ) -> Outcome:
     """Run ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
 
-    ``on_progress`` is called after every block; ``switch`` lets others hold or end the run. Ctrl-C ramps
-    down and returns an outcome whose state is ``stopped``; a second one raises KeyboardInterrupt. Raises
-    AcquisitionError as `run.Run` says; the generator is silent then, and the recording, if it had started,
-    is finished as failed.
+    ``on_progress`` is called after every block; ``switch`` lets other threads hold or end the run. Ctrl-C
+    ramps down and returns an outcome whose state is ``stopped``; a second Ctrl-C raises KeyboardInterrupt.
+    Raises AcquisitionError in the cases listed in `run.Run`; the generator is then silent, and a recording
+    that had started is finished as failed.
     """
     run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
     # Signals are handled until the run has ended, so that none interrupts the silencing.

@@ -1,6 +1,6 @@
 """Check of the drive before a run, and measurement of its silence after a stop.
 
-After a stall, samples read after the last command may have been taken before it.
+After a stall, samples read after the last command may have been converted before it.
 """
 
 from collections.abc import Callable
@@ -22,14 +22,14 @@ from .acquisition_loop import BLOCK_S
 from .drive import Drive
 
 DRIVE_TOLERANCE = 0.15
-"""Tolerance of the measured drive; a wrong load is a factor of 2."""
+"""Relative tolerance of the measured drive; a wrong load setting is a factor of 2."""
 BASE_FACTOR = 10 ** (3 / 20)
-"""Tolerance of the base acceleration relative to the model: 3 dB."""
+"""Factor by which the base acceleration may differ from the model: 3 dB."""
 WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
-"""Largest share of the expected signal before anything plays."""
+"""Largest signal before anything plays, as a fraction of the expected signal."""
 STILL_SHARE = 0.3
-"""Share of the quiet stretch that is ignored, because the converter's filter and the table may still ring."""
+"""Fraction of the quiet record that is ignored, because filter and table may still ring."""
 
 
 class LowLevelCheck(StrEnum):
@@ -37,7 +37,7 @@ class LowLevelCheck(StrEnum):
 
     AT_LOW_LEVEL = "at low level"
     RECENTLY_PASSED = "recently passed"
-    """No check: the bench was checked in the same session and not touched since."""
+    """No check, because the bench was checked in the same session and not changed since."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class CheckFigures:
     expected_base_m_per_s2: float
 
     def text(self) -> str:
-        """One line for the log."""
+        """Return the results as one line for the log."""
         return (
             f"drive {self.drive_v:.4g} V ({self.expected_drive_v:.4g} V expected), "
             f"base {self.base_m_per_s2:.4g} m/s2 ({self.expected_base_m_per_s2:.4g} m/s2 expected) "
@@ -66,10 +66,10 @@ def check_figures(
     sample_rate_hz: float,
     amplitude_vpp: float,
 ) -> CheckFigures:
-    """Compare the record before and during the sine of the check with expectations.
+    """Return the results of the check, after comparing them with the expected values.
 
-    Raises CheckFailed with the deviation and advice. ``quiet`` and ``during`` are the volts before and while
-    the sine plays, shape (channels, samples) each [V].
+    Raises CheckFailed with the deviation and advice. ``quiet`` and ``during`` are the input voltages before
+    and while the sine plays, shape (channels, samples) each [V].
     """
     quiet = quiet[:, round(STILL_SHARE * quiet.shape[1]) :]
     drive = _row(channels, Role.DRIVE_VOLTAGE)
@@ -90,9 +90,9 @@ def check_figures(
 
 
 def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-    """Return the amplitude of a sine of known frequency, fitted with a constant and a linear drift.
+    """Return the amplitude of a sine of known frequency [V], fitted with a constant and a linear drift.
 
-    ``volts`` has shape (samples,), more than a period.
+    ``volts`` has the shape (samples,) and is longer than a period.
     """
     time_s = np.arange(len(volts)) / sample_rate_hz
     angle = 2 * np.pi * frequency_hz * time_s
@@ -102,7 +102,7 @@ def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -
 
 
 def require_checkable(channels: tuple[Channel, ...]) -> None:
-    """Raise an error for a rig without the two channels that every safe run needs."""
+    """Raise CheckFailed if the rig has no channel for the drive voltage or the base acceleration."""
     for role in (Role.DRIVE_VOLTAGE, Role.BASE_ACCELERATION):
         _row(channels, role)
 
@@ -156,19 +156,19 @@ def _require_base(figures: CheckFigures) -> None:
 
 
 SILENT_V = 5e-3
-"""Half of peak to peak at the amplifier's input: noise, hum, and the lowest setting of a generator [V]."""
+"""Half peak-to-peak voltage that counts as silence: noise, hum, a generator's lowest setting [V]."""
 HUM_FACTOR = 2.0
-"""Silence may have this multiple of the hum measured before the run, if that exceeds `SILENT_V`."""
+"""Multiple of the hum before the run that also counts as silence, if it exceeds `SILENT_V`."""
 LISTEN_S = 0.02
-"""Period of the mains, the step of the search for silence [s]."""
+"""Step of the search for silence: one period of the mains [s]."""
 LONGEST_S = 12.0
-"""Longest listening time [s], longer than the converter's buffer."""
+"""Longest search for silence [s]; longer than the converter's buffer."""
 STILL_ON = 0.1
-"""Share of the largest recorded drive above which the residue cannot be hum."""
+"""Fraction of the largest recorded drive above which a remaining signal cannot be hum."""
 
 
 class SilenceWatch:
-    """Tracks the recorded drive from a stop until it is silent."""
+    """Monitors the recorded drive after a stop until it is silent."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
@@ -180,15 +180,15 @@ class SilenceWatch:
         self._residue_v = inf
         self._loudest_v = 0.0
         self.is_heard = False
-        """Whether the drive was still present at the end of the listening time."""
+        """Whether the drive was still measured at the end of the search for silence."""
 
     def learn_hum(self, quiet: Samples) -> None:
-        """Measure the hum from volts (channels, samples) while nothing plays."""
+        """Set the limit of silence from ``quiet``, shape (channels, samples) [V], while nothing plays."""
         drive = self._drive(quiet)[round(STILL_SHARE * quiet.shape[1]) :]
         self._silent_v = max(SILENT_V, HUM_FACTOR * _half_peak_to_peak(drive))
 
     def begin(self, sample: int) -> None:
-        """Note a stop before this sample."""
+        """Start the measurement: the stop was noticed before this sample."""
         self._begin, self._last_loud, self._residue_v = sample, sample - 1, inf
 
     def take(self, block: Block) -> None:
@@ -196,7 +196,7 @@ class SilenceWatch:
         drive = self._drive(block.volts)
         self._residue_v = _half_peak_to_peak(drive)
         self._loudest_v = max(self._loudest_v, self._residue_v)
-        # Relative to its mean: an offset of the input is not a signal.
+        # Subtract the mean, because an offset of the input is not a signal.
         loud = np.flatnonzero(np.abs(drive - np.mean(drive)) > self._silent_v)
         if loud.size:
             self._last_loud = block.first_sample + int(loud[-1])
@@ -207,7 +207,7 @@ class SilenceWatch:
         return self._residue_v <= self._silent_v
 
     def text(self) -> str:
-        """Return the time to silence as text."""
+        """Return the time from stop to silence as text."""
         took_s = (self._last_loud + 1 - self._begin) / self._sample_rate_hz
         if self.is_silent:
             return f"{took_s:.3f} s from the stop being seen to measured silence ({self._residue_v:.2g} V)"
@@ -231,26 +231,26 @@ def _half_peak_to_peak(volts: Samples) -> float:
 
 
 STANDSTILL_BLOCKS = 50
-"""Blocks without reading after which a drive is silenced: half of the default buffer of a converter."""
+"""Number of missed blocks after which the drive is switched off; half a converter's default buffer."""
 STOPPED_BLOCKS = 15
-"""Blocks without reading that are allowed after a stop was requested."""
+"""Number of missed blocks that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""Longest interval between two checks that counts [s]: in a longer one the whole process was suspended."""
+"""Longest counted interval between two checks [s]; a longer one means that the process was suspended."""
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Reserves resources for silencing before the drive starts: a thread, memory, and the end request.
+    """Switches the drive off if the run stops reading; reserves a thread, memory and the stop request.
 
-    The run calls it when its drive starts and after every block. The drive counts as on until its output
-    was read back as off.
+    The run calls the guard when its drive starts and after every block. The drive counts as on until its
+    output has been read back as off.
     """
 
     def __init__(
         self, drive: Drive, switch: StopSwitch, is_heard: Callable[[], bool] = lambda: False
     ) -> None:
-        """``is_heard``: whether the drive was still measured after its output was switched off.
+        """``is_heard`` returns whether the drive was still measured after its output was switched off.
 
-        Raises AcquisitionError when the system gives no memory for the reserve, or no thread.
+        Raises AcquisitionError when the system provides no memory for the reserve, or no thread.
         """
         MEMORY_RESERVE.hold()
         self._drive = drive
@@ -277,7 +277,7 @@ class DriveGuard(ClosedOnLeaving):
         DRIVES_ON.note_advance()
 
     def silence(self) -> None:
-        """Silence the drive with `Drive.silence`; if memory is exhausted, release the reserve first."""
+        """Silence the drive with `Drive.silence`; if memory is exhausted, release the reserve and repeat."""
         self._is_leaving = True
         try:
             self._drive.silence()
@@ -288,7 +288,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """Stop monitoring. Legal at any time; a drive not confirmed as off still counts as on."""
+        """Stop monitoring, at any time; a drive that was not confirmed as off still counts as on."""
         self._watchdog.close()
 
     def _look(self) -> None:

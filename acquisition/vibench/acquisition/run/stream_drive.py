@@ -1,4 +1,4 @@
-"""Analogue output as a drive: samples are written in advance, and samples read are the clock."""
+"""Analogue output as a drive: samples are written in advance; the clock is the number of samples read."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -15,12 +15,12 @@ from ..plan import DriveSource, Measurement, Phase, half_cosine
 from .acquisition_loop import BLOCK_S
 
 RELEASE_S = 0.05
-"""Fade of the last signal at the end of a sequence [s]."""
+"""Duration of the fade after the last phase [s]."""
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A stretch of samples with a half-cosine ramp of the level."""
+    """A range of samples over which the level follows a half-cosine ramp."""
 
     play: Play | None
     begin: int
@@ -29,17 +29,17 @@ class _Stretch:
     end_level: float
 
     def levels(self, first: int, count: int) -> Samples:
-        """Return the levels of ``count`` samples from sample number ``first`` of the sequence on."""
+        """Return the levels of ``count`` samples, starting at number ``first`` of the whole sequence."""
         progress = (first - self.begin + np.arange(count)) / (self.end - self.begin)
         rise = self.end_level - self.begin_level
         return np.asarray(self.begin_level + rise * 0.5 * (1 - np.cos(np.pi * progress)))
 
 
 class OutputSynthesizer:
-    """Converts phases to samples from -1 to 1, on demand and in order.
+    """Converts phases of a run to samples from -1 to 1, on demand and in order.
 
-    The level is an envelope: a half cosine over a ramp, otherwise constant. The phase of a tone is
-    continuous when its frequency changes. Phase boundaries are at the samples nearest to the sums of all
+    The level is an envelope: a half cosine over a ramp, otherwise constant. A tone continues without a phase
+    step when its frequency changes. Phases of the run end at the samples nearest to the sums of all
     durations, as in the recording. At the end, the signal fades within `RELEASE_S`, and silence follows.
     """
 
@@ -60,11 +60,11 @@ class OutputSynthesizer:
         return self._stretch.play is None and self.level == 0.0 and self._sample == self._stretch.end
 
     def append(self, phases: Iterable[Phase]) -> None:
-        """Append ``phases``, which start at once if nothing is left."""
+        """Append ``phases``; they start at once if no earlier phase is left."""
         self._coming = chain(self._coming, phases)
 
     def fade(self, duration_s: float) -> None:
-        """Drop coming phases and fade the signal from the next sample on."""
+        """Discard coming phases, and fade the signal from the next sample on."""
         self._coming = iter(())
         self._fade(duration_s)
 
@@ -84,10 +84,10 @@ class OutputSynthesizer:
         return taken
 
     def _advance_to_next(self, wanted: int) -> None:
-        """Advance to the piece of the next sample, skipping phases shorter than a sample.
+        """Advance to the range that contains the next sample, skipping phases shorter than a sample.
 
-        Without further phases, silence lasts for the ``wanted`` samples only, so that appended phases start
-        with the next one.
+        Without further phases, silence covers only the ``wanted`` samples. Phases appended later then start
+        at the sample after them.
         """
         while self._sample >= self._stretch.end:
             phase = next(self._coming, None)
@@ -131,16 +131,16 @@ class OutputSynthesizer:
 
 
 BLIND_FADE_S = 0.1
-"""Fade for exits without sampling [s]."""
-# Rounding must not add a part to a duration of a whole number of blocks.
+"""Duration of the fade when the run ends without sampling [s]."""
+# Keeps rounding errors from adding a part to a duration of a whole number of blocks.
 _ROUNDING = 1e-9
 
 
 class StreamDrive:
     """A `Drive` that writes every sample, including ramps, `AnalogOutput.ahead_samples` in advance.
 
-    Output and digitizer start at the same trigger, so the samples read show how many have been played.
-    Written samples cannot be withdrawn, so a stop takes effect after at most that time.
+    Output and digitizer start at the same trigger, so the number of samples read shows how many have been
+    played. Written samples cannot be withdrawn; a stop takes effect when they have been played.
     """
 
     drive_source = DriveSource.OUTPUT
@@ -149,45 +149,45 @@ class StreamDrive:
     can_hold = False
 
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
-        """``terminal_factor``: volts that the generator's terminal would show per volt of setting."""
+        """``terminal_factor`` is the voltage at a generator's terminal per volt of its setting."""
         self._output = output
         self.pause_s = output.ahead_samples / output.sample_rate_hz
-        """Time to play the samples written ahead [s]."""
+        """Time to play the samples written in advance [s]."""
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
         self._synthesizer = OutputSynthesizer(output.sample_rate_hz)
         self._read_s = 0.0
         self._written = 0
         self._sounds_until = 0
-        """The first sample after the last one that is not silent."""
+        """Number of the sample after the last one that is not zero."""
         self._is_playing = False
         self.setting_vpp = 0.0
-        """Current amplitude as the equivalent setting of a generator [V]."""
+        """Present amplitude as the equivalent setting of a generator [Vpp]."""
 
     @property
     def is_playing(self) -> bool:
-        """Whether any signal remains to be played."""
+        """Whether samples other than zero remain to be played."""
         return self._is_playing and self._sounds_until > self._played
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Write the first stretch, to start with the digitizer."""
+        """Write the first samples; they start with the digitizer."""
         self._synthesizer.append(coming)
         self._write_ahead()
         self._output.arm()
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Append ``coming`` after the silence already written."""
+        """Append the phases ``coming`` after the silence already written."""
         assert self._synthesizer.is_over, "the previous announcement is shorter than the written samples"
         self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Write ahead while an earlier phase plays; yield how long to read until more fits."""
+        """Write in advance while an earlier phase plays; yield the times to read until more samples fit."""
         self._is_playing = True
         full_vpp = self._amplitude_vpp * full_level(phase.play)
         yield from self._listened(phase.duration_s, full_vpp * phase.end_level)
 
     def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
-        """Play the written samples, then fade by the device's clock; yield as in `perform`."""
+        """Play the samples already written, then fade by the device's clock; yield as in `perform`."""
         fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._synthesizer.fade(ramp_s)
@@ -195,7 +195,7 @@ class StreamDrive:
         yield from self._listened(fade_s, 0.0)
 
     def cut(self) -> None:
-        """Set zero volts at once."""
+        """Set the output to zero volts at once."""
         self._is_playing = False
         self.setting_vpp = 0.0
         self._output.stop()
@@ -203,7 +203,7 @@ class StreamDrive:
     def silence(self) -> None:
         """Fade as fast as possible, write until the fade has been played, then stop.
 
-        For exits without sampling. A device that accepts no more samples is stopped at once.
+        Used when the run ends without sampling. A device that accepts no more samples is stopped at once.
         """
         try:
             with suppress(AcquisitionError):  # if this fails, stop() still follows
@@ -213,11 +213,11 @@ class StreamDrive:
 
     @property
     def _played(self) -> int:
-        """Return the number of played samples, from the time read."""
+        """Number of samples played so far, from the time read."""
         return round(self._read_s * self._output.sample_rate_hz)
 
     def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:
-        """Yield a duration in parts, none longer than a block, and write ahead after each."""
+        """Yield a duration in parts no longer than a block, and write in advance after each."""
         begin_vpp = self.setting_vpp
         parts = ceil(duration_s / BLOCK_S * (1 - _ROUNDING))
         for part in range(1, parts + 1):
@@ -244,7 +244,7 @@ class StreamDrive:
             return
         self._synthesizer.fade(BLIND_FADE_S)
         ahead = self._output.ahead_samples
-        # Writing blocks: once the last silence is written, the fade has been played.
+        # Each write waits for space, so the fade has been played once the last silence has been written.
         left = ceil(BLIND_FADE_S * self._output.sample_rate_hz) + ahead
         while left > 0:
             count = min(left, ahead // 2)

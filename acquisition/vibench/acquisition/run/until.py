@@ -1,4 +1,4 @@
-"""End a recording when its results meet requested bounds; another process analyses the growing file."""
+"""End a recording when its results are accurate enough; another process analyses the growing file."""
 
 import json
 import subprocess
@@ -24,20 +24,20 @@ from ..recording import UntilNote
 from ..stopping.stop import StopSwitch
 
 PIECE_S = 0.5
-"""Interval of checks whether to continue [s]; realisations of noise are always completed."""
+"""Interval at which to decide whether to continue [s]; realisations of noise are always completed."""
 LONGEST_HINDRANCE = 120
-"""Largest length of the text of a hindrance [characters]."""
+"""Largest length of the text that states why a bound is missing [characters]."""
 _ENDING_S = 2.0
 _READY_S = 60.0
-"""Longest start of the analysis [s]; the recording continues without it."""
+"""Longest wait for the analysis to start [s]; after it, the run starts anyway."""
 _ASK_S = 0.05
 
 
 class UntilWatch(ClosedOnLeaving):
-    """Analyses a growing recording at increasing times until the requested bounds are met.
+    """Analyses a growing recording again and again until the requested bounds are met.
 
-    Process and thread start before anything plays. The run only queues requests and reads the last result,
-    and never waits. If the process fails, the recording continues to its longest time.
+    A stretch is a part of the recording with one result. Process and thread start before anything plays. The
+    run queues requests, reads results and never waits. If the process fails, the longest time is recorded.
     """
 
     def __init__(self, measurement: Measurement, until: Until, path: Path) -> None:
@@ -71,11 +71,11 @@ class UntilWatch(ClosedOnLeaving):
         self._found: UntilNote | None = None
         """Note of the last analysis, possibly of the previous stretch; the thread replaces it atomically."""
         self.ended: list[UntilNote] = []
-        """Final notes of stretches, which the run moves to the recording."""
+        """Final notes of stretches, which the run writes to the recording."""
 
     @property
     def progress(self) -> UntilNote | None:
-        """Return the newest note of the current stretch; None between stretches."""
+        """Newest note of the current stretch; None between stretches."""
         begun, found = self._begun, self._found
         is_newer = begun is not None and found is not None and found.stretch == begun.stretch
         return found if is_newer else begun
@@ -88,7 +88,7 @@ class UntilWatch(ClosedOnLeaving):
             self._beside.wait(_ASK_S)
 
     def phases(self, measurement: Measurement) -> Iterator[Phase]:
-        """Return the phases of the measurement, which end when the requested bounds are met."""
+        """Yield the phases of the measurement; recordings end early when the requested bounds are met."""
         for phase in phases(measurement):
             is_result = phase.segment is not None and phase.segment.label in self._labels
             if not isinstance(phase.play, Waveform):
@@ -97,7 +97,7 @@ class UntilWatch(ClosedOnLeaving):
                 else:
                     yield phase
                 continue
-            # Noise by waveforms: one result of all realisations, each with ramps up and down.
+            # Periodic noise: all realisations together give one result; each has a ramp up and a ramp down.
             if self._is_reached and phase.state is RunState.RAMPING_UP:
                 break
             if not (self._is_reached and phase.state in (RunState.SETTLING, RunState.RECORDING)):
@@ -145,7 +145,7 @@ class UntilWatch(ClosedOnLeaving):
         self._beside.do(lambda: self._look(note, recorded_s))
 
     def _look(self, note: UntilNote, recorded_s: float) -> None:
-        """Analyse the file up to a time of the stretch, in the thread."""
+        """Request the bounds for the first ``recorded_s`` of the stretch; runs in the thread."""
         bounds: dict[str, float | None] = {}
         try:
             question = {"path": str(self._path), "stretch": note.stretch, "recorded_s": recorded_s}
@@ -171,7 +171,7 @@ class UntilWatch(ClosedOnLeaving):
         return self._process.stdout.readline()
 
     def close(self) -> None:
-        """End the process and discard its answer. Legal at any time."""
+        """End the process and discard its answer. May be called at any time."""
         self._process.kill()
         self._process.wait(_ENDING_S)
         self._beside.close(_ENDING_S)
