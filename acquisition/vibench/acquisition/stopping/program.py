@@ -1,4 +1,4 @@
-"""Programs that drive a bench announce themselves in the state folder, and can be stopped from outside."""
+"""Announcements of programs that drive a bench, and stops of these programs from outside."""
 
 import os
 import platform
@@ -31,14 +31,14 @@ from ..errors import AcquisitionError
 from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 
 # A stop needs no connection: it is a file in the state folder, which a driving program checks all the time.
-# The file name contains process, start time and level. A process that may open no more files can still find
-# it, and a full disk has room for it. The file contains the reason if there is space (decision 0029).
+# The file name contains process, start time and level, so a process that may open no more files can still see
+# the stop, and a full disk can store it. The file contains the reason if there is space (decision 0029).
 
 SILENT_REASON = "a stop that was left in the state folder"
 
 
 def engines_folder() -> Path:
-    """Return the private folder for announcements of programs, and for stops."""
+    """Return the private folder for announcements of programs and for stop files; create it if needed."""
     folder = state_folder() / "engines"
     folder.mkdir(mode=0o700, exist_ok=True)
     if S_IMODE(folder.stat().st_mode) != 0o700:
@@ -47,7 +47,7 @@ def engines_folder() -> Path:
 
 
 class KeptStops:
-    """Stop files that are addressed to one process."""
+    """Stop files addressed to one process."""
 
     def __init__(
         self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path
@@ -59,11 +59,11 @@ class KeptStops:
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
         self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """File descriptor that is closed to make one available for reading a reason."""
+        """Reserved file descriptor; it is closed so that a reason can be read even if no more are free."""
 
     @classmethod
     def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
-        """Look for stops of this process; ``press`` carries them out."""
+        """Return the stop files of this process; ``press`` is called to carry out a stop."""
         return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
 
     def obey(self) -> None:
@@ -76,8 +76,8 @@ class KeptStops:
             mark = (found.st_ino, found.st_mtime_ns)
             if self._obeyed.get(path) == mark:
                 continue
-            self._obeyed[path] = mark  # a stop that cannot be removed is carried out only once
-            # Reading a pipe could wait for ever.
+            self._obeyed[path] = mark  # carry out a stop only once, even if its file cannot be removed
+            # Read regular files only, because reading a pipe could wait for ever.
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             taken = Path(taken_path(str(path)))
             with suppress(OSError):
@@ -86,7 +86,7 @@ class KeptStops:
         self.confirm()
 
     def confirm(self) -> None:
-        """Remove completed stops when no drive is on; until then, update their times as a sign of life."""
+        """Remove obeyed stop files once no drive is on; until then, update their times as a sign of life."""
         is_advancing = DRIVES_ON.take_advance()
         for taken in tuple(self._taken):
             with suppress(OSError):  # somebody has emptied the folder
@@ -97,7 +97,7 @@ class KeptStops:
                     os.utime(taken)
 
     def close(self) -> None:
-        """Stop looking."""
+        """Release the reserved file descriptor."""
         if self._reserve >= 0:
             os.close(self._reserve)
             self._reserve = -1
@@ -121,7 +121,7 @@ LEFT_ALONE_S = 1.0
 class Watchdog:
     """Calls a function every `INTERVAL_S`, in a separate thread, until closed.
 
-    Raises AcquisitionError when the system gives no thread.
+    Raises AcquisitionError when the system provides no thread.
     """
 
     def __init__(self, look: Callable[[], None], name: str) -> None:
@@ -137,7 +137,7 @@ class Watchdog:
             ) from error
 
     def close(self) -> None:
-        """Stop watching; a call that hangs, in a folder that is gone, is abandoned."""
+        """Stop the calls; a call that hangs, for example in a lost folder, is abandoned."""
         self._closing.set()
         self._thread.join(LEFT_ALONE_S)
 
@@ -156,7 +156,7 @@ Press = Callable[[StopLevel, str], None]
 
 
 class Program(BaseModel):
-    """A program of this user on this computer that drives a bench, or may do so at any moment."""
+    """Announcement of a program that drives a bench, or may start to do so at any moment."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
@@ -165,18 +165,18 @@ class Program(BaseModel):
     """Purpose of the program: a campaign's name, or ``"window"``."""
     started_utc: str
     process_start: str = ""
-    """Start of the process, from the system: numbers are reused, number and start together are not."""
+    """Start time of the process, from the system. Process numbers are reused; number and start are unique."""
     computer: str = ""
-    """A state folder may be in a home folder that several computers share."""
+    """Name of the computer; a state folder may be in a home folder that several computers share."""
 
     @property
     def place(self) -> Place:
-        """Place where the program runs: containers and computers may share a state folder."""
+        """Where the program runs: here, or in another container or computer that shares the state folder."""
         return place_of(self.process_start)
 
     @property
     def is_alive(self) -> bool:
-        """Whether its process is alive, answering or not."""
+        """Whether the process is alive, whether it responds or not."""
         if self.place is Place.HERE:
             return is_process(self.pid, self.process_start)
         try:
@@ -187,7 +187,7 @@ class Program(BaseModel):
 
     @property
     def was_killed(self) -> bool:
-        """Whether its process ended without removing its announcement."""
+        """Whether the process has ended without removing its announcement."""
         return not self.is_alive and _path(self).exists()
 
 
@@ -195,7 +195,7 @@ AnyProgram = TypeVar("AnyProgram", bound=Program)
 
 
 def facts_of_this_process(what: str) -> dict[str, object]:
-    """Return the announcement of this process."""
+    """Return the fields of `Program` for this process, with ``what`` as its purpose."""
     pid = os.getpid()
     return {
         "pid": pid,
@@ -207,18 +207,18 @@ def facts_of_this_process(what: str) -> dict[str, object]:
 
 
 def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
-    """Return every living program announced under this process number space, oldest first, as ``model``.
+    """Return all living programs on this computer (or in this container), oldest first, as ``model``.
 
-    Entries of processes that have ended are removed.
+    Announcements of processes that have ended are removed.
 
-    Raises AcquisitionError when there is no state folder and none can be made.
+    Raises AcquisitionError when there is no state folder and none can be created.
     """
     found = []
     for path, announcement in _announcements(model):
         is_here = announcement.computer in ("", platform.node())
         if announcement.place is not Place.HERE:
             continue
-        # The name of a computer may change while a program runs; process number and start time identify it.
+        # The name of the computer may change while a program runs. Process number and start time identify it.
         if announcement.is_alive and (is_here or announcement.process_start):
             found.append(announcement)
         elif is_here:
@@ -229,9 +229,9 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 
 
 def programs_of_other_places() -> tuple[Program, ...]:
-    """Return every living program of another container or computer that shares the state folder.
+    """Return all living programs of other containers or computers that share the state folder.
 
-    Raises AcquisitionError as `announced_programs` does.
+    Raises AcquisitionError in the same cases as `announced_programs`.
     """
     others = (each for _, each in _announcements(Program) if each.place is not Place.HERE)
     return tuple(sorted((each for each in others if each.is_alive), key=lambda each: each.started_utc))
@@ -251,14 +251,14 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
             continue
         try:
             yield path, model.model_validate_json(_read_announcement(path))
-        except (ValueError, OSError):  # from another version, of another kind, or removed in between
+        except (ValueError, OSError):  # from another version, of another type, or removed meanwhile
             continue
 
 
 def _read_announcement(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except PermissionError:  # for example started as root; write access to the folder permits a stop
+    except PermissionError:  # for example of root; a stop only needs write access to the folder
         pid, start, _ = path.name.split(".")
         facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
         return facts.model_dump_json().encode()
@@ -271,21 +271,21 @@ def withdraw(program: Program) -> None:
 
 
 class _Reached:
-    """Everything in this process that a stop from outside must reach: an engine, runs, checks.
+    """List of what a stop from outside must end in this process: an engine, runs, checks.
 
-    The first entry is announced for the whole process until it ends, so an engine also covers its runs.
+    The first entry is announced for the whole process until it ends; an engine thus also covers its runs.
     """
 
     def __init__(self) -> None:
         self._inside: list[tuple[Press, Program]] = []
         self._kept: KeptStops | None = None
         self._mark: OpenFile | None = None
-        """A lock that shows other containers that this process is alive."""
+        """File lock by which other containers see that this process is alive."""
         self._watchdog: Watchdog | None = None
         self._changing = Lock()
 
     def enter(self, entry: tuple[Press, Program]) -> None:
-        """Add an entry; raises OSError when the state folder cannot be written."""
+        """Add an entry; raise OSError when the state folder cannot be written."""
         with self._changing:
             if not self._inside:
                 announced_programs(Program)  # removes entries of killed programs
@@ -299,7 +299,7 @@ class _Reached:
             self._inside.append(entry)
 
     def leave(self, entry: tuple[Press, Program]) -> None:
-        """Remove an entry; stop looking for stops after the last one."""
+        """Remove an entry; after the last one, stop checking for stop files."""
         with self._changing:
             spoke = self._inside[0] is entry
             self._inside = [each for each in self._inside if each is not entry]
@@ -317,7 +317,7 @@ class _Reached:
         withdraw(entry[1])
 
     def _look(self) -> None:
-        """Obey new stops, and renew the announcement: somebody may have emptied the state folder."""
+        """Carry out new stops, and announce again if somebody has emptied the state folder."""
         kept, inside = self._kept, self._inside
         if kept is None or not inside:
             return
@@ -351,10 +351,10 @@ _REACHED = _Reached()
 
 @contextmanager
 def announce_program(press: Press, program: Program) -> Iterator[None]:
-    """Let `announced_programs` find this program inside the context, and ``press`` carry out its stops.
+    """Announce ``program`` inside the context; ``press`` is called for each stop that others request.
 
-    Raises AcquisitionError when the state folder cannot be written: a program that cannot be found could not
-    be stopped.
+    Raises AcquisitionError when the state folder cannot be written, because a program that is not announced
+    cannot be stopped from outside.
     """
     entry = (press, program)
     try:
@@ -375,7 +375,7 @@ def _path(program: Program) -> Path:
 
 
 def _lock(path: Path) -> OpenFile | None:
-    """Lock a file for as long as this process lives; None if that is impossible."""
+    """Return a file locked for as long as this process lives; None if that is impossible."""
     try:
         file = OpenFile(path)
     except OSError:
@@ -392,13 +392,13 @@ def _lock(path: Path) -> OpenFile | None:
 def _write(program: Program) -> Path:
     path = _path(program)
     coming = path.with_suffix(".coming")
-    coming.unlink(missing_ok=True)  # left by a killed process with the same number
-    # Nobody else may read a token, not even for the moment before the mode is set.
+    coming.unlink(missing_ok=True)  # may remain from a killed process with the same number
+    # Create the file with its final mode, because nobody else may ever read the token in it.
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(program.model_dump_json())
-        rename(coming, path)  # readers never see a half-written file
+        rename(coming, path)  # so that readers never see a half-written file
     except OSError:
         coming.unlink(missing_ok=True)  # an empty file may remain on a full disk
         raise
@@ -406,7 +406,7 @@ def _write(program: Program) -> Path:
 
 
 def _sweep() -> None:
-    """Remove entries of processes that have ended; names begin with the process's number."""
+    """Remove files of processes that have ended; file names begin with the process number."""
     folder = engines_folder()
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
@@ -419,30 +419,30 @@ def _sweep() -> None:
 
 
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
-"""No program can catch the first two; the others repeat the faulty instruction after any handler."""
+"""Signals that are not handled: no program can catch the first two, and the others mean a fatal fault."""
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
-"""By default these neither end nor stop a process."""
+"""Signals that by default neither end nor suspend a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
 """Signals that suspend a process, as Ctrl-Z does; a terminal sends the last two repeatedly."""
 _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
-"""Always handled; other signals are handled only if the program does not handle them itself."""
+"""Signals that are always handled; others are handled only if the program does not handle them itself."""
 
 
 @contextmanager
 def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]:
-    """Stop ``switch`` on a signal, or on a stop from outside the program, inside the context.
+    """Request a stop of ``switch`` on a signal or a stop from outside the program, inside the context.
 
-    ``vibench stop`` finds the program and leaves its stop in the state folder, in any thread; ``what`` is
-    its name there. In the main thread, the only one to which Python delivers signals, every signal that
-    would end or stop the program is a stop (`heeded_signals`). SIGHUP stays ignored if it was ignored before
-    (nohup): such a run is meant to continue.
+    ``vibench stop`` finds the program under the name ``what`` and leaves a stop file in the state folder; it
+    works in any thread. Python delivers signals only to the main thread. There, every signal that would end
+    or suspend the program requests a stop (`heeded_signals`). SIGHUP stays ignored if it was ignored before
+    (nohup), because such a run is meant to continue.
 
     The first signal ramps down and ends the run as stopped: Ctrl-C with the planned ramp, the others faster.
-    A second one raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones
-    are ignored, so that impatience cannot interrupt the silencing; so is a second Ctrl-Z.
+    A second signal raises KeyboardInterrupt, which silences the generator without the measured ramp. Later
+    signals, and a second Ctrl-Z, are ignored, so that repeated key presses cannot interrupt the silencing.
 
-    Raises AcquisitionError when the state folder cannot be written: a program that cannot be found could not
-    be stopped.
+    Raises AcquisitionError when the state folder cannot be written, because a program that is not announced
+    cannot be stopped from outside.
     """
 
     def press(level: StopLevel, reason: str) -> None:
@@ -481,16 +481,16 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
 
 
 def signal_name(number: int) -> str:
-    """Return the name of a signal; real-time signals have only a number."""
+    """Return the name of a signal, or its number for a real-time signal, which has no name."""
     known = {each.value: each.name for each in signal.Signals}
     return known.get(number, f"signal {number}")
 
 
 def heeded_signals() -> list[int]:
-    """Return the signals that are stops during a drive: those that would end or stop the process.
+    """Return the signals that request a stop during a drive: those that would end or suspend the process.
 
-    Signals that the program handles or ignores are left out. Those in `LEFT_TO_THE_DEAD_MAN` cannot be
-    handled.
+    Signals that the program handles or ignores itself are left out, and so are those in
+    `LEFT_TO_THE_DEAD_MAN`, which cannot be handled.
     """
     return [number for number in sorted(signal.valid_signals()) if _is_heeded(number)]
 
@@ -501,5 +501,5 @@ def _is_heeded(number: int) -> bool:
         return False
     if name in _ALWAYS:
         return name != "SIGHUP" or handler is not signal.SIG_IGN
-    # A handler of this module belongs to an outer run, with another switch.
+    # A handler of this module belongs to an outer run with another switch, so it may be replaced.
     return handler is signal.SIG_DFL or getattr(handler, "__module__", "") == __name__

@@ -12,19 +12,19 @@ from ..errors import AcquisitionError
 
 
 class StopLevel(StrEnum):
-    """Level of a stop, from the gentlest to the hardest."""
+    """Level of a stop, in order from the gentlest to the hardest."""
 
     HOLD = "hold"
-    """Keep the present drive until released or stopped."""
+    """Keep the present drive until the run is released or stopped."""
     RAMP = "ramp"
-    """The half-cosine ramp at the end of the plan."""
+    """Ramp down with the half-cosine ramp of the plan."""
     ABORT = "abort"
-    """The shortest ramp without a shock: three periods of the loaded shaker on its suspension."""
+    """Ramp down within three periods of the loaded shaker on its suspension, the shortest without shock."""
     OFF = "off"
-    """The output is switched off at once, with a step."""
+    """Switch the output off at once, with a step."""
 
     def is_harder_than(self, other: "StopLevel") -> bool:
-        """Whether this level ends the drive sooner."""
+        """Return whether this level ends the drive sooner than ``other``."""
         return _HARDNESS[self] > _HARDNESS[other]
 
 
@@ -35,9 +35,9 @@ class Cause(StrEnum):
     """Cause of a stop."""
 
     OPERATOR = "operator"
-    """Somebody pressed stop."""
+    """An operator requested a stop."""
     EMERGENCY = "emergency key"
-    """Esc, or the large button."""
+    """The Esc key, or the large stop button of the window."""
     KEYBOARD = "ctrl-c"
     TERMINATED = "terminated"
     """The system ended the process."""
@@ -46,7 +46,7 @@ class Cause(StrEnum):
     PARENT_GONE = "parent gone"
     """The program that started the engine has ended."""
     PROGRAM = "program left"
-    """The program that carried out the run left it."""
+    """The program abandoned the run."""
     LIMIT = "limit"
     INSTRUMENT = "instrument"
     DISK = "disk"
@@ -67,8 +67,8 @@ LEVELS: Mapping[Cause, StopLevel] = {
     Cause.DISK: StopLevel.OFF,
     Cause.FAULT: StopLevel.OFF,
 }
-"""Level of each cause. Where nothing can be read any more (instrument, disk, fault), instruments that still
-answer are lowered as fast as they accept commands before their output is switched off.
+"""Stop level for each cause. After a failure of an instrument, the disk or the program, nothing more can be
+read. A generator that still responds is then ramped down as fast as it accepts commands, and turned off.
 """
 
 
@@ -89,8 +89,8 @@ class StopRequest:
 class StopSwitch:
     """Switch by which any thread or signal handler can hold, mark or end a run or a campaign.
 
-    It takes no lock, so that a signal handler cannot wait for one. A stop cannot be withdrawn, only replaced
-    by a harder one.
+    The switch uses no lock, because a signal handler must not wait for one. A stop cannot be withdrawn, only
+    replaced by a harder one.
     """
 
     def __init__(self) -> None:
@@ -101,8 +101,8 @@ class StopSwitch:
 
     @property
     def request(self) -> StopRequest | None:
-        """The hardest stop requested so far; None without one."""
-        # One slot for each level: two threads at the same time cannot lose the harder request.
+        """Hardest stop requested so far; None if none was requested."""
+        # Each level has a separate entry, so that two threads at once cannot lose the harder request.
         for level in reversed(StopLevel):
             if level in self._requests:
                 return self._requests[level]
@@ -114,7 +114,7 @@ class StopSwitch:
         return self._holding and not self._requests
 
     def ask(self, request: StopRequest) -> None:
-        """Request a stop; the first of each level counts."""
+        """Request a stop; the first request of each level is kept."""
         if request.level is StopLevel.HOLD:
             self.hold()
         else:
@@ -129,7 +129,7 @@ class StopSwitch:
         self._holding = False
 
     def mark(self, text: str) -> None:
-        """Note an event at the next recorded sample."""
+        """Add an event ``text`` to the recording, at its next sample."""
         self._marks.append(text)
 
     def take_marks(self) -> Iterator[str]:
@@ -138,7 +138,7 @@ class StopSwitch:
             yield self._marks.popleft()
 
     def tell_change(self, text: str) -> None:
-        """Report that the specimen has changed; a run with ``on_changed_specimen = "stop"`` then ends."""
+        """Report a change of the specimen; it ends a run with ``on_changed_specimen = "stop"``."""
         self._changes.append(text)
 
     def take_changes(self) -> Iterator[str]:
@@ -147,7 +147,7 @@ class StopSwitch:
             yield self._changes.popleft()
 
     def harder_than(self, level: StopLevel) -> StopRequest | None:
-        """Return a request that is harder than ``level``, if there is one."""
+        """Return the requested stop if it is harder than ``level``, otherwise None."""
         request = self.request
         return request if request is not None and request.level.is_harder_than(level) else None
 
@@ -167,25 +167,25 @@ class DrivesOn:
         self._drives = {drive}
 
     def confirm_silence(self, drive: object) -> None:
-        """Note that the output of a drive was read back as off. Legal at any time."""
+        """Note that the output of a drive was read back as off. May be called at any time."""
         self._drives.discard(drive)
 
     def note_advance(self) -> None:
-        """Note that the run of a drive continues, or ramps down."""
+        """Note that the run of a drive is still reading blocks."""
         self._has_advanced = True
 
     def take_advance(self) -> bool:
-        """Return whether a run has continued since the last call."""
+        """Return whether a run has read blocks since the last call."""
         advanced, self._has_advanced = self._has_advanced, False
         return advanced
 
 
 DRIVES_ON = DrivesOn()
-"""Drives of this process that may be on."""
+"""Drives of this process that may still be on."""
 
 
 RESERVE_BYTES = 16_000_000
-"""Memory reserve. Generator commands take some kB; other threads may use the rest meanwhile."""
+"""Size of the memory reserve. Generator commands need some kB; other threads may take the rest."""
 
 
 class MemoryReserve:
@@ -196,7 +196,7 @@ class MemoryReserve:
         self._changing = Lock()
 
     def hold(self) -> None:
-        """Reserve memory before any drive. Raises AcquisitionError when memory is too short."""
+        """Reserve the memory before any drive starts; raise AcquisitionError if there is not enough."""
         with self._changing:
             if self._held is None:
                 try:
@@ -209,14 +209,14 @@ class MemoryReserve:
                     ) from error
 
     def release(self) -> None:
-        """Release the reserve. Legal at any time."""
+        """Release the reserve. May be called at any time."""
         held, self._held = self._held, None
         if held is not None:
             held.close()
 
     @contextmanager
     def released_when_short(self) -> Iterator[None]:
-        """Release the reserve at a MemoryError inside, and re-raise it."""
+        """Release the reserve on a MemoryError inside the context, and raise the error again."""
         try:
             yield
         except MemoryError:
