@@ -1,10 +1,10 @@
 """Many measurements, unattended: journal, attempts, reconnecting, notices, and the catalogue of a folder.
 
-The state of every point is committed to an SQLite journal before and after each step: a campaign that was
-killed resumes at its first unfinished point. Each attempt is a separate file (``NAME.h5``, ``NAME.2.h5``). A
-command or a mail can notify people who are away. `estimate_campaign` estimates time and disk space,
-`list_recordings` lists the recordings of a folder. The package starts and stops runs; it does not use the
-engine's process or its clients. See docs/campaigns.md and docs/decisions/0014-chains-of-points.md.
+The state of every point is committed to an SQLite journal before and after each step, so a campaign that was
+killed resumes at its first unfinished point. Each attempt at a point is recorded in a separate file
+(``NAME.h5``, ``NAME.2.h5``). Notices can be sent by a command or by mail. `estimate_campaign` estimates time
+and disk space, `list_recordings` lists the recordings of a folder. The package starts and stops runs, without
+the engine's process. See docs/campaigns.md and docs/decisions/0014-chains-of-points.md.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

@@ -1,4 +1,4 @@
-"""The files of a point: one for each attempt, ``NAME.h5``, ``NAME.2.h5``, ..., never overwritten."""
+"""Files of a point: one for each attempt (``NAME.h5``, ``NAME.2.h5``, ...); none is ever overwritten."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class KeptRecording:
 
     path: Path
     state: RecordingState | None
-    """State of the recording; None if the file does not contain it."""
+    """State of the recording; None if the file cannot be read."""
     reason: str
     duration_s: float
     seal: str
@@ -35,7 +35,7 @@ class KeptRecording:
     """Description of the damage; empty if the file is sound or has no seal."""
     is_of_this_plan: bool
     rig: Mapping[str, Any] = field(default_factory=dict)
-    """The configuration of the bench that made it."""
+    """Configuration of the bench on which it was recorded."""
 
     @property
     def is_complete(self) -> bool:
@@ -44,7 +44,7 @@ class KeptRecording:
 
 
 def read_attempt(path: Path, measurement: Measurement, depth: SealDepth) -> KeptRecording:
-    """Read the state of a recording of ``measurement``."""
+    """Return the state of the recording at ``path``, which should be one of ``measurement``."""
     try:
         with open_recording(path) as recording:
             found = recording.check_seal(depth)
@@ -66,7 +66,7 @@ def read_attempt(path: Path, measurement: Measurement, depth: SealDepth) -> Kept
 
 
 def is_made_by(recording: Recording, measurement: Measurement) -> bool:
-    """Return whether a recording's plan, as read by this version, equals ``measurement``."""
+    """Return whether the plan of a recording, as this version reads it, equals ``measurement``."""
     try:
         return Measurement.model_validate(recording.plan) == measurement
     except ValidationError:
@@ -74,7 +74,7 @@ def is_made_by(recording: Recording, measurement: Measurement) -> bool:
 
 
 def attempts_in(folder: Path, name: str) -> tuple[Path, ...]:
-    """Return the paths of all attempts at a point, finished or not, in order."""
+    """Return the paths of all attempts at the point ``name``, finished or not, in order."""
     attempts: list[Path] = []
     while _is_taken(candidate := _attempt(folder, name, len(attempts) + 1)):
         attempts.append(candidate)
@@ -82,16 +82,16 @@ def attempts_in(folder: Path, name: str) -> tuple[Path, ...]:
 
 
 def next_attempt(folder: Path, name: str) -> Path:
-    """Return the path of a point's next recording."""
+    """Return the path for the next recording of the point ``name``."""
     return _attempt(folder, name, len(attempts_in(folder, name)) + 1)
 
 
 def complete_attempt(
     folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
-    """Return the complete recording of a point; without one, the last damaged recording, or None.
+    """Return the complete recording of a point; if there is none, the last damaged recording or None.
 
-    Raises RecordingError when one is complete but was measured with another plan.
+    Raises RecordingError when a recording is complete but was measured with another plan.
     """
     damaged: KeptRecording | None = None
     for path in attempts_in(folder, name):
@@ -112,7 +112,7 @@ def complete_attempt(
 
 
 def _attempt(folder: Path, name: str, number: int) -> Path:
-    # A measurement's name contains no dot, so a second attempt never gets the name of another point.
+    # The name of a measurement contains no dot, so a second attempt never gets the file of another point.
     return folder / (f"{name}{SUFFIX}" if number == 1 else f"{name}.{number}{SUFFIX}")
 
 

@@ -1,4 +1,4 @@
-"""Measuring one point until it is recorded or its attempts are used up, with cooling pauses."""
+"""Measure a point until it is recorded or all attempts are used, with cooling pauses."""
 
 from collections.abc import Callable, Collection
 from functools import partial
@@ -22,10 +22,10 @@ from ._opening import require_same_bench
 
 
 class CoolingPause:
-    """Pauses before a recording when another one was made before it in this session.
+    """Pause before every recording of a session except the first.
 
-    A stop ends the pause at once; a hold extends it until it is released. The journal does not change: the
-    next point stays queued, so a campaign that is killed during the pause resumes with that point.
+    A stop ends the pause at once; a hold extends the pause until it is released. The journal does not change
+    meanwhile: if the campaign is killed during the pause, it resumes with the next point.
     """
 
     def __init__(self, rest_s: float, switch: StopSwitch, say: CampaignListener) -> None:
@@ -39,7 +39,7 @@ class CoolingPause:
         self._is_due = True
 
     def wait(self, bench: Bench, name: str) -> None:
-        """Pause before the recording of a point, if required; the generator is off between recordings."""
+        """Pause before the recording of the point ``name``, if required, with the generator off."""
         if not self._is_due or not self._rest_s:
             return
         self._is_due = False
@@ -53,14 +53,14 @@ class CoolingPause:
 
 
 Reopen = Callable[[], Bench]
-"""Closes a bench that has lost an instrument, and opens it again; raises AcquisitionError."""
+"""Function that closes a bench with a lost instrument and opens it again; may raise AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
-"""Interval of the search for a lost instrument, and pause before another attempt [s]."""
+"""Interval between two searches for a lost instrument, and pause before another attempt [s]."""
 
 
 class Attempts:
-    """Carries out points on a bench, with the attempts that the policy allows."""
+    """Measures points on a bench, with as many attempts as the policy allows."""
 
     def __init__(
         self,
@@ -83,17 +83,17 @@ class Attempts:
         self._reopen = reopen
 
     def ask_for_beam(self, measurement: Measurement) -> None:
-        """Wait until the operator has moved the beam to the point of a measurement; a stop ends it."""
+        """Wait until the operator has moved the beam to the point of a measurement; a stop ends the wait."""
         self._beam.ask(self._bench, measurement)
 
     def pause_before(self, name: str) -> None:
-        """Pause between two recordings as the campaign requires; a stop ends it."""
+        """Pause before the point ``name`` as the campaign requires; a stop ends the pause."""
         self._pause.wait(self._bench, name)
 
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
-        """Make one valid recording of a point; ``tell`` is called after every block.
+        """Measure a point until it has a valid recording; ``tell`` is called after every block.
 
-        Raises AcquisitionError, the error of the last attempt, which is also in the journal.
+        Raises the AcquisitionError of the last attempt, which is also written to the journal.
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)
@@ -160,7 +160,7 @@ class Attempts:
         reason_code = reason_code_of(error)
         try:
             self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
-        except RecordingError as second:  # the journal is in the same folder: the first error is the cause
+        except RecordingError as second:  # the same disk fails: the first error is the cause
             error.add_note(str(second))
         self._say(
             CampaignEvent(
@@ -175,14 +175,14 @@ class Attempts:
         return not is_stopping and reason_code.value in {each.value for each in self._policy.on}
 
     def _prepare_retry(self, point: Point, path: Path, error: AcquisitionError) -> None:
-        """Prepare another attempt: reopen the bench after an instrument error, else wait a little."""
+        """Prepare another attempt: reopen the bench after an instrument error, otherwise wait briefly."""
         if isinstance(error, InstrumentError):
             if self._reopen is None:
                 raise error
             self._bench = self._reopened_bench(self._reopen, error)
             self._tell(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
-            self._bench.idle(LOOK_EVERY_S)  # a repetition at once seldom works
+            self._bench.idle(LOOK_EVERY_S)  # an immediate repetition seldom works
         self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _rest_before_retry(self, point: Point, failed: AcquisitionError) -> None:
@@ -196,12 +196,12 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig at free pace idles in rig time only, so the longer of the two times counts.
+                # A virtual rig that runs faster than real time idles in simulated time: use the longer time.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")
                     raise lost from error
-                # An instrument returns when somebody connects it, without any notification.
+                # The bench is not notified when somebody reconnects an instrument, so try again.
                 self._bench.idle(LOOK_EVERY_S)
                 idled_s += LOOK_EVERY_S
             else:
@@ -213,7 +213,7 @@ class Attempts:
 
 
 def _seal_of(path: Path) -> str:
-    """Return the seal of a finished recording; empty if it was not finished."""
+    """Return the seal of a finished recording; empty for an unfinished one."""
     try:
         with open_recording(path) as recording:
             return recording.seal
@@ -222,8 +222,8 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Return the inputs near full scale in the recorded segments; empty if none, or if the file is gone."""
-    if not path.exists():  # a complete recording belongs to the user, who may have moved it already
+    """Return a clause on inputs near full scale in segments with results; empty if none or no file."""
+    if not path.exists():  # the user may have moved a complete recording already
         return ""
     with open_recording(path) as recording:
         counting = [each for each in recording.segments if each.label in labels]

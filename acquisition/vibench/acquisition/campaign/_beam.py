@@ -12,11 +12,11 @@ from ..stopping.stop import StopSwitch
 from ._log import CampaignEvent, CampaignEventKind, CampaignListener, CommandMessenger
 
 MOVE_LONGEST_S = 120.0
-"""Longest duration of a command that moves the beam [s]."""
+"""Time after which a command that moves the beam is ended [s]."""
 
 
 def rig_at(rig: Rig, measurement: Measurement) -> Rig:
-    """Return the rig with the beam where a measurement needs it.
+    """Return the rig with the beam at the point that a measurement needs.
 
     Raises ConfigurationError when the vibrometer of the rig cannot measure there.
     """
@@ -24,17 +24,17 @@ def rig_at(rig: Rig, measurement: Measurement) -> Rig:
 
 
 class BeamMover:
-    """Moves the beam between two recordings, while the generator is off, unless both share a point."""
+    """Moves the beam between two recordings at different points, while the generator is off."""
 
     def __init__(self, command: CommandMessenger | None, switch: StopSwitch, say: CampaignListener) -> None:
-        """``command`` moves the beam of a real rig; without it the operator does."""
+        """``command`` moves the beam of a real rig; without a command, the operator moves it."""
         self._command = command
         self._switch = switch
         self._say = say
         self._at: ScanPoint | None = None
 
     def ask(self, bench: Bench, measurement: Measurement) -> None:
-        """Hold the campaign until the operator has moved the beam; a stop ends the hold."""
+        """Hold the campaign if the operator must move the beam, until it is released or stopped."""
         point = measurement.point
         moves_itself = bench.rig.virtual is not None or bench.rig.plays_back or self._command is not None
         if point is None or point == self._at or moves_itself:
@@ -50,7 +50,7 @@ class BeamMover:
     def moved(self, bench: Bench, name: str, measurement: Measurement) -> Iterator[Bench]:
         """Yield the bench with the beam at the point of a measurement, which is recorded as ``name``.
 
-        Raises AcquisitionError when the command fails: the beam may then be anywhere.
+        Raises AcquisitionError when the command fails, because the beam may then be anywhere.
         """
         point = measurement.point
         if point is None:

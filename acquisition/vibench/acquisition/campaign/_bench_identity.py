@@ -1,4 +1,4 @@
-"""The bench on which a campaign was started: its configuration, instruments, and knobs."""
+"""The bench on which a campaign was started: configuration, instruments and manual settings."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Self
@@ -9,7 +9,7 @@ from ..rig import Rig
 
 
 class Instrument(FrozenModel):
-    """Identity that an instrument reported."""
+    """Identity reported by an instrument."""
 
     maker: str
     model: str
@@ -18,12 +18,12 @@ class Instrument(FrozenModel):
 
 
 class BenchIdentity(FrozenModel):
-    """The properties of a bench that must not change during a campaign without confirmation."""
+    """Properties of a bench that must not change during a campaign without confirmation."""
 
     rig: Rig
     instruments: dict[str, Instrument]
     knobs: dict[str, str]
-    """Confirmed settings made by hand, without time and person."""
+    """Confirmed manual settings (knobs), without the time and the person of the confirmation."""
 
     @classmethod
     def of(cls, bench: Bench) -> Self:

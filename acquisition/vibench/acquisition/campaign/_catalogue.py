@@ -1,7 +1,7 @@
-"""All recordings of a folder and its subfolders, found without opening known ones again.
+"""Catalogue of all recordings in a folder and its subfolders; unchanged files are not opened again.
 
-The catalogue is a copy of facts from the files, in ``catalogue.sqlite`` beside them: it can be deleted and
-is then made again.
+The catalogue ``catalogue.sqlite`` in the folder only repeats information from the files. If it is deleted, it
+is created again.
 """
 
 import os
@@ -37,26 +37,26 @@ from ..recording import (
 from ._journal import JournalPoint, JournalPointState, journal_exists, read_journal
 
 UNREADABLE = "unreadable"
-"""State of a file that is not a recording, or is damaged; its reason says what is wrong."""
+"""State of a file that is damaged or not a recording; ``reason`` states what is wrong."""
 DAMAGED = "damaged"
-"""State of a recording that opens but differs from its seal."""
+"""State of a recording that can be opened but differs from its seal (checksum)."""
 UNCHECKED = "samples not checked"
 _FREQUENCIES = ("frequency_hz", "start_hz", "stop_hz", "low_hz", "high_hz", "band_start_hz", "band_stop_hz")
 
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """One recording of a folder. Unknown values are empty, or None."""
+    """Catalogue entry of one recording. Unknown values are empty or None."""
 
     path: str
     """Path relative to the folder, with ``/``."""
     name: str
     """Name of the measurement."""
     state: str
-    """Word of `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
+    """Value of `recording.layout.RecordingState`, or ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
-    """``samples not checked``, or what to check: ended early, near full scale, samples lost."""
+    """``samples not checked``, or problems found: ended early, near full scale, samples lost."""
     started_utc: str = ""
     origin: str = ""
     kind: str = ""
@@ -69,28 +69,28 @@ class CatalogueEntry:
     bench_check: str = ""
     """Verdict of the bench check before the recording."""
     results: str = ""
-    """Names of saved results of analyses, separated by commas."""
+    """Names of the saved analysis results, separated by commas."""
     operator: str = ""
     notes: str = ""
     recording_id: str = ""
     samples_id: str = ""
-    """Id of the samples, equal in copies; see `vibench.acquisition.recording.Recording`."""
+    """Identifier of the samples, equal in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
-    """Word of `recording.SealState` after a quick check; empty if unknown."""
+    """Value of `recording.SealState` after a quick check; empty if unknown."""
 
     @property
     def is_bad(self) -> bool:
-        """Whether the file is damaged, or cannot be read."""
+        """Whether the file is damaged or cannot be read."""
         return self.state in (UNREADABLE, DAMAGED)
 
 
 def place_below(folder: Path, path: Path) -> str:
-    """Return the path of a recording relative to the folder; undecodable characters are replaced."""
+    """Return ``path`` relative to ``folder``; characters that cannot be decoded are replaced."""
     return os.fsencode(path.relative_to(folder).as_posix()).decode(errors="replace")
 
 
 def read_entry(where: str, path: Path, size_bytes: int) -> CatalogueEntry:
-    """Read the entry of a recording; a file that cannot be read gets an entry with the reason."""
+    """Return the entry of a recording; for a file that cannot be read, an entry with the reason."""
     try:
         with open_recording(path) as recording:
             return _entry(recording, where, size_bytes)
@@ -118,7 +118,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
-        # Space that a growing file has reserved contains no samples yet.
+        # A growing file has reserved space that does not contain samples yet; do not count it.
         size_bytes=min(size_bytes, recording.stored_bytes) if recording.is_growing else size_bytes,
         bench_check=recording.check_text,
         results=", ".join(recording.result_names),
@@ -143,7 +143,7 @@ def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
 
 
 def _number(value: object) -> float | None:
-    """Return a number of a plan of any version; None for anything else."""
+    """Return a value of a plan as a number; None if it is not a number."""
     try:
         return float(value) if isinstance(value, int | float) else None
     except OverflowError:
@@ -169,9 +169,9 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 5
-"""Increased whenever the fields of an entry change: older catalogues are then rebuilt."""
+"""Version of the catalogue, increased when the fields of an entry change; older ones are rebuilt."""
 WAIT_S = 10.0
-"""Waiting time for another program that writes the same catalogue."""
+"""Longest wait for another program that writes the same catalogue [s]."""
 
 _COLUMNS = tuple(field.name for field in fields(CatalogueEntry))
 _TYPES = {"size_bytes": "INTEGER"} | dict.fromkeys(
@@ -180,18 +180,18 @@ _TYPES = {"size_bytes": "INTEGER"} | dict.fromkeys(
 
 
 class Refresh(StrEnum):
-    """Which recordings are read again."""
+    """Which recordings are read again when a folder is listed."""
 
     CHANGED = "changed"
-    """Recordings that have changed since the last list, and unfinished ones."""
+    """Recordings that have changed since the last listing, and unfinished ones."""
     ALL = "all"
 
 
 def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> tuple[CatalogueEntry, ...]:
-    """List the recordings of a folder, oldest first, and update its catalogue.
+    """Return the recordings of a folder, oldest first, and update its catalogue.
 
-    In a read-only folder the list is made again each time. Raises RecordingError when there is no such
-    folder, or ``catalogue.sqlite`` is another file.
+    In a read-only folder, all files are read each time. Raises RecordingError when the folder does not exist,
+    or ``catalogue.sqlite`` is not a catalogue.
     """
     if not folder.is_dir():
         raise RecordingError(f"{folder} is not a folder; give the folder that the recordings are in.")
@@ -235,7 +235,7 @@ def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
 
 
 def _update(folder: Path, connection: sqlite3.Connection) -> None:
-    """Read new or changed files, and remove entries of missing ones; all in one transaction."""
+    """Read new or changed files and remove entries of missing files, in one transaction."""
     known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
     noted = cache(noted_seals)
     for path in recordings_below(folder):
@@ -243,19 +243,19 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
             found = path.stat()
             size_bytes = found.st_size
             stamp = _stamp(found, noted(path.parent).get(path.name, ()))
-        except FileNotFoundError:  # it got its final name in the meantime
+        except FileNotFoundError:  # the file got its final name in the meantime
             continue
-        except OSError:  # a link to itself: its entry says that it cannot be read
+        except OSError:  # for example a link to itself; its entry states that it cannot be read
             size_bytes, stamp = 0, ""
         where = place_below(folder, path)
-        # The state of a .part changes to "interrupted" when its program has ended, without any change of the
-        # file.
+        # The state of a .part file changes to "interrupted" when its program has ended, although the file
+        # stays the same.
         if known.pop(where, None) != stamp or path.suffix == PART_SUFFIX:
             entry = read_entry(where, path, size_bytes)
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
-                f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - question marks alone
-                # A disk that could not be read may be readable the next time.
+                f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - only question marks
+                # Read the file again the next time: a disk error may be temporary.
                 (*astuple(entry), "" if entry.state == UNREADABLE else stamp),
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))
@@ -263,9 +263,9 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
 
 
 def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
-    """Return a value that changes with any write, and with the seals that journals have for the file.
+    """Return a value that changes with any write to the file, and with its seals in journals.
 
-    It includes the file system's time of change, which no program sets back.
+    The value includes the file system's time of change, which programs cannot set back.
     """
     seals = "".join(f" {each.seal} {each.attempt_seal}" for each in noted)
     return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}{seals}"
@@ -293,7 +293,7 @@ def _entries(connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
 
 
 MISSING = "missing"
-"""Verdict on a recording that is in the journal but missing."""
+"""Verdict on a recording that a journal lists but that does not exist."""
 BAD = frozenset(
     {SealState.DAMAGED.value, SealState.SEAL_GONE.value, SealState.OTHER_KEY.value, UNREADABLE, MISSING}
 )
@@ -304,13 +304,13 @@ class VerifiedRecording:
     """Result of verifying one file."""
 
     path: str
-    """Path relative to the folder, with ``/``; the name of a single file."""
+    """Path relative to the folder, with ``/``; for a single file, its name."""
     verdict: str
-    """Word of `recording.SealState`, ``unreadable`` or ``missing``."""
+    """Value of `recording.SealState`, or ``unreadable`` or ``missing``."""
     sentence: str
     seal: str
     results: dict[str, str]
-    """Verdict on each saved result."""
+    """Verdict on each saved result, by its name."""
 
     @property
     def is_bad(self) -> bool:
@@ -323,18 +323,18 @@ def verify_recordings(
     depth: SealDepth | str = SealDepth.WHOLE,
     key: SealKey | None = None,
 ) -> tuple[VerifiedRecording, ...]:
-    """Compare a recording, or all below a folder, with their seals and journals; change nothing.
+    """Compare recordings with their seals and journals; return the result for each file, change nothing.
 
     Raises RecordingError when ``place`` does not exist, or the key cannot be read.
 
     Parameters
     ----------
     place
-        A recording or a folder.
+        A recording, or a folder whose recordings are all verified, including those in subfolders.
     depth
-        ``"quick"`` reads attributes, texts and tables, ``"whole"`` every sample too.
+        ``"quick"`` reads attributes, texts and tables; ``"whole"`` also reads every sample.
     key
-        Key that signs the seals, from `vibench.acquisition.recording.seal_key`.
+        Key with which the seals were signed, from `vibench.acquisition.recording.seal_key`.
     """
     forget_checks()
     if not place.exists():

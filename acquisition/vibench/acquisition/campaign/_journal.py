@@ -1,8 +1,8 @@
-"""A campaign's journal on disk: every point's state, committed before and after each step.
+"""Journal of a campaign on disk: the state of every point, committed before and after each step.
 
-SQLite in WAL mode with full synchronisation: a finished transaction survives a kill and a power cut, and an
-unfinished one leaves no trace. After a kill the journal is right, except that the point under way is still
-``running``.
+SQLite in WAL mode with full synchronisation is used: a finished transaction survives a kill and a power cut,
+and an unfinished one leaves no trace. After a kill the journal is correct, except that the state of the point
+that was being measured is still ``running``.
 """
 
 import re
@@ -34,25 +34,25 @@ from ._bench_identity import BenchIdentity
 
 
 class ReasonCode(StrEnum):
-    """The reason of a point's state; the words of `plan.retry.Retryable` are among them."""
+    """Reason for the state of a point; includes all values of `plan.retry.Retryable`."""
 
     NOT_YET = "not_yet"
     """Not started yet."""
     RUNNING = "running"
     CARRIED_OUT = "carried_out"
     OVER_RANGE = "over_range"
-    """Carried out, with an input near its full scale in a recorded segment."""
+    """Carried out, but an input was near its full scale in a recorded segment."""
     FOUND = "found"
-    """A complete recording of the same plan was in the folder."""
+    """A complete recording of the same plan was already in the folder."""
     GONE = "gone"
     """The point was done, but its recording is missing."""
     DAMAGED = "damaged"
-    """The point was done, but its recording differs from its seal. The file is kept, and the point is
-    measured again."""
+    """The point was done, but its recording differs from its seal (checksum). The file is kept, and the point
+    is measured again."""
     STOPPED = "stopped"
-    """Somebody requested a stop; the reason names who."""
+    """A stop was requested; the reason names by whom."""
     PROGRAM_ENDED = "program_ended"
-    """The program ended without notice: killed, crashed, or without power."""
+    """The program was killed, crashed, or lost power."""
     DATA_LOST = "data_lost"
     INSTRUMENT_LOST = "instrument_lost"
     INSTRUMENT_FAULT = "instrument_fault"
@@ -60,7 +60,7 @@ class ReasonCode(StrEnum):
     LIMIT = "limit"
     DISK = "disk"
     PLAN = "plan"
-    """This bench cannot play the plan."""
+    """The bench cannot play the plan."""
     FAULT = "fault"
     """Anything else that went wrong."""
 
@@ -88,9 +88,9 @@ class ExistingRecordings(StrEnum):
     """What to do with recordings that are already in the folder."""
 
     REFUSE = "refuse"
-    """Refuse to begin a campaign over an older one."""
+    """Refuse to start a campaign in a folder that has recordings of it."""
     RESUME = "resume"
-    """Keep complete recordings; measure the others again, beside the old files."""
+    """Keep complete recordings; measure the other points again, in new files beside the old ones."""
 
 
 class AfterFailure(StrEnum):
@@ -98,11 +98,11 @@ class AfterFailure(StrEnum):
 
     STOP = "stop"
     GO_ON = "go_on"
-    """Continue with the next one, unless an instrument or the disk is lost: then nothing can be measured."""
+    """Continue with the next measurement, unless an instrument is lost or the disk cannot be written."""
 
 
 class ChangedBench(StrEnum):
-    """What to do when a campaign is resumed on another bench than it was started on."""
+    """What to do when a campaign is resumed on a bench that differs from the one at its start."""
 
     REFUSE = "refuse"
     ACCEPT = "accept"
@@ -114,14 +114,14 @@ class PointOutcome(StrEnum):
 
     RECORDED = "recorded"
     KEPT = "kept"
-    """The recording was complete before."""
+    """The recording was already complete before."""
     STOPPED = "stopped"
     FAILED = "failed"
 
 
 @dataclass(frozen=True)
 class PointResult:
-    """One recording of a campaign, with its result."""
+    """Result of one recording of a campaign, with its reason."""
 
     name: str
     outcome: PointOutcome
@@ -136,9 +136,9 @@ class CampaignProgress:
 
     name: str
     number: int
-    """Number of this recording, from 1."""
+    """Number of the current recording, from 1."""
     count: int
-    """Number of recordings."""
+    """Number of all recordings."""
     path: Path
     """Path of the current recording."""
     run: Progress
@@ -159,29 +159,29 @@ class Finished:
 
     point: DonePoint
     done: tuple[DonePoint, ...]
-    """In the order of the campaign, ``point`` included; the same after a resume."""
+    """Points done in the order of the campaign, including ``point``; the same after a resume."""
 
 
 After = Callable[[Finished, Recording], Iterable[Measurement]]
-"""Called after every point with its open recording; returns the measurements to be made next, or none."""
+"""Called after every point with its open recording; returns further measurements to make next, or none."""
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:
-    """Ignore progress."""
+    """Do nothing: the default for ``on_progress``."""
 
 
 def ignore_result(point_result: PointResult) -> None:
-    """Ignore a result."""
+    """Do nothing: the default for ``on_result``."""
 
 
-# The SQLite file of a journal: its tables (see docs/campaigns.md), connections to it, and its errors.
+# SQLite file of a journal: tables (see docs/campaigns.md), connections, and errors.
 
 VERSION = 2
 
 SEAL_COLUMNS = tuple(
     f"ALTER TABLE {table} ADD COLUMN seal TEXT NOT NULL DEFAULT ''" for table in ("points", "attempts")
 )
-"""Columns that version 1 lacks."""
+"""Statements that add the columns missing in version 1."""
 
 SCHEMA = """
 CREATE TABLE campaign (
@@ -230,7 +230,7 @@ FROM points ORDER BY place
 
 
 def journal_exists(path: Path) -> bool:
-    """Whether a journal exists; a program that ended before its first commit left none."""
+    """Return whether ``path`` is a journal; a file without any committed transaction is not."""
     if not path.is_file():
         return False
     with sentences(path), closing(opened_to_look(path)) as connection:
@@ -240,7 +240,7 @@ def journal_exists(path: Path) -> bool:
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Open a database for writing, so that commits survive a kill and a power cut."""
+    """Return a connection for writing, whose commits survive a kill and a power cut."""
     with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
@@ -249,7 +249,7 @@ def connect(path: Path) -> sqlite3.Connection:
 
 
 def require_version(path: Path, connection: sqlite3.Connection) -> None:
-    """Refuse a file that is not a journal, or one of a newer version; raises RecordingError."""
+    """Refuse a file that is not a journal, or a journal of a newer version; raises RecordingError."""
     try:
         row = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
     except sqlite3.Error as error:
@@ -264,7 +264,7 @@ def require_version(path: Path, connection: sqlite3.Connection) -> None:
 
 @contextmanager
 def sentences(path: Path) -> Iterator[None]:
-    """Turn errors of the database, and invalid contents, into a RecordingError."""
+    """Convert errors of the database, and invalid contents, to a RecordingError."""
     try:
         yield
     except (ValueError, TypeError, LookupError) as error:  # invalid contents or missing columns
@@ -287,7 +287,7 @@ class JournalPointState(StrEnum):
     DONE = "done"
     FAILED = "failed"
     INTERRUPTED = "interrupted"
-    """Stopped by a person, or by the end of its program."""
+    """Stopped by a person, or by the end of the program."""
 
 
 @dataclass(frozen=True)
@@ -298,24 +298,24 @@ class JournalPoint:
     measurement: Measurement
     chain: str
     added_after: str
-    """The point whose result requested this one; empty for points of the plan."""
+    """Name of the point whose result requested this one; empty for points of the plan."""
     state: JournalPointState
     reason_code: ReasonCode
     reason: str
     file: str
-    """Name of the last attempt's file in the journal's folder; empty before the first."""
+    """File name of the last attempt, in the journal's folder; empty before the first attempt."""
     attempts: int
     is_followed_up: bool
-    """Whether the measurements that its result requested are in the journal."""
+    """Whether the measurements that the result of this point requested are in the journal."""
     begun_utc: str
     ended_utc: str
-    """End of the last attempt."""
+    """Time of the end of the last attempt (UTC)."""
     seal: str
-    """Seal of its recording; empty without a recording or a seal."""
+    """Seal of the recording; empty without a recording or a seal."""
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
-    """Read a journal, also while its campaign runs; changes nothing.
+    """Return the points in a journal; the campaign may be running. Changes nothing.
 
     Raises RecordingError when the file does not exist or is not a journal.
     """
@@ -328,14 +328,14 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
 
 
 def _own_name(file: str) -> str:
-    """Refuse a file outside the journal's folder: listed files are recovered and their copies deleted."""
+    """Return ``file`` if it is a plain file name: files outside the journal's folder must not be touched."""
     if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
         raise ValueError(f"{file[:80]!r} is not a name of a recording")
     return file
 
 
 def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
-    """Return every point, in the order of measurement."""
+    """Return all points, in the order of measurement."""
     return tuple(
         JournalPoint(
             name=row["name"],
@@ -362,7 +362,7 @@ def journal_path(folder: Path, campaign: str) -> Path:
 
 
 class Journal(ClosedOnLeaving):
-    """The journal of one campaign, open for writing; used by one thread. Use it in a ``with``."""
+    """Journal of one campaign, open for writing in one thread. Use it in a ``with`` statement."""
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
@@ -370,7 +370,7 @@ class Journal(ClosedOnLeaving):
 
     @classmethod
     def begin(cls, path: Path, campaign: Campaign, bench: BenchIdentity) -> Self:
-        """Write the whole plan, in one transaction, before anything else happens."""
+        """Create a journal with the whole plan, in one transaction, before anything else happens."""
         points = campaign.points()
         journal = cls(path, connect(path))
         with closed_on_error(journal._connection), journal._transaction() as connection:
@@ -396,7 +396,7 @@ class Journal(ClosedOnLeaving):
         with closed_on_error(connect(path)) as connection:
             with sentences(path):
                 require_version(path, connection)
-                # A journal of version 1 gets the missing columns, in one transaction.
+                # Add the columns that a journal of version 1 lacks, in one transaction.
                 connection.execute("BEGIN IMMEDIATE")
                 (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
                 if int(version) < VERSION:
@@ -414,24 +414,24 @@ class Journal(ClosedOnLeaving):
 
     @property
     def bench(self) -> BenchIdentity:
-        """The bench at its start, or the one accepted since."""
+        """The bench at the start of the campaign, or the last one accepted since."""
         command = "SELECT identity_json FROM benches ORDER BY rowid DESC"
         with sentences(self.path):
             (identity,) = self._connection.execute(command).fetchone()
             return BenchIdentity.model_validate_json(identity)
 
     def points(self) -> tuple[JournalPoint, ...]:
-        """Every point, in the order of measurement."""
+        """Return all points, in the order of measurement."""
         with sentences(self.path):
             return points_of(self._connection)
 
     def accept_bench(self, bench: BenchIdentity) -> None:
-        """Continue with another bench; the earlier ones stay in the journal."""
+        """Record that the campaign continues on another bench; earlier benches stay in the journal."""
         with self._transaction() as connection:
             connection.execute("INSERT INTO benches VALUES (?, ?)", (_now(), bench.model_dump_json()))
 
     def start(self, name: str, file: str) -> None:
-        """Record that an attempt begins, before anything plays."""
+        """Record the start of an attempt, before anything plays."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
             connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))
@@ -460,13 +460,13 @@ class Journal(ClosedOnLeaving):
             _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
     def keep(self, name: str, file: str, seal: str) -> None:
-        """Record a file that is already in the folder."""
+        """Mark a point as done whose complete recording ``file`` is already in the folder."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
-        """Insert the measurements that a result requested, and mark its point, in one transaction."""
+        """Insert the measurements that a point's result requested, and note this, in one transaction."""
         with self._transaction() as connection:
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))
@@ -474,7 +474,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET is_followed_up = 1 WHERE name = ?", (name,))
 
     def close(self) -> None:
-        """Close the file. Legal at any time."""
+        """Close the file. May be called at any time."""
         self._connection.close()
 
     def _fact(self, key: str) -> str:

@@ -1,4 +1,4 @@
-"""Log of a campaign as JSON lines, its status lines for ``tail -f``, and notices by command or mail."""
+"""Log of a campaign as JSON lines, status lines for ``tail -f``, and notices by command or mail."""
 
 import json
 import shlex
@@ -28,7 +28,7 @@ from ._journal import CampaignProgress, JournalPoint, JournalPointState
 
 
 class CampaignEventKind(StrEnum):
-    """Kind of an event."""
+    """Kind of an event in a campaign."""
 
     BEGUN = "begun"
     RESUMED = "resumed"
@@ -36,9 +36,9 @@ class CampaignEventKind(StrEnum):
     POINT_DONE = "point_done"
     POINT_STOPPED = "point_stopped"
     FAULT = "fault"
-    """An attempt failed, or the campaign was ended by a fault."""
+    """An attempt failed, or a fault ended the campaign."""
     DAMAGED = "damaged"
-    """A complete recording differs from its seal, or is missing; its point is measured again."""
+    """A complete recording is missing or differs from its seal (checksum); the point is measured again."""
     RETRY = "retry"
     RESTING = "resting"
     """Pause between two recordings."""
@@ -46,7 +46,7 @@ class CampaignEventKind(StrEnum):
     """The operator must move the beam to the next point of a scan."""
     BENCH_REOPENED = "bench_reopened"
     FURTHER = "further"
-    """A result requested more measurements."""
+    """The result of a point requested further measurements."""
     ENDED = "ended"
     NOTICE = "notice"
     """A notice was sent, or could not be sent."""
@@ -54,7 +54,7 @@ class CampaignEventKind(StrEnum):
 
 @dataclass(frozen=True)
 class CampaignEvent:
-    """One event, as a sentence and as facts."""
+    """One event, as a sentence and as named values."""
 
     kind: CampaignEventKind
     text: str
@@ -66,16 +66,16 @@ CampaignListener = Callable[[CampaignEvent], None]
 
 
 def ignore_event(event: CampaignEvent) -> None:
-    """Ignore an event."""
+    """Do nothing: the default for ``on_event``."""
 
 
 LOG_SUFFIX = ".log.jsonl"
 
 
 class CampaignLog(ClosedOnLeaving):
-    """Appends events; each line is flushed before the next step.
+    """Appends events to the log file; each line is flushed before the next step.
 
-    A log that cannot be written (full disk) does not stop the campaign, which needs only the journal.
+    If a line cannot be written (full disk), the campaign continues, because it needs only the journal.
     """
 
     def __init__(self, path: Path) -> None:
@@ -99,7 +99,7 @@ class CampaignLog(ClosedOnLeaving):
             self._file.flush()
 
     def close(self) -> None:
-        """Close the log. Legal at any time."""
+        """Close the log. May be called at any time."""
         with suppress(OSError):
             self._file.close()
 
@@ -111,21 +111,21 @@ def _ends_a_line(path: Path) -> bool:
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval of status lines between events [s]; a night gives half a megabyte."""
+"""Interval of status lines between events [s]; this gives half a megabyte per night."""
 LEFT_ALONE_S = 1.0
 """Longest time for writing the last lines [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
-    """Appends a line at every event, and every few seconds while a point runs.
+    """Appends a status line at every event, and every few seconds while a point runs.
 
-    Writes in another thread, because a folder that hangs would otherwise keep the drive on.
+    The lines are written by another thread, because otherwise a folder that hangs would keep the drive on.
     """
 
     def __init__(
         self, path: Path, campaign: str, points: Sequence[JournalPoint], rest_s: float = 0.0
     ) -> None:
-        """``rest_s``: pause between two points."""
+        """``rest_s`` is the pause between two points [s]."""
         self._path = path
         self._campaign = campaign
         self._counts = Counter(done=sum(point.state is JournalPointState.DONE for point in points))
@@ -133,7 +133,7 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Rig time of the points and pauses before the running point [s]."""
+        """Time by the rig's clock of the points and pauses before the running point [s]."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
@@ -161,7 +161,7 @@ class StatusLine(ClosedOnLeaving):
             self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s{known}")
 
     def close(self) -> None:
-        """Write the last lines. Legal at any time."""
+        """Write the last lines. May be called at any time."""
         self._beside.close(LEFT_ALONE_S)
 
     def _write(self, what: str) -> None:
@@ -172,12 +172,12 @@ class StatusLine(ClosedOnLeaving):
         self._beside.do(lambda: self._append(f"{printable(line)}\n"))
 
     def _append(self, line: str) -> None:
-        # A full disk must not end a measurement because of this line.
+        # A status line that a full disk cannot store must not end a measurement.
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
 
     def _left(self) -> timedelta:
-        """Return the time left at the speed of this session; in the first second, in rig time."""
+        """Return the remaining time at the speed of this session; in the first second, as planned."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
@@ -189,7 +189,7 @@ class Security(StrEnum):
     STARTTLS = "starttls"
     TLS = "tls"
     NONE = "none"
-    """Plain text: only for a server on this computer."""
+    """No encryption; only for a server on this computer."""
 
 
 class MailSettings(FrozenModel):
@@ -201,19 +201,19 @@ class MailSettings(FrozenModel):
     sender: str = Field(pattern=r"^[^@\s]+@[^@\s]+$")
     recipients: tuple[str, ...] = Field(min_length=1)
     user: str = ""
-    """Empty for a server without login."""
+    """Login name; empty for a server without login."""
     password: SecretStr = SecretStr("")
     timeout_s: PositiveFloat = Field(default=20.0, le=300)
 
 
 class MailMessenger:
-    """Sends each notice as a mail."""
+    """Sends each notice by mail."""
 
     def __init__(self, settings: MailSettings) -> None:
         self._settings = settings
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Send one mail; return a clause on its result."""
+        """Send one mail; return a clause that states the result."""
         settings = self._settings
         try:
             with self._connected() as server:
@@ -244,25 +244,25 @@ class MailMessenger:
 
 TOLD_OF = frozenset({CampaignEventKind.FAULT, CampaignEventKind.DAMAGED, CampaignEventKind.ENDED})
 COMMAND_LONGEST_S = 30.0
-"""Longest duration of a command [s]."""
+"""Time after which a command is ended [s]."""
 
 
 class Messenger(Protocol):
-    """A way to notify somebody."""
+    """Means to send a notice to somebody."""
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Send a notice; return a clause on its result, and never raise."""
+        """Send a notice; return a clause that states the result. Never raise."""
 
 
 @dataclass(frozen=True)
 class CommandMessenger:
-    """Runs a command with the notice as JSON on its standard input, without a shell."""
+    """Runs a command without a shell; the command reads the notice as JSON from its standard input."""
 
     arguments: tuple[str, ...]
 
     @classmethod
     def of(cls, command: str) -> "CommandMessenger":
-        """Split a command line as a shell does, without variables, wildcards and pipes.
+        """Return the messenger for a command line, split as in a shell; no variables, wildcards or pipes.
 
         Raises ConfigurationError when it is empty, a quotation mark is missing, or there is no such program.
         """
@@ -281,11 +281,11 @@ class CommandMessenger:
         return cls(arguments)
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Run the command; end it after `COMMAND_LONGEST_S`."""
+        """Run the command, end it after `COMMAND_LONGEST_S`, and return a clause that states the result."""
         return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
 
     def run(self, document: Mapping[str, Any], longest_s: float) -> str:
-        """Run the command with a document; return a clause on its failure, which is empty without one."""
+        """Run the command with ``document`` as input; return a clause on its failure, empty on success."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,
@@ -303,12 +303,12 @@ class CommandMessenger:
 
 
 class Notifier:
-    """Sends notices of faults, damaged recordings and the campaign's end. A failed notice has no effect."""
+    """Sends notices of faults, damaged recordings and the end of the campaign; failures are only logged."""
 
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener
     ) -> None:
-        """``say``: called with the result of each notice."""
+        """``say`` is called with the result of each notice."""
         self._campaign = campaign
         self._folder = folder
         self._messengers = messengers

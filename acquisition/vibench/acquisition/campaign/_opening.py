@@ -1,4 +1,4 @@
-"""Beginning or resuming a campaign: obstacles, kept recordings, and the journal.
+"""Start or resume a campaign: check for obstacles, find kept recordings, and open the journal.
 
 After a crash, journal and folder are compared to find the state of the point that was running.
 """
@@ -35,11 +35,11 @@ PROGRAM_ENDED = "its program ended in the middle of it"
 def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     """Update a resumed journal from the files in its folder.
 
-    A point with a complete recording is done, even if the journal lacks its last entry. A running point
-    without one is interrupted, and its unfinished recording becomes a readable file. A done point is queued
-    again when its recording is missing or differs from its seal; the file is kept, and the next attempt is
-    made beside it. Reading a folder may take minutes: after a stop, the other points are left for the next
-    resume.
+    A point with a complete recording is done, even if the last entry in the journal is missing. A running
+    point without a complete recording is interrupted, and its unfinished recording is made readable. A done
+    point is queued again when its recording is missing or differs from its seal; the file is kept, and the
+    next attempt gets a new file. Reading a folder may take minutes; after a stop, the remaining points are
+    left for the next resume.
     """
     for point in journal.points():
         if stop.request is not None:
@@ -57,7 +57,7 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
             case state if point.file:
                 ended = _end_of_attempt(path, point.measurement, errors)
-                # The journal may say failed although the file on the disk is complete: the file decides.
+                # The journal may state a failure although the file on the disk is complete; the file decides.
                 if has_part or state is JournalPointState.RUNNING or ended[0] is JournalPointState.DONE:
                     journal.end(point.name, *ended)
 
@@ -65,11 +65,11 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
 def found_recordings(
     points: Sequence[Point], folder: Path, depth: SealDepth, stop: StopSwitch | None = None
 ) -> dict[str, KeptRecording]:
-    """Find the recordings in a folder, for a campaign whose journal is lost or never existed.
+    """Return the recordings in a folder by point, for a campaign whose journal is lost or never existed.
 
-    After a stop no more samples are read; the next resume reads them, using its journal. Damaged recordings
-    are returned too, and those whose seal is in no journal of the folder, because the campaign may have been
-    renamed. Raises RecordingError when a recording is complete, but was made by another plan.
+    After a stop no more samples are read; the next resume reads them, with the journal. Damaged recordings
+    are also returned, and so are those with a seal that no journal of the folder contains, because the
+    campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
     """
 
     def looked_for(point: Point) -> KeptRecording | None:
@@ -81,14 +81,14 @@ def found_recordings(
 
 
 def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, str]:
-    """Recover every unfinished attempt at a point; returns the errors by file name.
+    """Recover every unfinished attempt at a point; return the errors by file name.
 
-    Raises RecordingError when a complete recording cannot be recovered: it would be measured again.
+    Raises RecordingError when a complete recording cannot be recovered, so that it is not measured again.
     """
     errors: dict[str, str] = {}
     for path in attempts:
         if not part_of(path).exists():
-            with suppress(OSError):  # it was being prepared and contains no sample
+            with suppress(OSError):  # the file was being prepared and contains no sample
                 tmp_of(path).unlink()
             continue
         try:
@@ -129,18 +129,18 @@ def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointSt
 
 
 MOST_DIFFERENCES = 5
-"""Number of differences that a refusal lists."""
+"""Largest number of differences listed in an error message."""
 
 
 @dataclass(frozen=True)
 class PlannedRecording:
-    """One recording of a campaign, and its path."""
+    """One planned recording of a campaign, with its path."""
 
     name: str
     measurement: Measurement
     path: Path
     is_complete: bool = False
-    """Whether a recording of the same plan exists already."""
+    """Whether a complete recording of the same plan exists already."""
 
 
 def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
@@ -164,10 +164,10 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
 def planned_recordings(
     campaign: Campaign, folder: Path, existing: ExistingRecordings
 ) -> tuple[PlannedRecording, ...]:
-    """Return which recordings are to be made and which exist; changes nothing.
+    """Return all recordings of a campaign, and which of them exist already; change nothing.
 
-    Raises RecordingError when recordings exist and ``existing`` refuses that, or a complete one was made by
-    another plan.
+    Raises RecordingError when recordings exist and ``existing`` refuses that, or a complete recording was
+    made by another plan.
     """
     points = campaign.points()
     match existing:
@@ -191,11 +191,11 @@ def open_journal(
     changed: ChangedBench,
     stop: StopSwitch,
 ) -> Journal:
-    """Begin a journal, or open the campaign's journal and update it.
+    """Return the campaign's journal: a new one, or the existing one updated from the folder.
 
-    Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that, or
-    the journal belongs to another plan. Raises CheckFailed when the bench is not the one that the campaign
-    was started on and ``changed`` refuses that.
+    Raises RecordingError when the folder contains recordings of the campaign and ``existing`` refuses that,
+    or the journal belongs to another plan. Raises CheckFailed when the bench differs from the one at the
+    start of the campaign and ``changed`` refuses that.
     """
     path = journal_path(folder, campaign.name)
     identity = BenchIdentity.of(bench)
@@ -227,7 +227,7 @@ def open_journal(
 
 
 def require_same_bench(begun_on: BenchIdentity, now: BenchIdentity) -> None:
-    """Refuse to continue a campaign on another bench; raises CheckFailed."""
+    """Refuse to continue a campaign on a bench that has changed; raises CheckFailed."""
     _require_no_differences(begun_on.differences(now))
 
 
@@ -242,7 +242,7 @@ def _require_no_differences(found: tuple[str, ...]) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make the folder for the recordings; raises RecordingError."""
+    """Create the folder for the recordings; raises RecordingError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -285,12 +285,12 @@ def _require_same_plan(journal: Journal, campaign: Campaign) -> None:
 
 
 def _points_to_make(campaign: Campaign) -> tuple[tuple[str, Measurement], ...]:
-    """Return the points of a plan, without notes, which may change."""
+    """Return the points of a plan without their notes, which may change."""
     return tuple((name, each.model_copy(update={"notes": ""})) for name, each in campaign.recordings())
 
 
 def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> None:
-    """Refuse to begin a campaign over an older one; raises RecordingError and changes nothing."""
+    """Refuse a folder that has recordings of the campaign; raises RecordingError and changes nothing."""
     present = [str(path) for point in points for path in attempts_in(folder, point.name)]
     path = journal_path(folder, campaign.name)
     if not present and journal_exists(path):

@@ -1,4 +1,4 @@
-"""Running a campaign: one recording for each point, with every step in a journal."""
+"""Run a campaign: make one recording for each point, and write every step to a journal."""
 
 import shutil
 from collections import deque
@@ -58,7 +58,7 @@ from ._opening import make_folder, open_journal, planned_recordings, require_all
 
 
 class CampaignRunner:
-    """Runs the points of a campaign, and further points that results request."""
+    """Measures the points of a campaign, and further points that results request."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class CampaignRunner:
         on_progress: Callable[[CampaignProgress], None],
         on_result: Callable[[PointResult], None],
     ) -> tuple[PointResult, ...]:
-        """Measure the points one after the other; return the result of each."""
+        """Measure the points one after another; return the result of each."""
         done = sum(point.state is JournalPointState.DONE for point in self._coming)
         begun = (
             CampaignEventKind.RESUMED
@@ -130,7 +130,7 @@ class CampaignRunner:
                 self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Pause, and have the beam moved, before a point is measured; return False after a stop."""
+        """Pause and wait for the beam to be moved before a measurement; return False after a stop."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
             self._attempts.pause_before(point.name)
             self._attempts.ask_for_beam(point.measurement)
@@ -143,7 +143,7 @@ class CampaignRunner:
         try:
             return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
         except (InstrumentLost, RecordingError):
-            raise  # without instruments, or without disk space, the next point would fail too
+            raise  # without an instrument or disk space, the next point would fail too
         except AcquisitionError as error:
             if self._after_failure is AfterFailure.STOP:
                 raise
@@ -153,7 +153,7 @@ class CampaignRunner:
             return PointResult(point.name, PointOutcome.FAILED, path, str(error), reason_code_of(error))
 
     def _follow_up(self, point: JournalPoint, point_result: PointResult) -> None:
-        """Call ``after`` once for a point, and insert the measurements that it requests."""
+        """Call ``after`` once for a point that is done, and insert the measurements that it returns."""
         is_done = point_result.outcome in (PointOutcome.RECORDED, PointOutcome.KEPT)
         if not is_done or point.is_followed_up or self._after is None:
             return
@@ -217,41 +217,41 @@ def run_campaign(
 ) -> tuple[PointResult, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
-    All points are checked against the limits of the rig before the first one begins. The journal records
-    what was done, what failed and why, so that a killed campaign continues with ``existing="resume"`` at
-    its first unfinished point. Ctrl-C ramps the running measurement down, and ends the campaign. Returns
-    the recordings made, kept or failed; it ends early when the campaign was stopped.
+    All points are checked against the limits of the rig before the first one starts. The journal records
+    what was done, what failed and why. A killed campaign continues with ``existing="resume"`` at its first
+    unfinished point. Ctrl-C ramps the running measurement down and ends the campaign. Returns one result per
+    recording made, kept or failed; fewer than planned if the campaign was stopped.
 
     Parameters
     ----------
     bench, campaign, folder
         The open bench, the plan, and the folder of the recordings.
     existing, after_failure, changed_bench
-        What to do with existing recordings, with a point whose attempts are used up, and with another
-        bench than the campaign was started on; members of the enums or their words.
+        What to do about existing recordings, a point whose attempts are used up, and a bench that differs
+        from the one at the start; members of the enums or their values.
     on_progress, on_result, on_event
-        Called after every block, after every recording, and at every event.
+        Functions called after every block, after every recording, and at every event.
     switch
         Holds the running measurement or ends the campaign, from another thread.
     after
-        Called after every point that is done; the measurements it returns are made next, in this session
-        or after a resume.
+        Function called after every point that is done; the measurements that it returns are made next, in
+        this session or after a resume.
     reopen
-        Closes and opens the bench when an instrument is lost and the campaign's retries allow another
-        attempt; absent, a lost instrument ends the campaign.
+        Function that closes and opens the bench when an instrument is lost and the campaign allows another
+        attempt; if absent, a lost instrument ends the campaign.
     messengers
         Ways to notify somebody at every fault and at the end.
     move_beam
-        Command that moves the vibrometer of a real rig to each point of a scan, which it reads as JSON;
-        absent, the campaign holds until the operator has moved it.
+        Command that moves the vibrometer of a real rig to each point of a scan; it reads the point as JSON.
+        If absent, the campaign holds until the operator has moved the vibrometer.
 
     Raises
     ------
     LimitExceeded
-        When any point would exceed a limit; nothing was played.
+        When any point would exceed a limit; nothing has been played.
     RecordingError
-        When the folder contains recordings already and ``existing`` refuses that, or another program
-        carries out the same campaign.
+        When the folder contains recordings already and ``existing`` refuses that, or another program is
+        running the same campaign.
     CheckFailed
         When the bench has changed and ``changed_bench`` refuses that.
     AcquisitionError
@@ -291,7 +291,7 @@ def run_campaign(
 
 @contextmanager
 def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
-    """Open and lock the log, so that no other program carries out the campaign meanwhile."""
+    """Open and lock the log, so that no other program runs the same campaign meanwhile."""
     with CampaignLog(folder / f"{campaign.name}{LOG_SUFFIX}") as log, ExitStack() as mark:
         try:
             mark.enter_context(sole_use(log.path))
@@ -304,11 +304,11 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Rig time [s] before the bench of a virtual rig is opened again; cables may be reconnected meanwhile."""
+"""Simulated time before the bench of a virtual rig is reopened, for reconnecting cables [s]."""
 
 
 class ReconnectingBench:
-    """Opens a rig's bench, and reopens it without asking anybody. Use it in a ``with``."""
+    """Opens the bench of a rig, and reopens it without questions. Use it in a ``with`` statement."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)
@@ -326,20 +326,20 @@ class ReconnectingBench:
 
     @property
     def played_faults(self) -> tuple[str, ...]:
-        """Faults that a script has injected into a virtual rig so far, in order."""
+        """Faults that a script has injected into the virtual rig so far, in order."""
         return tuple(each.fault for each in self._power.played_faults)
 
     def reopen(self) -> Bench:
-        """Close the bench and open it again; knobs keep their confirmed settings.
+        """Close the bench, open it again and return it; confirmed manual settings (knobs) stay valid.
 
-        Raises AcquisitionError when an instrument is still missing. The bench is then closed; try again.
+        Raises AcquisitionError when an instrument is still missing. The bench is then closed; call again.
         """
         before, self._bench = self._bench, None
         if before is not None:
             self._last_check = before.last_check
             sheet = before.confirmations
             self._confirm = lambda knobs: _confirmed_before(sheet, knobs)
-            with suppress(AcquisitionError):  # a lost instrument cannot be silenced; the others were
+            with suppress(AcquisitionError):  # a lost instrument cannot be silenced; all others have been
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
         self._bench = open_bench(self._rig, self._confirm, power=self._power)
@@ -347,7 +347,7 @@ class ReconnectingBench:
         return self._bench
 
     def close(self) -> None:
-        """Silence and close everything. Legal at any time."""
+        """Silence and close everything. May be called at any time."""
         bench, self._bench = self._bench, None
         try:
             if bench is not None:
@@ -386,51 +386,51 @@ def _confirmed_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""Size of a finished recording over its size while growing: white noise at 24 bit; dwells need less."""
+"""Size of a finished recording over its size while growing, for 24-bit white noise; less for dwells."""
 
 
 @dataclass(frozen=True)
 class CampaignEstimate:
-    """Duration and size of a campaign, without existing recordings."""
+    """Duration and size of the recordings of a campaign that do not exist yet."""
 
     recordings: int
     """Number of recordings still to be made."""
     kept: int
     """Number of recordings that are complete already."""
     duration_s: float
-    """Rig time, with bench checks, lead-ins and ramps."""
+    """Duration by the rig's clock, including bench checks, lead-ins and ramps [s]."""
     rest_s: float
     """Part of ``duration_s`` for pauses between recordings [s]."""
     lead_in_s: float
     """Part of ``duration_s`` for lead-ins of points in chains [s]."""
     largest_bytes: int
-    """Largest size [bytes] of one growing recording."""
+    """Largest size of one growing recording [bytes]."""
     total_bytes: int
-    """Total size [bytes] of all finished recordings."""
+    """Total size of all finished recordings [bytes]."""
     free_bytes: int
-    """Free space on the disk of the folder."""
+    """Free space on the disk of the folder [bytes]."""
     searching: int = 0
-    """Number of recordings that may end earlier: by their feedback, or when their results are known."""
+    """Number of recordings that may end early, due to feedback or because results are accurate enough."""
 
     @property
     def needed_bytes(self) -> int:
-        """Disk space [bytes] that the campaign needs."""
+        """Disk space that the campaign needs [bytes]."""
         return self.total_bytes + self.largest_bytes
 
     @property
     def fits(self) -> bool:
-        """Whether the disk has that space."""
+        """Whether the disk has enough free space."""
         return self.needed_bytes <= self.free_bytes
 
 
 def estimate_campaign(
     campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
 ) -> CampaignEstimate:
-    """Estimate the time and space of a campaign; open no instrument and write nothing.
+    """Estimate the duration and disk space of a campaign; open no instrument and write nothing.
 
-    Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that;
-    ConfigurationError when the rig lacks a part that a measurement needs; LimitExceeded when feedback on the
-    rig cannot hold a requested motion.
+    Raises RecordingError when the folder contains recordings of the campaign and ``existing`` refuses that,
+    ConfigurationError when the rig lacks a part that a measurement needs, and LimitExceeded when feedback on
+    the rig cannot hold a requested motion.
     """
     for each in campaign.measurements:
         require_played(each, rig)
