@@ -16,24 +16,24 @@ _NOISE_FACTOR = 4.0
 _DISTORTION = 0.02
 """Largest residual of a smooth motion relative to order 1, from high harmonics of amplifier and shaker."""
 _RINGING = 2.0
-"""Least ratio of the residual to that of the specimen without contact in the same sweep."""
+"""Least ratio of the residual to the residual simulated without contact in the same sweep."""
 _TOO_FAST = 0.5
 """Residual relative to order 1 that collisions usually exceed; ringing above it can hide collisions."""
 _IMPACTS = 0.1
-"""Orders 2 and 3 relative to order 1 that show impacts; ringing causes 0.05 at most, away from modes."""
+"""Least ratio of orders 2 and 3 to order 1 that shows impacts; ringing off modes causes at most 0.05."""
 _RING_CYCLES = 5_000.0
 """Cycles after which a mode with a damping ratio of 0.02 % has decayed to 1/500."""
 _ENOUGH = 0.25
-"""Smallest share of a region with such orders, which is required if no specimen is known."""
+"""Least share of a region with such orders; only required if no specimen is known."""
 _SMOOTH_AT_MOST = 0.1
-"""Residual relative to order 1 that excludes a smooth motion in any case."""
+"""Residual relative to order 1 above which a motion is never smooth."""
 _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _VOTE_S = 1.0
-"""Length of the neighbourhood whose majority decides on an interval, because collisions last."""
+"""Length of the neighbourhood whose majority decides on an interval, because collisions persist."""
 _MERGE_S = 3.0
-"""Shorter quiet stretches do not split a region: motion between impacts may settle briefly."""
+"""Quiet stretches shorter than this do not split a region: motion may settle briefly between impacts."""
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,12 @@ class CollisionRegion:
 
     @property
     def low_hz(self) -> float:
-        """Lower end [Hz]."""
+        """Lowest frequency of the region [Hz]."""
         return min(self.start.frequency_hz, self.stop.frequency_hz)
 
     @property
     def high_hz(self) -> float:
-        """Upper end [Hz]."""
+        """Highest frequency of the region [Hz]."""
         return max(self.start.frequency_hz, self.stop.frequency_hz)
 
 
@@ -85,25 +85,25 @@ class Collisions(Labelled):
     is_colliding: Flags
     """Intervals inside a region, shape (intervals,)."""
     is_unexplained: Flags
-    """Intervals with a residual above the noise and distortion of the sensors, shape (intervals,). Rattling
-    during a whole sweep counts as noise of the bench."""
+    """Intervals with a residual above the noise and distortion of the sensors, shape (intervals,). The
+    threshold also counts rattling during a whole sweep as noise."""
     too_fast_hz: tuple[tuple[float, float], ...]
-    """Ends of stretches where ringing may hide collisions, which are not determined there."""
+    """Frequency limits of stretches where collisions are not determined, because ringing may hide them."""
     noise_rms: float
-    """Noise in the threshold [m/s]."""
+    """Noise used in the threshold [m/s]."""
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
     """Find where the motion is not a smooth, slowly varying sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
-    sweep. An interval counts as colliding when this residual exceeds three limits: 4 times the noise, 2 % of
-    order 1, and twice the residual simulated without contact under the recorded base motion. The noise is the
-    larger of two estimates: the sixth difference of the samples, and the quietest tenth of the sweep if it
-    can be smooth. Intervals follow their neighbours, as do those with drop-outs of the laser. A residual of
-    twice its limits counts if two intervals in a row show impacts, and is otherwise not determined. Orders 2
-    and 3 above a tenth of order 1, and above twice those without contact, show impacts. If no specimen is
-    known, they are required, at frequencies whose double and triple the sweep has not just passed.
+    sweep. An interval collides if this residual exceeds three limits: 4 times the noise, 2 % of order 1, and
+    twice the residual simulated without contact under the recorded base motion. The noise is the larger of
+    two estimates: from the sixth difference of the samples, and from the quietest tenth of the sweep if it
+    can be smooth. The majority of neighbours decides, also during laser drop-outs. A residual of twice its
+    limits is enough if two successive intervals show impacts; otherwise it is not determined. Impacts show as
+    orders 2 and 3 above a tenth of order 1 and above twice their value without contact. If no specimen is
+    known, a region must show impacts at frequencies whose double and triple the sweep has not just passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -116,7 +116,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
             f"more than {votes}"
         )
     ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
-    # The maximum over a vote, because real resonances may differ a little from the described ones.
+    # Take the maximum over a vote: real resonances may differ a little from the described ones.
     rung = maximum_filter1d(_RINGING * np.nan_to_num(sweep.linear_impacts), votes)
     impacts = sweep.velocity.impacts > np.maximum(_IMPACTS, rung)
     most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))
@@ -124,7 +124,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
     threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
     above, is_clear = residual > threshold, sweep.is_clear & (residual > _CLEARLY * threshold)
     is_known = bool(np.isfinite(sweep.linear_residual).all())
-    is_clear[0] &= is_known  # An unknown specimen may still ring of its start.
+    is_clear[0] &= is_known  # An unknown specimen may still ring from its start.
     inside = np.zeros(above.size, dtype=np.bool_)
     regions = []
     is_voted = _majority(above, votes) | binary_opening(is_clear & impacts, np.ones(2, np.bool_))
@@ -146,7 +146,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
 
 
 def _seen_impacts(sweep: SweptMotion) -> Flags:
-    """Return where order 2 or 3 shows impacts of an unknown specimen.
+    """Return flags of the intervals where order 2 or 3 shows impacts of an unknown specimen.
 
     A mode that the drive has passed may still ring at twice or three times its frequency; ringing above
     order 1 leaks into all orders.

@@ -33,12 +33,12 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""The same ratio to the noise in the silence, which is shorter than the ring-down of a mode."""
+"""The same ratio to the noise in the silence; the silence is shorter than the ring-down of a mode."""
 OVERHEARD = 20.0
-"""Largest ratio of the residual to the noise in the silence that may still be noise.
+"""Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
-In one of 400 short silences, a mode excited by noise is by chance as faint as that. The generator's noise
-is missing in a silence.
+By chance, a mode excited by noise is this faint in one of 400 short silences. A silence also lacks the noise
+of the generator.
 """
 BETWEEN = "what the motion contains between its lines"
 
@@ -50,13 +50,13 @@ class Background:
     rms_m: float
     """RMS; NaN if it cannot be distinguished from motion."""
     frequency_hz: float
-    """Rms frequency of the noise; a window has two independent values per cycle of it."""
+    """Rms frequency of the noise; a window has two independent noise values per cycle of this frequency."""
     source: str
-    """Source of the estimate, or the reason for none."""
+    """Source of the estimate, or the reason why there is none."""
 
     @property
     def is_rest(self) -> bool:
-        """Return whether the noise is the whole non-repeating part; the repeating part is then the motion."""
+        """Return whether all of the non-repeating part is noise, so that the motion is the repeating part."""
         return self.source == BETWEEN
 
     @property
@@ -66,7 +66,7 @@ class Background:
 
 
 def silence_before(channels: Channels) -> Reals:
-    """Return drive, base and response during the silence of the check, as read; empty without a check."""
+    """Return drive, base and response in the silence of the bench check; empty if lost or not recorded."""
     for stretch in channels.stretches(SegmentLabel.CHECK):
         stop = stretch.start + round(CHECK_QUIET_S * channels.sample_rate_hz)
         heard = channels.read(stretch.start, min(stop, stretch.stop))
@@ -75,7 +75,7 @@ def silence_before(channels: Channels) -> Reals:
 
 
 def background_in_silence(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> Background:
-    """Return the noise of a silence in a band as displacement; NaN if it is too short for the band."""
+    """Return the displacement noise of a silence in a band; NaN if the silence is too short for the band."""
     source = "silence before the check"
     if 2 * velocity.size < rate_hz / band_hz[0]:
         return Background(np.nan, np.nan, source)
@@ -95,11 +95,11 @@ def background_between_lines(rest: Reals, rate_hz: float) -> Background:
 
 
 def background_of(rest: Background, motion_m: float, sensor: Background, silent: Background) -> Background:
-    """Return how much of the non-repeating part is noise, and its rms frequency.
+    """Return the noise in the non-repeating part of a motion.
 
-    Chaos does not repeat either. The residual between the lines is noise if vibrometer noise or noise in the
-    silence explains it, or if it hardly matters for a periodic motion. Otherwise it may be motion, and only
-    the silence shows the noise; without a silence the noise is unknown.
+    The non-repeating part, or residual between the lines, may be noise or chaos. It counts as noise if
+    vibrometer noise or noise in the silence explains it, or if it is negligible for a periodic motion.
+    Otherwise the noise comes from the silence or the vibrometer; without a silence it is unknown.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
     motion_m
         RMS of the whole motion.
     sensor
-        Vibrometer noise, taken as white.
+        Vibrometer noise, assumed white.
     silent
         Noise in the silence before the test.
     """
@@ -137,16 +137,16 @@ _FEWEST_BLOCKS = 4
 _SLOW = 0.5
 """Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""
 _ONCE = 0.5
-"""Share of the variance with the record's length as period, above which the further course is unknown."""
+"""Share of the variance at one cycle per record above which the change may continue after the record."""
 _BEYOND = 3.0
-"""Ratio of the remaining decay to the observed scatter, if a tenth of the decay is within the record."""
+"""Ratio of the remaining decay to the observed scatter if the record covers a tenth of the decay."""
 
 
 def slow_change(parts: Complexes | Reals) -> float:
     """Return the relative standard uncertainty that slow change adds to a mean or maximum.
 
-    0 if the parts scatter at random, because their standard error is enough then. NaN if a change of more
-    than 0.2 % is incomplete, because another record could have any value.
+    0 if the parts scatter at random, because their standard error then suffices. NaN if a change of more than
+    0.2 % is incomplete at the end of the record, because its final value is unknown.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def slow_change(parts: Complexes | Reals) -> float:
     power = float(np.sum(np.abs(off) ** 2))
     if count < _FEWEST_BLOCKS or power == 0.0:
         return 0.0
-    # A straight line through few parts correlates less than through many.
+    # Neighbouring parts of a linear trend correlate less if there are few parts.
     limit = _SLOW * (1 - 3 / count) / (1 - 3 / _BLOCKS_OF_WINDOW)
     if float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) <= min(limit, _SLOW) * power:
         return 0.0
@@ -191,13 +191,13 @@ _LOWEST_ORDER = 0.1
 _BAND_ABOVE = 0.33
 """Low-pass relative to the sample rate."""
 _HIGHEST_ORDER = 0.45
-"""Frequency of the highest order relative to the sample rate; aliases cannot be told from lower orders."""
+"""Frequency of the highest order relative to the sample rate; aliases above it look like lower orders."""
 _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
 """Band relative to the sample rate that contains only vibrometer noise, above modes and impacts."""
 _NOISE_SEGMENT = 4096
 LEAST_CLEAR = 0.2
-"""Smallest share of a window that must be clear of drop-outs."""
+"""Smallest share of a window that must be free of drop-outs."""
 _NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 
@@ -219,7 +219,7 @@ class Line:
 
 @dataclass(frozen=True)
 class DwellResponse(Labelled):
-    """One dwell, analysed over its window."""
+    """Results of one dwell over its window."""
 
     OWN_UNITS: ClassVar = {
         "order_displacement": "m",
@@ -239,16 +239,16 @@ class DwellResponse(Labelled):
     response_i: float
     """Largest |x| over the window, divided by the drive amplitude."""
     noise_bias_i: float
-    """Expected bias by noise; NaN if the noise is unknown."""
+    """Expected bias of Response I by noise; NaN if the noise is unknown."""
     noise_error_i: float
-    """RMS error by noise, including the bias; NaN if the noise is unknown."""
+    """RMS error of Response I by noise, including the bias; NaN if the noise is unknown."""
     noise_source: str
-    """Source of that noise, or the reason why it is unknown."""
+    """Source of the noise estimate, or the reason why the noise is unknown."""
     rest_bias_i: float
-    """The same bias if the whole non-repeating part were noise; NaN if that part is too large."""
+    """Bias of Response I if all of the non-repeating part were noise; NaN if this part is too large."""
     rest_error_i: float
     rest_displacement_m: float
-    """RMS of the part that does not repeat with the drive [m]."""
+    """RMS displacement of the part that does not repeat with the drive [m]."""
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
@@ -256,28 +256,28 @@ class DwellResponse(Labelled):
     slow_change: float
     """Relative standard uncertainty of Response I by slow change of base or response; NaN if unknown."""
     phase_rad: float
-    """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    """Phase of x ahead of the base displacement at the drive frequency, without the channels' delay."""
     sd_phase_rad: float
     orders: tuple[float, ...]
     order_displacement: Complexes
-    """Complex amplitudes of x at the orders; phase re the drive voltage's cosine [m]."""
+    """Complex amplitudes of x at the orders [m]; phases relative to the drive voltage as a cosine."""
     noise_density: float
     """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """RMS of this noise as displacement in its band, or the noise in the silence if that is larger [m]."""
+    """RMS displacement noise by this density, or noise in the silence if larger [m]."""
     displacement: ConvertedSignal
     """x over the record [m]; the window lies in its settled part."""
     is_clear: Flags
-    """Samples of the window away from drop-outs, shape (samples,)."""
+    """Flags of the window's samples that no drop-out affects, shape (samples,)."""
     spectrum: AmplitudeSpectrum
     """Displacement amplitudes over the window [m]."""
     lines: tuple[Line, ...]
 
     def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
-        """Return a copy with the non-repeating part as noise, for motions not known to be irregular.
+        """Return a copy that counts the non-repeating part as noise, for motions not known as irregular.
 
-        If the motion is not known to repeat either, only a part of at most `OVERHEARD` times the known noise
-        counts as noise.
+        If the motion is not known to repeat either, the part counts as noise only if it is at most
+        `OVERHEARD` times the known noise.
         """
         heard_m = self.noise_displacement_m
         if not (is_known_to_repeat or self.rest_displacement_m <= OVERHEARD * heard_m):
@@ -315,11 +315,11 @@ def dwell_response(
         Drive voltage, base acceleration [m/s2], response velocity [m/s], shape (samples,). Pass more than
         the window if possible: integration disturbs about 0.25 s at each end.
     near_hz
-        Drive frequency, within 20 %; the exact one is measured.
+        Expected drive frequency, within 20 %; the exact frequency is measured.
     window_s
         Length of the window, which ends with the settled part of the displacement [s].
     towards_hz
-        Frequencies, such as those of the bound modes, near which (10 %) the largest peak is listed.
+        Frequencies, for example of the bound modes; the largest peak within 10 % of each is listed.
     delay_s
         Lag of the response channel behind the base channel [s].
     sensors
@@ -414,12 +414,12 @@ def _window(samples: int, edge: int, sample_rate_hz: float, window_s: float) -> 
 
 
 def clear_of_dropouts(bridged: Flags, sample_rate_hz: float, near_hz: float) -> Flags:
-    """Return which samples are unaffected by bridges, whose error decays within the slowest period kept."""
+    """Return flags of samples that bridged drop-outs do not affect: a period of the high-pass away."""
     return far_from(bridged, round(sample_rate_hz / (_LOWEST_ORDER * near_hz)))
 
 
 def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window: slice) -> Flags:
-    """Return which samples of the window are unaffected by bridges; raises UnusableData if too few."""
+    """Return flags of the window's samples without effect of drop-outs; raises UnusableData if too few."""
     if not bridged.any():
         return np.ones(window.stop - window.start, dtype=np.bool_)
     clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
@@ -445,7 +445,7 @@ def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -
 def _slow_changes(
     base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
 ) -> tuple[float, float]:
-    """Return the uncertainties by slow change of the base, and of the response over the base."""
+    """Return the relative uncertainties by slow change of the base, and of response over base."""
     settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
     rate = displacement.sample_rate_hz
     moved, shook = (
@@ -455,7 +455,7 @@ def _slow_changes(
 
 
 def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float, Background]:
-    """Return the velocity noise density, from a band with noise only, and its rms in displacement."""
+    """Return the velocity noise density, from a band with noise only, and the displacement noise."""
     rate = displacement.sample_rate_hz
     density = spectral_density(response, rate, segment_samples=min(_NOISE_SEGMENT, response.size // 2))
     quiet = (density.frequency_hz > _NOISE_BAND[0] * rate) & (density.frequency_hz < _NOISE_BAND[1] * rate)

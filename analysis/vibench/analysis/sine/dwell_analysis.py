@@ -36,14 +36,14 @@ _CLEAR_MOTION = 0.8
 """Smallest share of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Largest distance of any of many noise maxima from their median, in median deviations."""
+"""Largest deviation of noise maxima from their median, in median deviations; a burst exceeds it."""
 _LEAST_RISE = 0.01
 """Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """Displacement and velocity at one phase of every drive period, with the orbit."""
+    """Poincaré points, displacement and velocity at one phase of every drive period, with the orbit."""
 
     drive_hz: float
     phase_rad: float
@@ -67,7 +67,7 @@ def stroboscope(
     phase_rad: float = 0.0,
     delay_s: float = 0.0,
 ) -> Section:
-    """Interpolate the motion at one phase of the recorded drive.
+    """Return the motion at one phase of every period of the recorded drive, by interpolation.
 
     The nominal drive frequency is not accurate enough: 50 ppm between the clocks shift the phase by half a
     period of 100 Hz in 100 s.
@@ -132,7 +132,7 @@ class DwellMotion(Labelled):
 
 
 def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
-    """Take the Poincaré points of a dwell and classify its motion.
+    """Return the Poincaré points of a dwell and the verdict on its motion.
 
     Raises UnusableData when samples were lost inside the dwell.
     """
@@ -147,7 +147,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
         why = f"|x| rises {100 * rise:.2g} % above its usual maximum in a burst; find its cause, dwell again"
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
-    # Bridges can make a repeating motion look irregular, not the reverse.
+    # Bridged drop-outs can make a repeating motion look irregular, not the reverse.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         why = (
             f"drop-outs of the vibrometer affect {100 * (1 - clear):.0f} % of the dwell, and may make it "
@@ -173,7 +173,7 @@ def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> flo
 
 @dataclass(frozen=True)
 class IrregularMotion:
-    """Non-repeating motion of a dwell, from its first undisturbed period."""
+    """Part of a dwell in which the motion did not repeat, from the first undisturbed period."""
 
     start_s: float
     stop_s: float
@@ -208,7 +208,7 @@ def _section(channels: Channels, response: DwellResponse) -> Section:
 
 
 def _points(section: Section, response: DwellResponse, sample_rate_hz: float) -> Points:
-    """Points and noise relative to the size of the orbit."""
+    """Return the Poincaré points and their noise, both relative to the size of the orbit."""
     sizes = np.array(
         [
             np.sqrt(2 * np.mean(section.orbit_displacement_m**2)),
@@ -221,9 +221,9 @@ def _points(section: Section, response: DwellResponse, sample_rate_hz: float) ->
 
 
 _SEGMENT_S = 0.5
-"""Segments of the density: 3 Hz wide, some twenty averages in 5 s."""
+"""Segment length of the density [s]: lines 3 Hz wide, about twenty averages in 5 s."""
 _REACH = 0.1
-"""Half width of the band, as a fraction of its middle."""
+"""Half width of the band relative to its centre frequency."""
 
 
 @dataclass(frozen=True)
@@ -240,11 +240,11 @@ class TerminalLevel:
     rms_m: float
     relative_sd: float
     decibel: float
-    """RMS of the band relative to that of the line at the drive frequency."""
+    """RMS of the band relative to the line at the drive frequency."""
 
 
 def terminal_levels(response: DwellResponse, towards_hz: tuple[float, ...]) -> tuple[TerminalLevel, ...]:
-    """Measure the bands around the given frequencies; bands with the drive's line are left out."""
+    """Return the levels of bands around the given frequencies, except bands with the drive's line."""
     motion = response.displacement
     window = round(response.window_s * motion.sample_rate_hz)
     segment = min(round(_SEGMENT_S * motion.sample_rate_hz), window // 4)
@@ -300,7 +300,7 @@ class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
 
 
 def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
-    """Return the frequencies of the specimen with m1 bound to m2, which strong collisions excite."""
+    """Return the natural frequencies with m1 bound to m2, which strong collisions excite."""
     return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
 
 

@@ -17,16 +17,16 @@ _SIDE = 12
 """Intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""Standard errors of a significant step among thousands of candidates, even with rough errors."""
+"""Least size of a jump in standard errors, since thousands of steps are tested with rough errors."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
 """Intervals of the transition, which belong to neither side."""
 _DEGREE, _EXPLAINED = 4, 0.06
-"""Degree of the polynomial that 1/response squared follows at a resonance, and its largest residual
-relative to the step: a jump leaves 0.13 or more, and 400 resonances left 0.03 at most."""
+"""Degree of the polynomial fitted to 1/response squared at a resonance, and its largest residual relative to
+the step. A jump leaves 0.13 or more; 400 resonances left at most 0.03."""
 _LARGER = 2.0
-"""Smallest ratio of a jump to the step of the linear specimen."""
+"""Smallest ratio of a jump to the largest step of the linear specimen nearby."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -62,9 +62,9 @@ def jumps(
 ) -> tuple[Jump, ...]:
     """Find the jumps of a response against time.
 
-    At each interval straight lines are fitted to the logarithm of the response before and after. A jump is
-    a local maximum of their difference of at least 1.5 dB and 8 standard errors. Resonances of a linear
-    specimen are excluded: they are steep, and ring in a fast sweep. The place of a jump maximises the
+    At each interval straight lines are fitted to the logarithm of the response before and after. A jump is a
+    local maximum of their difference of at least 1.5 dB and 8 standard errors. Resonances of a linear
+    specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump maximises the
     likelihood; its bounds come from the likelihood ratio.
 
     Parameters
@@ -75,8 +75,8 @@ def jumps(
         Intervals with smooth motion, by default all. At least one side of a jump must be smooth, because a
         chaotic response fluctuates without jumps.
     linear
-        Response of the linear specimen in the same sweep, positive, if known: the step must be twice as large
-        as any of its steps nearby.
+        Response of the linear specimen in the same sweep, positive, if known. A jump must be twice as large
+        as any step of this response nearby.
     """
     if not time_s.shape == frequency_hz.shape == response.shape:
         raise InvalidRequest(
@@ -128,7 +128,7 @@ def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
 
 
 def _is_resonance(logarithm: Reals, place: int, step: float) -> bool:
-    """Return whether a mode explains the response around a step: 1/response squared is smooth."""
+    """Return whether a resonance explains a step: 1/response squared follows a smooth polynomial."""
     near = logarithm[max(0, place - _SIDE - _TRANSITION) : place + _SIDE + _TRANSITION]
     square = np.exp(2 * (near.max() - near))
     basis = np.vander(np.linspace(-1.0, 1.0, near.size), _DEGREE + 1) / square[:, np.newaxis]
@@ -138,7 +138,7 @@ def _is_resonance(logarithm: Reals, place: int, step: float) -> bool:
 
 
 def _peaks(size: Reals) -> list[int]:
-    """Return the largest step of each neighbourhood."""
+    """Return the place of the largest step in each neighbourhood."""
     left = size.copy()
     found = []
     while left.max(initial=0.0) > 0.0:
@@ -149,7 +149,7 @@ def _peaks(size: Reals) -> list[int]:
 
 
 def _likely(logarithm: Reals) -> tuple[int, int, int]:
-    """Return the lowest, best and highest place of one step, from the likelihood of two levels."""
+    """Return the lower bound, best value and upper bound of the place of a step between two levels."""
     count = logarithm.size
     misfit = np.full(count, np.inf)
     for place in range(2, count - 1):
@@ -182,10 +182,10 @@ def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, loga
 
 
 JUMP_FACTOR = 2.0
-"""Change of Response II between two levels that counts as a jump; a linear response does not change."""
+"""Least ratio of Response II between two levels for a jump; for a linear specimen the ratio is 1."""
 
 _UNSTEADY = 0.05
-"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as above."""
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as larger."""
 
 
 @dataclass(frozen=True)
@@ -197,14 +197,14 @@ class LevelJump:
     before_vpp: float
     after_vpp: float
     factor: float
-    """Ratio of Response II after the jump to before."""
+    """Response II after the jump divided by Response II before."""
 
 
 def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
-    """Find the jumps of a stepped level, in the order of time, but not across a turning point.
+    """Return the jumps of a stepped level in the order of time, except across a turning point.
 
-    A step during which the motion jumps shows a mean of both, so the steps before and after it are
-    compared.
+    If the motion jumps during a step, its response is a mean of two motions. Such a step is skipped, and the
+    steps before and after it are compared.
     """
     levels, sizes = response.amplitude_vpp.tolist(), response.response_ii.tolist()
     steps = list(zip(response.direction, levels, sizes, strict=True))
@@ -223,7 +223,7 @@ def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
     """Return the smallest and largest difference between the levels of the jumps up and down [V].
 
-    None without both jumps.
+    None unless there are jumps in both directions.
     """
     rises = [each for each in jumps if each.direction == "up" and each.factor > 1]
     falls = [each for each in jumps if each.direction == "down" and each.factor < 1]
@@ -261,20 +261,20 @@ _PER_BEL_DB = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Hysteresis(Labelled):
-    """Dependence on the direction of a sweep; arrays of shape (points,)."""
+    """Difference between an up sweep and a down sweep; arrays of shape (points,)."""
 
     frequency_hz: Reals
     up: Reals
     down: Reals
     """Response II of both sweeps."""
     differs: Flags
-    """Where both differ by more than 1.5 dB, averaged over 2 % of the band."""
+    """Points where the sweeps differ by more than 1.5 dB, averaged over 2 % of the band."""
     pairs: tuple[tuple[Jump, Jump], ...]
     """Pairs of opposite jumps: (up sweep, nearest in the down sweep)."""
 
     @property
     def widths_hz(self) -> tuple[tuple[float, float, float], ...]:
-        """Width of each pair with bounds: frequency in the up sweep minus that in the down sweep."""
+        """Width and bounds of each pair: jump frequency of the up sweep minus that of the down sweep."""
         return tuple(
             (
                 up.frequency_hz - down.frequency_hz,

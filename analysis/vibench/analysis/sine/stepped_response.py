@@ -40,7 +40,7 @@ from ..tones.sine_fit import fit_sine
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
-"""Plans that are recorded by frequency or by level."""
+"""Plans that are recorded in steps of frequency or level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end."""
 _OF_A_STEP = (
@@ -52,7 +52,7 @@ _OF_A_STEP = (
 
 @dataclass(frozen=True)
 class SteppedResponse(Labelled):
-    """One value per step in the order of playing; arrays of shape (steps,)."""
+    """Results of a stepped sine, one value per step in the order of playing; arrays of shape (steps,)."""
 
     DOCUMENT: ClassVar = (
         "frequency_hz direction drive_amplitude_m response_i noise_bias_i noise_error_i response_ii "
@@ -120,10 +120,10 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
     line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).real
     inside = line[edge:-edge]
-    # Sensor drift would be a jump where the record is continued, and integration amplifies it.
+    # Remove sensor drift: it would jump where the record is continued, and integration amplifies jumps.
     data[-1] = scipy.signal.detrend(data[-1] - inside) + inside
-    # Outside the step, frequency or level differed, and integration would mix that in. The sine is continued
-    # exactly, and the rest by copies.
+    # Outside the step, frequency or level differ, and integration would mix them in. Instead, continue the
+    # sine exactly, and the rest by copies.
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     response += line - inside[places]
@@ -147,7 +147,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
 def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Integers:
     """Return the indices that continue a record at both ends, shape (samples + 2 edge,).
 
-    The record is continued periodically; the number of drive periods is that which fits the response best.
+    The record is continued by copies of its ends, as many drive periods long as fits the response best.
     """
     before = _repeats_after(data[-1], period_samples)
     after = _repeats_after(data[-1, ::-1], period_samples)
@@ -219,7 +219,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
 
 
 def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
-    """Return a sentence on the kinds of recorded motions; period one is not mentioned."""
+    """Yield sentences on the kinds of recorded motions and on missed levels; period one is omitted."""
     count = Counter((each.motion, each.period) for each in steps)
     kinds = [
         f"period {period}: {count[Steadiness.PERIODIC, period]}"
@@ -307,7 +307,7 @@ class TrackedResonance:
 
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
-    """Return the levels at which the resonance was found, weakest first."""
+    """Return the resonances that were found, sorted from the weakest base level."""
     return tuple(sorted(_found_levels(notes), key=lambda each: each.base_m_per_s2))
 
 

@@ -85,7 +85,7 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
 
 
 def _band(frequency_hz: Reals, low_hz: float, high_hz: float) -> Reals:
-    """Band of positive frequencies around the drive; cosine edges limit the ringing to a few cycles."""
+    """Return the weights of a band around the drive; cosine edges limit the ringing to a few cycles."""
     rise = (frequency_hz / low_hz - (1 - _MARGIN)) / (_MARGIN / 2)
     fall = ((1 + _MARGIN) - frequency_hz / high_hz) / (_MARGIN / 2)
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(np.minimum(rise, fall), 0.0, 1.0)))
@@ -115,13 +115,13 @@ _LINEAR_ABOVE = 5.5
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Relative difference of the largest Response II from the linear run, above which the motion differs."""
+"""Largest relative difference of the largest Response II from linear simulation for the same motion."""
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
-"""Periods of the band's lower edge after which the error of a bridge three times the motion is 2 %."""
+"""Periods of the band's lower edge in which a bridge's error of three times the motion decays to 2 %."""
 _ROOM = 1.1
-"""Relative margin of the interval length, because the first may start slightly below the band."""
+"""Factor on the interval length, because the first interval may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 """Sixth difference with unit gain for white noise, which removes the smooth motion."""
@@ -129,7 +129,7 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 
 @dataclass(frozen=True)
 class SweptMotion(Labelled):
-    """Quantities by which draws of a sweep are compared; arrays of shape (intervals,) unless stated."""
+    """Quantities of a recorded or simulated sweep (draw); arrays of shape (intervals,) unless stated."""
 
     OWN_UNITS: ClassVar = {
         "upper": "m s-1",
@@ -164,20 +164,20 @@ class SweptMotion(Labelled):
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: Reals
     phase_rad: Reals
-    """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    """Phase of x ahead of the base displacement at the drive frequency, without the channels' delay."""
     is_clear: Flags
     """Intervals without a drop-out, shape (intervals,)."""
     noise_rms: float
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
-    """Residual relative to order 1, of the specimen without contact in this sweep; NaN without a specimen."""
+    """Residual relative to order 1, simulated without contact in this sweep; NaN without a specimen."""
     linear_ii: Reals
-    """Response II of the specimen without contact in this sweep, with its ringing."""
+    """Response II, simulated without contact in this sweep, including ringing."""
     linear_impacts: Reals
-    """Orders 2 and 3 relative to order 1 in this response, from modes that still ring at twice the drive."""
+    """Orders 2 and 3 relative to order 1 in the same simulation: modes may ring at twice the drive."""
     steady_over_swept: float
-    """Ratio of the largest Response II without contact under steady sines to that in this sweep; NaN if the
-    measured one differs, for example while the specimen still rings."""
+    """Largest Response II without contact under steady sines, divided by the largest in this sweep. NaN if
+    the measured Response II differs, for example while the specimen still rings."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
@@ -221,7 +221,7 @@ Transmission = Callable[[Reals], Complexes]
 
 
 class SweepSums:
-    """Sums of a sweep that arrives in blocks; keeps about a sixth of the record.
+    """Analysis of a sweep that arrives in blocks; keeps about a sixth of the samples.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ class SweepSums:
     interval_s
         Length of one interval; half orders need two cycles of half the drive frequency.
     clock
-        Phase of the drive, if known; blocks need no drive then.
+        Phase of the drive, if known; the drive in the blocks is then ignored.
     """
 
     def __init__(
@@ -254,7 +254,7 @@ class SweepSums:
         self._interval = max(1, round(interval_s * self._rate_hz))
         self._low_hz, self._high_hz = low_hz, high_hz
         self._before = self._after = 0
-        """Number of samples added beside the sweep."""
+        """Number of samples added before and after the sweep."""
         self._clock = clock
         self._first_row = _DRIVE if clock is None else _BASE
         self._decimator = Decimator(3 - self._first_row, self._factor)
@@ -272,8 +272,8 @@ class SweepSums:
     def add_neighbour(self, block: Reals, bridged: Flags | None = None) -> None:
         """Add the record directly before or after the sweep.
 
-        Without it, integration of velocity makes the largest |x| of the first and last intervals wrong by
-        up to a third.
+        Without this record, integration of velocity makes the largest |x| of the first and last intervals
+        wrong by up to a third.
         """
         if self._extremes:
             self._after += block.shape[1]
@@ -330,7 +330,7 @@ class SweepSums:
         )
 
     def motion(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweptMotion:
-        """Return the quantities by which draws are compared; see `response`."""
+        """Return the quantities that simulated records (draws) need; see `response`."""
         return self._analysed(delay_s, linear)[0]
 
     @property
@@ -465,7 +465,7 @@ class SweepSums:
 
 
 def _largest_steady(linear: Transmission, low_hz: float, high_hz: float) -> float:
-    """Return the largest magnitude between two frequencies, including narrow modes."""
+    """Return the largest magnitude of a transmission between two frequencies, including narrow modes."""
     hz, step_hz = np.linspace(low_hz, high_hz, _STEADY_POINTS, retstep=True)
     steady = np.abs(linear(hz))
     rising = np.diff(steady) > 0

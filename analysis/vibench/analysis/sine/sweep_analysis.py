@@ -57,7 +57,7 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 
 
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
-    """Find the jumps of Response II that have a smooth motion on one side.
+    """Return the jumps of Response II that have a smooth motion on at least one side.
 
     Without a description of the specimen, only jumps where collisions begin or end are returned: others may
     be the ringing of a fast sweep.
@@ -120,7 +120,7 @@ def measured_sweep(
 
 
 class SweepDraws:
-    """Analysis of draws of one recorded sweep, which share its drive."""
+    """Analysis of simulated records (draws) of one recorded sweep, which all have its drive."""
 
     def __init__(self, sweep: Sweep, specimen: Specimen | None) -> None:
         self._sweep, self._specimen = sweep, specimen
@@ -145,10 +145,10 @@ def _without_contact(specimen: Specimen | None) -> Transmission | None:
 
 
 def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) -> float:
-    """Add the sweep and the record beside it, and return the start of the sums [s]."""
+    """Add the sweep and the samples before and after it; return the start of the analysed part [s]."""
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
     rate = channels.sample_rate_hz
-    # If the record beside the sweep is incomplete, the end of the sweep replaces it.
+    # If samples before or after the sweep are missing, an end of the sweep replaces them.
     reach = min(sums.neighbour_samples, stretch.samples // 4)
     start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
     stop = stretch.stop - (0 if _is_whole(channels, stretch.stop, stretch.stop + reach) else reach)
@@ -193,11 +193,11 @@ def _corrected(found: M, channels: Channels, first_s: float) -> M:
 
 
 _SAME = 1e-3
-"""Relative tolerance of a frequency; two clocks differ by a tenth of it."""
+"""Relative tolerance of a frequency; two clocks differ by a tenth of this."""
 
 
 def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:
-    """Compare each measured drive frequency with the nearest of the plan [Hz]."""
+    """Compare each measured drive frequency with the nearest planned frequency [Hz]."""
     nearest = planned_hz[np.argmin(np.abs(found_hz[:, np.newaxis] - planned_hz), axis=1)]
     off = np.abs(found_hz / nearest - 1)
     worst = int(np.argmax(off))
