@@ -51,7 +51,7 @@ class TrackedOrders(Labelled):
         return np.abs(self.value)
 
     def order(self, number: float) -> Complexes:
-        """Complex amplitudes of one order, shape (intervals,)."""
+        """Return the complex amplitudes of one order, shape (intervals,)."""
         if number not in self.orders:
             raise InvalidRequest(f"order {number:g} was not tracked; tracked are {self.orders}")
         chosen: Complexes = self.value[self.orders.index(number)]
@@ -80,9 +80,9 @@ def tracked_together(
 ) -> tuple[TrackedOrders, ...]:
     """Fit all orders at once to each interval of signals, by least squares.
 
-    One order at a time would be biased by the others whenever an interval is not a whole number of
-    *subharmonic* periods. A straight line and a linear change of order 1 are fitted too: drift of a sensor
-    or a sweep through a resonance then leaves no residual.
+    In separate fits, the other orders would bias each order if an interval is not a whole number of
+    *subharmonic* periods. A straight line and a linear change of order 1 are fitted too, so that sensor drift
+    or a sweep through a resonance leaves no residual.
 
     Parameters
     ----------

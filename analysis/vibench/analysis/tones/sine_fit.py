@@ -33,9 +33,9 @@ class Peak:
     sd_frequency_hz: float
     """Standard deviation from the noise around the line; zero without noise."""
     amplitude: float
-    """Peak amplitude, corrected for lying between lines [unit of the spectrum]."""
+    """Amplitude of the peak, corrected for its position between lines [unit of the spectrum]."""
     floor: float
-    """Median amplitude of the lines around it [unit of the spectrum]."""
+    """Median amplitude of the lines around the peak [unit of the spectrum]."""
 
 
 def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int) -> tuple[Peak, ...]:
@@ -98,7 +98,7 @@ _SEARCH = 0.2
 
 @dataclass(frozen=True)
 class FittedSine:
-    """amplitude cos(2 pi frequency_hz t + phase_rad), t counted from the first sample."""
+    """Fitted sine amplitude cos(2 pi frequency_hz t + phase_rad), with t = 0 at the first sample."""
 
     frequency_hz: float
     sd_frequency_hz: float
@@ -112,14 +112,14 @@ class FittedSine:
 def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
     """Fit a sine and a straight line by least squares, frequency included (IEEE Std 1057, four parameters).
 
-    The straight line, which is not in the standard, takes up the drift of a sensor.
+    The straight line, which is not in the standard, absorbs the drift of a sensor.
 
     Raises UnusableData when no spectral line near ``near_hz`` stands above the noise.
 
     Parameters
     ----------
     samples
-        Shape (samples,), some ten cycles or more.
+        Signal of at least about ten cycles, shape (samples,).
     near_hz
         Expected frequency, within 20 %.
     """
@@ -167,12 +167,12 @@ def _kept_sine(recorded: bytes, sample_rate_hz: float, near_hz: float) -> Fitted
 
 
 def steady_phase(samples: int, cycles_per_sample: float, phase_rad: float) -> Reals:
-    """Phase of a steady sine at every sample [rad]."""
+    """Return the phase of a steady sine at every sample [rad]."""
     return 2 * np.pi * cycles_per_sample * np.arange(samples, dtype=np.float64) + phase_rad
 
 
 _SCATTER_BLOCKS = 10
-"""Parts of the window whose scatter gives the uncertainty, which includes slow changes."""
+"""Number of parts of the window; their scatter gives the uncertainty, including slow changes."""
 _ORDERS = (1.0, 2.0, 3.0)
 
 
@@ -204,7 +204,7 @@ class NoiseDriveLevel:
     """RMS acceleration of the base [m/s2]."""
     rms_displacement_m: float
     relative_sd: float
-    """Relative standard deviation of both, from independent averages and lines."""
+    """Relative standard deviation of both rms values, from independent averages and lines."""
 
 
 def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: float) -> DriveLevel:
@@ -256,7 +256,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
 _REACH_SD = 7.0
 """Noise beyond this many standard deviations is neglected (1e-12 per sample)."""
 _GRID = 141
-"""Number of points, ten per standard deviation: the integral errs by 1e-3 of a standard deviation."""
+"""Number of points, ten per standard deviation; the integration error is 1e-3 standard deviations."""
 
 
 class NoiseLift(NamedTuple):
@@ -272,8 +272,8 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
     """Return the rise of max|x| by Gaussian noise, expected and root mean square.
 
     Both follow from the distribution of the maximum, P(max < z) = prod_j P(|x_j + n_j| < z). Here x_j is the
-    largest of the samples with one noise value n_j. Noise alone over 51 200 samples gives 4.4 standard
-    deviations. The samples are taken as the true motion, although they may contain the noise.
+    largest of the samples that share the noise value n_j. Noise alone over 51 200 samples gives 4.4 standard
+    deviations. The samples are taken as the true motion, although they may contain noise.
 
     Parameters
     ----------
