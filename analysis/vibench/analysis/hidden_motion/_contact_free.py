@@ -115,7 +115,7 @@ def free_motion(
 
 
 def _at_stops(rows: Reals) -> Flags:
-    """Return which rows are impacts at a stop."""
+    """Return flags of the rows that are impacts at a stop."""
     kept = np.zeros(len(rows), dtype=np.bool_)
     if not len(rows):
         return kept
@@ -181,7 +181,7 @@ def _extrapolate(values: Reals, far: int, near: int, place: float) -> float:
 
 
 def _between(values: Reals, slopes: Reals, t: float) -> float:
-    """Interpolate between two samples by the cubic with their slopes (per sample)."""
+    """Interpolate between two samples by the cubic with their values and slopes (per sample)."""
     (a, b), (da, db) = values, slopes
     return float(
         a * (1 + 2 * t) * (1 - t) ** 2 + da * t * (1 - t) ** 2 + b * t**2 * (3 - 2 * t) + db * t**2 * (t - 1)
@@ -208,10 +208,10 @@ class _GapLine:
 
 
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Return both gaps from |p| at the centre of contacts over the impulse; None if undetermined.
+    """Return both gaps from |p| at the centre of contacts against the impulse; None if undetermined.
 
-    Harder impacts indent a stop more: |p| over J^0.8 is a straight line that starts at the gap. It is
-    fitted robustly with one slope for both sides.
+    Harder impacts indent a stop more: |p| against J^0.8 is a straight line that starts at the gap. The fit is
+    robust and has one slope for both sides.
     """
     return _gap_line(impacts).gaps
 
@@ -219,8 +219,8 @@ def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
 def free_loss(impacts: FreeImpacts) -> float | None:
     """Return the loss of the stops [s/m] from speeds before and after impacts; None if there are too few.
 
-    For a small loss of Hunt and Crossley's law, speed after / speed before = 1 - 2/3 loss * speed before.
-    The result only starts a search, since both extrapolated speeds are a few per cent low.
+    For a small loss of Hunt and Crossley's law, speed after / speed before = 1 - 2/3 loss * speed before. The
+    result is only a start value, since both extrapolated speeds are a few per cent low.
     """
     before, after = impacts.rate_before, impacts.rate_after
     good = (before > np.median(before)) & (after > 0.0) if before.size else before > 0.0
@@ -274,7 +274,7 @@ def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
 
 
 def _robust_line(matrix: Reals, target: Reals) -> tuple[Reals, Reals]:
-    """Fit with Huber's weights; return the solution and its covariance."""
+    """Fit a linear model with Huber's weights; return the solution and its covariance."""
     weight = np.ones(target.size)
     for _ in range(_HUBER_ROUNDS):
         solution, *_ = np.linalg.lstsq(matrix * weight[:, None], target * weight)
@@ -367,7 +367,7 @@ class Collisions(Labelled):
 
 
 def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiece) -> Collisions:
-    """Simulate every contact that starts in a piece, from the smoothed flight before it."""
+    """Return the contacts that start in a piece, simulated from the smoothed flight before each."""
     smoothed, tables = piece.smoothed, model.tables
     samples = smoothed.states.shape[0]
     rows = np.empty((samples + 1, _COLUMNS))

@@ -31,7 +31,7 @@ from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m,
 _WANDER = 0.02
 """Random walk of parameters per block, relative to their prior sd; it prevents early overconfidence."""
 REBUILT_S = 0.05
-"""Interval after which the tables are computed for the current parameters [s]."""
+"""Interval after which the tables are updated to the current parameters [s]."""
 _LOST = (
     f"each track was lost within {REBUILT_S:g} s of the search for parameters, so the values taken as "
     "described (m0, m2, k1, kind of contact) may be wrong"
@@ -46,18 +46,18 @@ _FURTHEST = 8.0
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters at the end of a stretch of motion."""
+    """Parameters estimated at the end of a stretch of motion."""
 
     tracked: TrackedSpecimen
     wanted: tuple[Hidden, ...]
     begun_at: Reals
-    """Start of the search, shape (parameters,), SI."""
+    """Start values of the search, shape (parameters,), SI."""
     prior_sd: Reals
     """Prior standard deviations, shape (parameters,)."""
     moved: Reals
-    """Deviations from the start in prior standard deviations, shape (parameters,)."""
+    """Deviations from the start values in prior standard deviations, shape (parameters,)."""
     covariance: Reals
-    """Covariance by the filter in units of the prior, shape (parameters, parameters)."""
+    """Covariance of the filter in units of the prior, shape (parameters, parameters)."""
     wandered: float
     """Variance that the random walk added to each parameter, in units of the prior."""
     followed_s: float
@@ -72,7 +72,7 @@ def estimate(
     first: int,
     stop: int,
 ) -> Estimate | str:
-    """Find parameters between two samples of a motion; return the reason as a sentence if that fails.
+    """Estimate parameters between two samples of a motion; return a sentence with the reason on failure.
 
     ``relative_sd`` has the prior standard deviation of each wanted parameter relative to ``start``.
     """
@@ -97,7 +97,7 @@ class _Search:
         self._followed, self._level = 0, math.nan
 
     def over(self, first: int, stop: int) -> Estimate | str:
-        """Track from one sample to another; restart after every loss."""
+        """Track from ``first`` to ``stop`` and return the estimate; restart after every loss of the track."""
         rate = self._motion.sample_rate_hz
         block = round(REBUILT_S * rate)
         at: FilterState | None = None
@@ -168,7 +168,7 @@ class _Search:
         return [step_tables(each, rate, coupling) for each in (current, *raised)]
 
     def _block(self, model: MotionModel, at: FilterState, count: int) -> bool:
-        """Filter some samples; return whether the track held."""
+        """Filter ``count`` samples; return whether the track held."""
         size = STATES + len(self._wanted)
         noise = np.zeros((size, size))
         noise[:STATES, :STATES] = model.step_noise
@@ -203,14 +203,14 @@ class _Search:
 _TELLING_LOSS = 0.15
 """Smallest loss [s/m] for which speeds at impacts are more accurate than the description."""
 _LAW_UNKNOWN = 0.3
-"""Relative error of a depth computed with the described law, which may be wrong."""
+"""Relative error of a penetration depth computed with the described contact law."""
 _FREE_S = 3.0
 
 
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Return start values found without a contact model, and their prior or the reason for having none."""
+    """Return start values found without a contact model, and their prior or the reason for its absence."""
     rate = motion.sample_rate_hz
     fitted, sds = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
@@ -248,7 +248,7 @@ def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]
 
 
 def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Return gaps for impacts that are all alike: |p| minus the depth by the described law."""
+    """Return the gaps from impacts of similar strength: |p| minus the depth by the described law."""
 
     def gap(side: float) -> FreeGap | None:
         here = impacts.sides == side

@@ -16,7 +16,7 @@ from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_ta
 _DIFFUSION_OF_GAP = 7e-6
 """Model error of each mass: random displacement relative to the gap, per root millisecond."""
 _DIFFUSION_OF_SPEED = 2e-5
-"""The same for random speed, relative to the gap times the highest natural frequency [rad/s]."""
+"""The same for random velocity, relative to the gap times the highest natural frequency [rad/s]."""
 _DRIFT_M_PER_S2 = 1e-3
 """Random walk of the accelerometer's slow error per root second."""
 _ACCELERATION_EXCESS = 1.5
@@ -125,7 +125,7 @@ class Filtered:
         return {each.name: getattr(self, each.name) for each in fields(self)[1:]}
 
     def samples(self, begin: int, end: int | None = None) -> "Filtered":
-        """Return some of the samples."""
+        """Return the samples from ``begin`` to before ``end``."""
         return Filtered(self.first + begin, *(each[begin:end] for each in self.arrays.values()))
 
     @property
@@ -175,9 +175,9 @@ def move_filter(
     force_variance: Reals = _NOTHING,
     record: Structure | None = None,
 ) -> int:
-    """Advance ``at`` by up to ``count`` samples; return how many were done before a loss.
+    """Advance ``at`` by up to ``count`` samples; return the number of samples before a loss.
 
-    Each table after the first has one parameter changed by its deviation.
+    In each table after the first, one parameter is changed by its deviation.
     """
     engine, first = native_engine(), tables[0]
     work = engine.new(
@@ -222,7 +222,7 @@ class Smoothed:
     first_covariance: Reals
     """Covariance of the first state, shape (8, 8)."""
     touched: Flags
-    """Steps with contact."""
+    """Flags of steps with contact."""
 
     @property
     def p(self) -> Reals:
@@ -236,7 +236,7 @@ class Smoothed:
 
 
 def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) -> Smoothed:
-    """Smooth a run of the filter backwards."""
+    """Smooth a run of the filter backwards in time."""
     count = run.states.shape[0]
     states, variances = np.empty((count, STATES)), np.empty((count, 2))
     forces, matrix = np.empty((force_variance.size, 2)), np.empty((STATES, STATES))

@@ -1,4 +1,4 @@
-"""Forecast of m1 for some milliseconds under a steady sine, with its observed error."""
+"""Forecast of m1 for 40 ms under a steady sine, with the error of earlier forecasts."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -57,7 +57,7 @@ class Forecaster:
         states: Reals,
         frequency_hz: float,
     ) -> Forecast | None:
-        """Forecast the motion after ``at``; ``states`` are those of the newest samples.
+        """Return the forecast of p after ``at``; ``states`` are the states at the newest samples.
 
         None if the filter cannot follow the forecast base motion to its end.
         """

@@ -32,18 +32,18 @@ _FITTING_LEVEL = 1.6
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 """Shifts of gaps found without a contact model, in standard deviations, tried if no track holds."""
 _LARGEST_SD = 0.5
-"""Largest standard deviation of a determined parameter, relative to that of the description."""
+"""Largest standard deviation of a determined parameter, relative to the description's."""
 _WIDE = 3.0
-"""Standard deviation of the wide prior that replaces a narrow one, relative to that of the description."""
+"""Standard deviation of the wide prior that replaces the narrow prior, relative to the description's."""
 _FAR = 3.0
 """Largest standard deviation of a determined parameter, relative to the narrow prior."""
 _SETTLED = 1.0
-"""Largest distance between a value without and with the narrow prior, in standard deviations of it."""
+"""Largest distance between the values without and with the narrow prior, in sd of this prior."""
 _ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
-"""Relative standard error of a squared frequency by a converter clock within 50 ppm, which nothing shows."""
+"""Relative standard error of a squared frequency by the unknown error of the clock, up to 50 ppm."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,
@@ -110,7 +110,7 @@ class FoundParameter:
 
     @property
     def row(self) -> tuple[str, str, str]:
-        """Name, value with 95 % bounds or the reason for none, and described value."""
+        """Name, value with 95 % bounds (or why it is not determined), and described value."""
         label, factor, unit = _SHOWN[self.what]
         reason = self.not_determined and f"not determined: {self.not_determined}"
         value = with_unit(factor * self.value, factor * self.half_width, unit)
@@ -119,17 +119,17 @@ class FoundParameter:
 
 @dataclass(frozen=True, eq=False)
 class FoundSpecimen(Labelled):
-    """Parameters that were found, and the specimen for tracking."""
+    """Parameters found from collisions, and the specimen for tracking."""
 
     tracked: TrackedSpecimen
     parameters: tuple[FoundParameter, ...]
     restarts: int
     searched: bool
-    """Whether tracking failed with the description."""
+    """Whether parameters were searched because tracking with the description failed."""
 
 
 def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundSpecimen:
-    """Find the parameters that collisions determine."""
+    """Return the parameters that collisions determine, and the specimen for tracking."""
     if described.steepness == 0.0:
         return _nothing(described, "the specimen is described without stops")
     if _can_be_tracked(described, motion):
@@ -170,7 +170,7 @@ def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estima
 def _refine(
     described: TrackedSpecimen, motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> FoundSpecimen | str:
-    """Find parameters near a start; repeat from the result until it converges."""
+    """Find parameters near start values; repeat from the result until it converges."""
     wanted = tuple(near)
     for _ in range(_ROUNDS):
         good = _restarts(motion, start, near)
@@ -209,7 +209,7 @@ def _restarts(
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        # If a shifted start fails, try the start itself, then the result.
+        # If a shifted start fails, try the start itself, then the latest result.
         for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
             answer = estimate(begin, motion, near, first, stop)
             if _is_held(answer, motion):
@@ -238,7 +238,7 @@ class _Combined:
     assumed: Reals
     """Standard deviation of the description."""
     beyond: Reals
-    """Distance of the values from those with the narrow prior."""
+    """Distance between the values without and with the narrow prior."""
 
 
 def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
@@ -268,9 +268,9 @@ def combine(found: list[Estimate], described: TrackedSpecimen, independent: floa
 def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
     """Replace the narrow prior by a wide one; return values, claimed and likely variances.
 
-    The filter needs a narrow prior to keep its track. With it, weakly determined parameters would stay at the
-    description, with bounds as narrow as the prior. In units of that prior the information of the motion is
-    J = P^-1 - 1.
+    The filter needs a narrow prior to keep its track. With this prior, weakly determined parameters would
+    stay at the description, with bounds as narrow as the prior. In units of the narrow prior, the information
+    in the motion is J = P^-1 - 1.
     """
     size = len(found.wanted)
     inverse = np.linalg.inv(found.covariance)
@@ -281,8 +281,8 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     pull = weak @ ((centre - found.begun_at) / found.prior_sd)
     moved = freed @ (inverse @ found.moved + pull)
     variance = np.diag(freed)
-    # The random walk of a well determined parameter overstates its variance; for a hardly determined one
-    # the stated bounds are right.
+    # For a well determined parameter, the random walk overstates the variance; for a weakly determined
+    # parameter, the variance is right.
     wandering = found.wandered / (found.wandered + np.diag(found.covariance))
     part = np.array([SEARCHES[each].claimed for each in found.wanted])
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
@@ -315,7 +315,7 @@ def without_values(found: FoundSpecimen, why: str) -> FoundSpecimen:
 
 
 def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
-    """Spread the restarts evenly over the motion."""
+    """Return the stretches of the restarts, spread evenly over the motion."""
     length = min(round(_STRETCH_S * motion.sample_rate_hz), motion.samples)
     number = min(_MOST_RESTARTS, max(_FEWEST_RESTARTS, motion.samples // length))
     firsts = np.linspace(0, motion.samples - length, number).astype(int)
@@ -323,7 +323,7 @@ def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
 
 
 def _apart(start: TrackedSpecimen, near: Mapping[Hidden, float], number: int) -> TrackedSpecimen:
-    """Shift the start of each restart, in a fixed pattern of signs."""
+    """Return the shifted start values of a restart, in a fixed pattern of signs."""
     sign = {each: 1.0 if (number >> (place % 2)) % 2 else -1.0 for place, each in enumerate(near)}
     return with_values(
         start,

@@ -1,4 +1,4 @@
-"""Hidden motion of one recording, tracked and without a contact model."""
+"""Hidden motion of one recording, by tracking and by the method without a contact model."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -41,7 +41,7 @@ _MOST_EXCESS = 1.25
 _ALLOWED = 0.02
 """Allowed relative deviation due to mounting, alignment and local modes at the sensor."""
 _MOST_EXPECTED = 0.2
-"""Largest expected deviation for a verdict; for an accelerometer on a colliding mass, blows are noise."""
+"""Largest expected deviation for a verdict; for an accelerometer on a colliding mass, impacts are noise."""
 _MOST_SCALE = 0.05
 """Largest deviation of the scale from 1: both calibrations may be wrong by some per cent."""
 
@@ -54,13 +54,13 @@ class MassCheck:
     scale: float
     """Ratio of measured to tracked velocity."""
     unexplained: float
-    """Part of the measured velocity that the track does not explain (rms)."""
+    """Relative part of the measured velocity that the track does not explain (rms)."""
     expected: float
     """Unexplained part to be expected from noise, the track's uncertainty and the sensor's mounting."""
 
     @property
     def confirms(self) -> bool | None:
-        """Whether the track explains the measured velocity; None if the sensor cannot tell."""
+        """Whether the track explains the measured velocity; None if the sensor is not accurate enough."""
         if not self.expected <= _MOST_EXPECTED:
             return None
         return self.unexplained**2 <= _MOST_EXCESS * self.expected**2 and abs(self.scale - 1) <= _MOST_SCALE
@@ -82,7 +82,7 @@ class MeasuredMass:
 
     channel: str
     velocity: Reals
-    """Measured velocity [m/s], shape (samples,); NaN where it is not known."""
+    """Measured velocity [m/s], shape (samples,); NaN where unknown."""
     noise: float
     """Rms noise [m/s]."""
     _sums: Reals = field(default_factory=lambda: np.zeros(5))
@@ -94,7 +94,7 @@ class MeasuredMass:
         used = np.isfinite(measured) & (touched == 0)
         places = [_RATES[self.channel[:2]], W]
         tracked = piece.smoothed.states[used][:, places].sum(axis=1)
-        # This is the variance of the filter's predictions; the smoother's is smaller.
+        # Use the variance of the filter's predictions; the smoother's variance is smaller.
         variance = piece.run.covariances[used][:, places][:, :, places].sum(axis=(1, 2))
         measured = measured[used]
         self._sums += (
@@ -106,7 +106,7 @@ class MeasuredMass:
         )
 
     def check(self, level: float) -> MassCheck | None:
-        """Return the comparison; None without samples. ``level`` widens the track's variance."""
+        """Return the comparison; None without samples. A ``level`` above 1 widens the track's variance."""
         count, measured, both, tracked, variance = self._sums.tolist()
         if not count or not measured or not tracked:
             return None
@@ -206,7 +206,7 @@ class HiddenMotion(Labelled):
 
     @property
     def is_confirmed(self) -> bool:
-        """Return whether parameters were given or found, and no sensor refutes them; if not, omit bounds."""
+        """Whether parameters were given or found and no sensor refutes them; otherwise bounds are omitted."""
         if any(each.confirms is False for each in self.mass_checks):
             return False
         return self.found is None or any(each.is_determined for each in self.found.parameters)
@@ -278,10 +278,10 @@ def hidden_motion(
     Parameters
     ----------
     recording
-        Any with base acceleration and m0's velocity, at 10 kHz or more; finding the law needs 51.2 kHz.
+        Recording of base acceleration and m0's velocity at 10 kHz or more (51.2 kHz to find the law).
     specimen
-        Description; m0, m2 and k1 must be exact, the rest within some per cent. By default that in the
-        recording.
+        Description; m0, m2 and k1 must be exact, the rest within some per cent. By default the description in
+        the recording.
     start_s, stop_s
         Stretch of the recording [s]; by default all of it.
     numbers
@@ -361,7 +361,7 @@ def hidden_motion_of(
     observer: Observer = ignore_progress,
     masses: Sequence[MeasuredMass] = (),
 ) -> HiddenMotion:
-    """Apply both methods to a prepared motion, and check the track by the sensors of ``masses``."""
+    """Apply both methods to a prepared motion, and check the track against the sensors in ``masses``."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
     followed = _tracked_motion(motion, model, found, lambda sample: on_read(sample, motion.samples), masses)
@@ -435,7 +435,7 @@ def _tracked_motion(
 
 
 def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> str:
-    """Return the reason why the parameters cannot be the specimen's, if there is one."""
+    """Return the reason why the parameters do not fit the specimen; empty if they fit."""
     for each in checks:
         if each.confirms is False:
             return f"{each.channel} refutes a track with the numbers that were found"
@@ -461,7 +461,7 @@ def _gap_sd(found: FoundSpecimen | None) -> float:
 
 
 def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
-    """Return rows of parameters: name, value with 95 % bounds or the reason for none, description."""
+    """Return rows of parameters: name, value with 95 % bounds or a reason, and described value."""
     return tuple(each.row for each in motion.parameters)
 
 

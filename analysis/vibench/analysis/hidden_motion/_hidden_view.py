@@ -24,7 +24,7 @@ _LEAD_S = 0.15
 
 @dataclass(frozen=True)
 class HiddenViewRequest:
-    """A stretch of a recording."""
+    """Stretch of a recording to show, and the parameters to use."""
 
     path: Path
     low_s: float
@@ -52,7 +52,7 @@ class HiddenView(Labelled):
 
 
 def hidden_view(request: HiddenViewRequest) -> HiddenView:
-    """Estimate the hidden motion of a stretch.
+    """Return the hidden motion of the requested stretch.
 
     Raises AnalysisError as `hidden_motion` does.
     """

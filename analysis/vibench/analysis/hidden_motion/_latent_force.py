@@ -1,10 +1,10 @@
 """Motion and impacts without a contact law, with the contact force as an unknown.
 
-Two relations hold for any law: z follows from m0's motion through a stable first-order filter, and the sum
-of m1 y'' and m2 z'' contains no contact force. A Kalman smoother combines both, with a white force held
-over each sample. In flight the force is zero: windows around its peaks are found first, then the force is
-set to zero elsewhere (switched variance, Rogers and Friis, arXiv 2303.03858). This keeps the double integral
-of the second relation from drifting.
+Two relations hold for any law: z follows from m0's motion through a stable first-order filter, and the sum of
+m1 y'' and m2 z'' contains no contact force. A Kalman smoother combines both, with a white force held over
+each sample. In flight the force is zero: windows around its peaks are found first, then the force is set to
+zero elsewhere (switched variance, Rogers and Friis, arXiv 2303.03858). Otherwise the double integral of the
+second relation would drift.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ CLOSED_SHARE = 3e-4
 """Standard deviation of the force between impacts, relative to the first guess."""
 _LEAST_GUESS_N = 1e-3
 _SURPRISE = 25.0
-"""Squared normalised innovation above which an impact was overlooked."""
+"""Squared normalised innovation that shows an overlooked impact."""
 _MEDIAN_OF_SQUARE = 0.455
 """Median of the square of a standard normal variable."""
 _RERUNS = 3
@@ -45,9 +45,9 @@ class LatentMotion:
     run: Filtered
     smoothed: Smoothed
     is_open: Flags
-    """Samples with a possible contact force."""
+    """Flags of samples with a possible contact force."""
     is_dark: Flags
-    """Open samples in or near drop-outs."""
+    """Flags of open samples in or near drop-outs."""
     force_variance: Reals
     misfit: float
     """Mean squared normalised innovation without its largest 0.1 %; 1 for a good fit."""
@@ -88,7 +88,7 @@ def latent_motion(
 
 
 def latent_start(first: int) -> FilterState:
-    """Return a wide initial state at sample ``first``, of which nothing is known."""
+    """Return an unknown initial state at sample ``first``: zero with a wide covariance."""
     place, rate, base, error = _START_SD
     return FilterState(first, np.zeros(STATES), np.diag([place**2] * 3 + [rate**2] * 3 + [base**2, error**2]))
 
@@ -119,7 +119,7 @@ def _start_up(sample_rate_hz: float, count: int) -> int:
 
 
 def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tuple[Flags, bool]:
-    """Open a window just before every innovation that shows an overlooked impact."""
+    """Add a window just before every innovation that shows an overlooked impact."""
     squared = run.squared
     # Wrong parameters raise innovations everywhere; only outliers are impacts.
     usual = max(1.0, float(np.nanmedian(squared)) / _MEDIAN_OF_SQUARE)
@@ -132,7 +132,7 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
 
 
 def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
-    """Return the force variance: the mean square of each window, as in expectation maximisation."""
+    """Return the force variance: mean square force of each window, as in expectation maximisation."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
     begins, ends = edges[::2], edges[1::2]
     squares = np.concatenate(([0.0], np.cumsum(forces[:, 0] ** 2 + forces[:, 1])))

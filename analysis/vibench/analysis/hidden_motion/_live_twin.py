@@ -47,7 +47,7 @@ BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
 """Smallest mean time between false alarms [s]."""
 OUT_BY_CHANCE = 0.01
-"""Largest share of blocks that are outside without a change."""
+"""Largest share of blocks outside the usual level without a change."""
 _OUT_WHEN_CHANGED = 0.5
 _OUT_ADDS = math.log(_OUT_WHEN_CHANGED / OUT_BY_CHANCE)
 _IN_ADDS = math.log((1.0 - _OUT_WHEN_CHANGED) / (1.0 - OUT_BY_CHANCE))
@@ -55,7 +55,7 @@ THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
 """Number of blocks to learn the usual level."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block is outside above this multiple of the usual level and this number of standard deviations."""
+"""A block is outside if it exceeds 1.5 times the usual level and the usual level by 8 sd."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 
@@ -114,10 +114,10 @@ def keep_baseline(baseline: Baseline, path: Path) -> None:
 
 
 class ChangeWatch:
-    """Detect when the levels of blocks are no longer the usual ones."""
+    """Test for a change: whether the levels of blocks have left the usual level."""
 
     def __init__(self, usual: Level | None = None) -> None:
-        """``usual`` is the stored level; without one it is learnt from the first two seconds."""
+        """Start with the stored level ``usual``; without it, learn the level from the first two seconds."""
         self.usual = usual
         self._learnt: list[float] = []
         self._sum = 0.0
@@ -203,7 +203,7 @@ class LiveTwin:
         specimen: Specimen | None = None,
         known: dict[Hidden, KnownNumber] | None = None,
     ) -> None:
-        """Begin without samples.
+        """Start without samples.
 
         Raises InvalidRequest when the specimen's stops cannot be tracked; UnusableData when the bench lacks
         one of the two channels.
@@ -250,7 +250,7 @@ class LiveTwin:
         self._begin_anew(0)
 
     def begin_run(self, usual: Level | None) -> None:
-        """Discard the last motion, but not its parameters; ``usual`` is the level of the new excitation."""
+        """Discard the last motion but keep its parameters; ``usual`` is the level of the new excitation."""
         self.watch = ChangeWatch(usual)
         self.found = ()
         self._begin_anew(0)
@@ -301,7 +301,7 @@ class LiveTwin:
     def take(
         self, first_sample: int, acceleration: Reals, velocity: Reals, frequency_hz: float | None = None
     ) -> tuple[str, ...]:
-        """Add the next samples in channel units; after a hole, tracking restarts.
+        """Add the next samples; return sentences on changes. Tracking restarts after lost samples.
 
         Parameters
         ----------
@@ -435,7 +435,7 @@ class LiveTwin:
             self._find_at = self.next_sample + self._wait
 
     def _find(self, sentences: list[str]) -> None:
-        """Take a finished search for gaps and masses; start the next one in parallel with tracking."""
+        """Use the result of a finished parameter search; start the next search in parallel with tracking."""
         if self._finding is not None and self._finding.done():
             finding, self._finding = self._finding, None
             self._take_found(finding.result(), sentences)
@@ -454,7 +454,7 @@ class LiveTwin:
             return
         if Hidden.LOWER_GAP in parameters or Hidden.UPPER_GAP in parameters:
             self._find_at = np.iinfo(np.int64).max
-        # Dampers and contact law depend on the level, without a change of the specimen.
+        # Dampers and contact law depend on the level, even if the specimen does not change.
         compared = (
             parameters.values()
             if self.watch.has_changed

@@ -20,11 +20,11 @@ class Hidden(StrEnum):
     C0 = "c0_ns_per_m"
     C2 = "c2_ns_per_m"
     FORCE = "force_at_1um_n"
-    """Force of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT (1 + LOSS d')."""
+    """Force at an indentation d of 1 um: F = FORCE (d / 1 um)^EXPONENT (1 + LOSS d')."""
     EXPONENT = "contact_exponent"
     LOSS = "contact_loss_s_per_m"
     MEAN_GAP = "mean_gap_m"
-    """Mean gap of both sides, which statistics determine better than either gap."""
+    """Mean of both gaps; statistics determine it better than each gap."""
 
 
 class Search(NamedTuple):
@@ -40,7 +40,7 @@ class Search(NamedTuple):
     """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0
     """Ratio of actual errors to the filter's standard deviation; the random walk makes it smaller than 1.
-    Found on 31 random rigs; the slow tests check others."""
+    Determined on 31 random rigs; the slow tests check other rigs."""
 
 
 SEARCHES = {
@@ -61,7 +61,7 @@ NEAR = {what: search.near for what, search in SEARCHES.items()}
 
 
 def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Read one parameter [m, kg, kg/s, N/m, N, s/m; the exponent has no unit]."""
+    """Return one parameter [m, kg, kg/s, N/m, N, s/m; the exponent has no unit]."""
     specimen = tracked.specimen
     lower, upper = specimen.gaps_m
     (k0, _, k2), (c0, c1, c2) = specimen.stiffnesses, specimen.dampings
@@ -82,12 +82,12 @@ def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
 
 
 def scale_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Return the scale of relative distances: the parameter, or 1 s/m for the loss, which may be zero."""
+    """Return the scale of relative deviations: the parameter, or 1 s/m for the loss, which may be zero."""
     return 1.0 if what is Hidden.LOSS else value_of(tracked, what)
 
 
 def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> TrackedSpecimen:
-    """Return a copy with other values; k1 stays when m1 changes."""
+    """Return a copy with the given values; k1 stays the same if m1 changes."""
     new = {each: values.get(each, value_of(tracked, each)) for each in PRIOR_SD}
     m0, _, m2 = tracked.specimen.masses
     specimen = replace(

@@ -44,7 +44,7 @@ class ChannelNoise:
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
-    """A stretch of a recording without holes, corrected for dynamics and delays of the sensors.
+    """A stretch of a recording without lost samples, corrected for dynamics and delays of the sensors.
 
     Long stretches are stored in single precision, far below sensor noise.
     """
@@ -54,7 +54,7 @@ class PreparedMotion:
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]; bridged in drop-outs."""
     is_dark: Flags
-    """Samples in drop-outs, shape (samples,)."""
+    """Flags of samples in drop-outs, shape (samples,)."""
     sample_rate_hz: float
     coupling_rad_per_s: float
     first_sample: int
@@ -75,7 +75,7 @@ class PreparedMotion:
         return np.where(self.is_dark[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
-        """Return a stretch, with the noise of the whole."""
+        """Return a part of the motion, with the noise of the whole motion."""
         return replace(
             self,
             acceleration=self.acceleration[start:stop],
@@ -116,7 +116,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
 
 
 def dark_samples(dropouts: Sequence[Dropout], start: int, stop: int) -> Flags:
-    """Return which corrected samples from ``start`` to before ``stop`` are affected by drop-outs."""
+    """Return flags of the corrected samples from ``start`` to before ``stop`` that drop-outs affect."""
     is_dark = np.zeros(stop - start, dtype=np.bool_)
     for each in dropouts:
         first, behind = each.first - _DARK_MARGIN - start, each.stop + _DARK_MARGIN - start
@@ -144,7 +144,7 @@ def _motion(
 
 
 def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: float) -> PreparedMotion:
-    """Prepare samples already corrected for their sensors; raises like `prepared_motion`."""
+    """Return the motion of samples already corrected for their sensors; raises like `prepared_motion`."""
     _require_rate(sample_rate_hz)
     _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
     _require_finite(_lost_samples(acceleration, velocity))

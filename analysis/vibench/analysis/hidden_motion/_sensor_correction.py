@@ -26,7 +26,7 @@ class SensorCorrection:
     """Filters for both channels, and the AC coupling for the tracker."""
 
     acceleration: Reals
-    """Weights, shape (2 HALF_LENGTH + 1,), which also compensate for linear interpolation of samples."""
+    """Filter weights, shape (2 HALF_LENGTH + 1,); they also correct for linear interpolation."""
     velocity: Reals
     coupling_rad_per_s: float
     """Corner of the accelerometer's AC coupling, which the tracker corrects; 0 for DC."""
@@ -42,7 +42,7 @@ class SensorCorrection:
 def sensor_correction(
     bench: Mapping[str, Any], base: SensedChannel, response: SensedChannel, sample_rate_hz: float
 ) -> SensorCorrection:
-    """Design the filters from a recording's sensors; undescribed ones are taken as ideal."""
+    """Design the filters from a recording's sensors; undescribed sensors are assumed ideal."""
 
     def base_gain(frequency_hz: Reals) -> Complexes:
         interpolation = np.sinc(frequency_hz / sample_rate_hz) ** 2
@@ -56,7 +56,7 @@ def sensor_correction(
 
 
 def ideal_sensors(sample_rate_hz: float) -> SensorCorrection:
-    """Return a correction for the interpolation between samples only."""
+    """Return a correction only for the interpolation between samples."""
 
     def interpolation(frequency_hz: Reals) -> Complexes:
         return np.asarray(np.sinc(frequency_hz / sample_rate_hz) ** 2, dtype=np.complex128)
@@ -67,7 +67,7 @@ def ideal_sensors(sample_rate_hz: float) -> SensorCorrection:
 
 
 def _inverse(sensor: Callable[[Reals], Complexes], sample_rate_hz: float) -> Reals:
-    """Fit weights whose response is the inverse of a sensor's, least squares over the band."""
+    """Return weights whose response is the inverse of a sensor's, by least squares over the band."""
     cycles = np.linspace(0.0, 0.5, _FIT_POINTS)
     inside = cycles <= _EXACT_BAND
     target = np.where(inside, 1.0 / sensor(cycles * sample_rate_hz), 0.0)

@@ -28,11 +28,11 @@ _WORST_MISFIT = 3.0
 _ACQUIRED_EXCESS = 4.0
 """Factor on the covariance after acquisition, because the filter uses the same samples again."""
 _FLIGHT_MARGIN_S = 8e-5
-"""Shortest flight on each side of the first sample of a track [s]."""
+"""Shortest flight before and after the first sample of a track [s]."""
 _PIECE_S = 0.25
-"""Length filtered and smoothed at once [s]."""
+"""Length of motion that is filtered and smoothed at once [s]."""
 _OVERLAP_S = 0.02
-"""Length filtered beyond a piece, so that its end is smoothed too [s]; several times the filter's memory."""
+"""Length of motion filtered beyond a piece to smooth its end [s]; several times the filter's memory."""
 _GOOD = 2.5
 """Largest mean squared innovation over `_LOOK_S` in the valid part of a lost track."""
 _LOOK_S = 4e-3
@@ -69,7 +69,7 @@ class NotFollowed:
 
 
 def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterState | str:
-    """Start a track in the middle third of the 60 ms after a sample; return a sentence if this fails."""
+    """Start a track in the middle third of the 60 ms after a sample; return the reason if this fails."""
     count = min(round(ACQUISITION_S * motion.sample_rate_hz), motion.samples - 1 - first)
     if count < round(ACQUISITION_S * motion.sample_rate_hz):
         return f"fewer than {1e3 * ACQUISITION_S:.0f} ms of motion were left to begin a track with"
@@ -87,7 +87,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
 
 
 def _calmest(model: MotionModel, smoothed: Smoothed, is_open: Flags, sample_rate_hz: float) -> int | None:
-    """Return the flight sample of the middle third with the smallest uncertainty of p."""
+    """Return the flight sample in the middle third with the least uncertain p; None if all are uncertain."""
     count = is_open.size
     margin = max(1, round(_FLIGHT_MARGIN_S * sample_rate_hz))
     near = np.convolve(is_open, np.ones(2 * margin + 1), "same") > 0.5
@@ -108,7 +108,7 @@ def follow(
     motion: PreparedMotion,
     on_sample: Callable[[int], None] = lambda _sample: None,
 ) -> Iterator[TrackedPiece | NotFollowed]:
-    """Track a motion; return pieces and stretches between them in the order of time."""
+    """Track a motion; yield tracked pieces and the stretches between them in the order of time."""
     window = round(ACQUISITION_S * motion.sample_rate_hz)
     last = motion.samples - 1 - window
     looked, done = 0, 0

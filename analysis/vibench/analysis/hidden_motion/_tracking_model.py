@@ -12,9 +12,9 @@ from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 
 STATES = 8
-"""X, Y, Z and their rates relative to the base, the base's velocity W, the error B of its acceleration, SI.
+"""States X, Y, Z and rates relative to the base, base velocity W, error B of base acceleration, SI.
 
-They are followed by deviations of the estimated parameters. Equations: docs/hidden-motion.md.
+Deviations of the estimated parameters follow these states. Equations: docs/hidden-motion.md.
 """
 X, Y, Z, VX, VY, VZ, W, B = range(STATES)
 _SMALL_STEPS_A_CONTACT = 36
@@ -27,7 +27,7 @@ _MICROMETRE = 1e-6
 
 @dataclass(frozen=True)
 class TrackedSpecimen:
-    """A specimen whose contact law is F = f (d / 1 um)^n (1 + chi d') at the indentation d, all free."""
+    """A specimen with contact law F = f (d / 1 um)^n (1 + chi d') at indentation d; f, n, chi are free."""
 
     specimen: Specimen
     force_at_1um_n: float
@@ -43,7 +43,7 @@ class TrackedSpecimen:
 
 
 def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
-    """Return a described specimen for tracking; raises InvalidRequest when its stops do not yield."""
+    """Return a described specimen for tracking; raises InvalidRequest for rigid or unsuitable stops."""
     match specimen.contact:
         case RigidStops() | PowerLaw():
             raise InvalidRequest(
@@ -62,16 +62,16 @@ class StepTables:
     """Tables of a specimen for the filter."""
 
     flow: Reals
-    """Map from state, acceleration and its rise to the state a sample later, without stops; shape (8, 10)."""
+    """Matrix from state, acceleration and its rise to the next state, without stops; shape (8, 10)."""
     small_flow: Reals
-    """The same map for one small step."""
+    """The same matrix for one small step."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""
     force_input: Reals
-    """Shape (8,): state after a force of 1 N on m1 against m2, held over a sample."""
+    """State after a force of 1 N on m1 against m2 held over a sample, shape (8,)."""
     acceleration_input: Reals
-    """Shape (8,): state after 1 m/s2 held over a sample."""
+    """State after a base acceleration of 1 m/s2 held over a sample, shape (8,)."""
     step_s: float
 
 
@@ -98,7 +98,7 @@ def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Rea
 
 
 def exact_flow(a: Reals, inputs: Reals, step_s: float) -> Reals:
-    """Return the map of one step from state, input and the input's linear rise, shape (n, n + 2)."""
+    """Return the matrix of one step for state, input and the input's linear rise, shape (n, n + 2)."""
     n = len(a)
     joint = np.zeros((n + 2, n + 2))
     joint[:n, :n], joint[:n, n] = a * step_s, inputs * step_s
@@ -145,10 +145,10 @@ def indentation_m(tracked: TrackedSpecimen, approach_m_per_s: float) -> float:
 
 
 def small_steps_of(tracked: TrackedSpecimen, step_s: float) -> int:
-    """Return the small steps per sample that resolve the shortest collision."""
+    """Return the number of small steps per sample that resolve the shortest collision."""
     if tracked.steepness == 0.0:
         return _FEWEST_SMALL_STEPS
-    # The time to the deepest point and back is pi / 2 times that at constant speed.
+    # The time to the deepest point and back is pi / 2 times the time at constant speed.
     deepest_m = indentation_m(tracked, _FASTEST_APPROACH_M_PER_S)
     duration_s = math.pi * deepest_m / _FASTEST_APPROACH_M_PER_S
     return max(_FEWEST_SMALL_STEPS, math.ceil(step_s * _SMALL_STEPS_A_CONTACT / duration_s))
