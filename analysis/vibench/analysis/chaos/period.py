@@ -19,7 +19,7 @@ _REPEATED = 0.25
 """Largest share of the points' variance that may remain for a period above one."""
 _BLOCKS = 10
 _DRIFT = 5.0
-"""Largest drift [standard errors]; one settled record in 250 exceeds it (four quantities, eight blocks)."""
+"""Largest drift [standard errors]; 1 settled record in 250 exceeds it (4 slopes, 8 degrees of freedom)."""
 
 _STEADY_SCATTER = 0.9
 """Least ratio of the smaller to the larger scatter of the two halves of a settled record."""
@@ -63,11 +63,11 @@ class Points(Labelled):
 
 
 def shortest_period(points: Points) -> int | None:
-    """Find the fewest drive periods after which all points repeat within noise; None if they do not.
+    """Return the fewest drive periods after which all points repeat within noise; None if they do not.
 
-    The points of each phase are compared over the whole record, because slow changes are small from period
-    to period. Beyond their noise, they may scatter by 0.2 % of the orbit (unsteadiness of the drive), and
-    for a period above one by no more than half of the total scatter.
+    Points of the same phase are compared over the whole record, because slow changes are small from period to
+    period. Beyond their noise, they may scatter by 0.2 % of the orbit (unsteadiness of the drive), and for a
+    period above one by no more than half of the total scatter.
     """
     by_noise = (_NOISE_MARGIN * points.noise) ** 2
     allowed = by_noise + STEADY**2
@@ -85,8 +85,8 @@ def shortest_period(points: Points) -> int | None:
 def drift(points: Points) -> float:
     """Return the trend of mean and scatter over a record, in standard errors.
 
-    This is the slope through tenths of the record over its standard error; 0.2 % of the orbit is tolerated
-    as unsteadiness of the drive.
+    The slope through tenths of the record is divided by its standard error; a scatter of 0.2 % of the orbit
+    is tolerated as unsteadiness of the drive.
     """
     blocks = np.array_split(points.value, _BLOCKS)
     place = np.linspace(-0.5, 0.5, _BLOCKS)

@@ -100,7 +100,7 @@ _SHORTEST_BLOCK = 50
 def begin_of_last_motion(points: Points) -> int:
     """Return the index at which the last motion of a record starts; 0 if it never changes.
 
-    Each block of the record repeats within its noise or not. A single change between the two is the end of
+    Each block of the record is tested for repetition within its noise. One change of the result is the end of
     a transient or the loss of a motion. Several changes are chaos with calm stretches and count as one
     motion.
     """
@@ -133,9 +133,9 @@ SLOW = 0.5
 _FEWEST_TURNS = 3.0
 """Fewest turns of a closed curve in a record; fewer count as a slow change."""
 _LARGEST_HUM = 0.1
-"""Largest mains hum relative to the orbit; more may be motion at its frequency."""
+"""Largest mains hum relative to the orbit; more may be motion at the mains frequency."""
 _LOW_PERIOD = 4
-"""Longest period of interest; hum can repeat as soon if the drive is at twice the mains frequency."""
+"""Longest low period; hum causes such a period, too, if the drive is at twice the mains frequency."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40."""
@@ -196,8 +196,8 @@ class MotionVerdict(Labelled):
     def least_exponent_per_s(self) -> float | None:
         """Lower bound on the largest Lyapunov exponent of a chaotic motion; None if unresolved.
 
-        Noise and the size of the motion reduce the slope by up to a half, by an unknown amount. Points that
-        scatter for other reasons diverge as well.
+        Noise and the finite size of the motion reduce the slope by an unknown amount, up to a half. Points
+        that scatter for other reasons diverge as well.
         """
         parting = self.evidence.divergence
         if self.kind is not MotionKind.CHAOTIC or parting is None or not parting.is_resolved:
@@ -207,21 +207,20 @@ class MotionVerdict(Labelled):
 
 
 def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionVerdict:
-    """Classify a motion from its points, one per drive period.
+    """Return the verdict on a motion from its points, one per drive period.
 
     A motion is *periodic* if its points repeat within their noise, *quasi-periodic* if they lie on a closed
     curve, and *chaotic* only if all tests agree: settled, far above the noise, on no closed curve, 0-1 test
-    near one without oversampling, and linear noise rejected by surrogates. Each test alone would accept
-    some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a
-    chaotic transient ends, the last part is classified: always if it repeats, otherwise only if it is the
-    longer part. Noise above a tenth of the orbit excludes the verdict periodic. Raises InvalidRequest when
-    the drive frequency is not positive and finite.
+    near one without oversampling, and linear noise rejected by surrogates. Each test alone would accept some
+    noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a chaotic
+    transient ends, the last part is classified: always if its period is at most 4, otherwise only if it is
+    the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises InvalidRequest
+    when the drive frequency is not positive and finite.
 
     Parameters
     ----------
     points
-        All drive periods; repetition is tested over all, the shape over the last
-        3000.
+        Points of all drive periods; repetition is tested on all points, shape on the last 3000.
     drive_hz
         Drive frequency, to convert exponents per period to exponents per second.
     seed
@@ -280,7 +279,7 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
 
 
 def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
-    """Return the verdict on a motion with a component at a mains frequency: hum if small, or undecided."""
+    """Return the verdict on a motion with mains hum: periodic if the hum is small, otherwise undecided."""
     if evidence.spread <= _LARGEST_HUM and (period is None or period > _LOW_PERIOD):
         why = (
             f"the points repeat every drive period, except for {100 * evidence.spread:.2g} % of the orbit at "
@@ -348,7 +347,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
-    """Test for noise after a static nonlinearity, by ranks (if monotone) and by time symmetry (if not)."""
+    """Test for noise after a static nonlinearity: by ranks (if monotone) and by time symmetry (if not)."""
     ranked = [surrogate_test(normal_scores(each), seed=seed) for each in points.value.T]
     weakest, strongest = max(ranked, key=lambda each: each.p), max(ranked, key=lambda each: each.margin)
     if not weakest.rejects_linear_noise:

@@ -55,10 +55,10 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     points
         Shape (n, dimensions).
     apart
-        Theiler's window: points less than this many steps apart in time are not neighbours, since one
-        is merely the other a little later (Theiler, Phys. Rev. A 34 (1986) 2427).
+        Theiler's window: points less than this many steps apart in time are not neighbours, since they belong
+        to one stretch of the orbit (Theiler, Phys. Rev. A 34 (1986) 2427).
     last
-        Only points before this index are used, so that both can be followed beyond it.
+        Only points before this index are used, so that both points of a pair can be followed beyond it.
     floor
         Neighbours closer than this are skipped, because noise dominates.
     """
@@ -96,7 +96,7 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Distance relative to the typical one, above which the size of the attractor limits growth."""
+"""Distance relative to the typical distance, above which the size of the attractor limits growth."""
 _ABOVE_NOISE = 3.0
 """Least ratio of a distance to the noise in the fit."""
 _SHORTEST_FIT = 3
@@ -115,7 +115,7 @@ class Divergence:
     """Logarithm of the typical distance of two points of the motion."""
     first: int
     last: int
-    """Steps between which the line was fitted; last - first is 0 if there was no room for one."""
+    """First and last step of the fitted line; equal if there were too few steps for a line."""
     exponent: float
     """Slope [1/step]; NaN without a line."""
     sd_exponent: float
@@ -129,11 +129,10 @@ class Divergence:
 
 
 def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float = 0.0) -> Divergence:
-    """Follow neighbouring points while they diverge.
+    """Return the divergence of neighbouring points over time.
 
-    Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit starts where distances exceed the
-    noise and ends before the size of the attractor limits them. Without a range between, there is no
-    exponent.
+    Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit starts where distances exceed the noise
+    and ends before the size of the attractor limits them. If too few steps lie between, the exponent is NaN.
 
     Raises NotEnoughData when fewer than 50 points have a neighbour.
 
@@ -180,7 +179,7 @@ def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int,
     above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
     beyond = np.flatnonzero(mean > top)
     first = int(above[0]) if above.size else mean.size - 1
-    # The first steps are not fitted: the difference still rotates into the direction of growth.
+    # Leave out the first steps, in which the difference still rotates into the direction of growth.
     first = max(first, apart)
     last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
     return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
@@ -224,7 +223,7 @@ class ZeroOne:
 
 
 def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
-    """Test a series that was taken once per drive period.
+    """Apply the 0-1 test to a series that was taken once per drive period.
 
     Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the
     oscillatory term removed (eqs. 3.1 to 3.6). It mistakes noise for chaos, and an oversampled chaotic flow
@@ -395,7 +394,7 @@ def normal_scores(series: Reals) -> Reals:
 
 
 def _with_matching_ends(series: Reals) -> Reals:
-    """Cut values off so that both ends match; a jump between them would act like noise in the spectrum."""
+    """Cut off values so that both ends match; a jump between ends would act like noise in the spectrum."""
     most = max(1, series.size // 10)
     heads = series[:most]
     tails = series[series.size - most :]
