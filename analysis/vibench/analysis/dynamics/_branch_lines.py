@@ -100,7 +100,7 @@ class BranchLine(Labelled):
 
     @property
     def growth_time_s(self) -> Reals:
-        """Time in which a small deviation grows by e; infinite if stable, shape (n,)."""
+        """Time in which a small deviation grows by a factor e; infinite if stable, shape (n,)."""
         return growth_time_s(self.frequency_hz, self.largest_multiplier, self.periods)
 
     def along(self, parameter: Parameter) -> Reals:
@@ -151,7 +151,7 @@ def line_of(found: FoundBranch) -> BranchLine:
 
 
 def _response_at(found: FoundBranch, index: int, value: float) -> float:
-    """Interpolate Response II of m0 between a point and the next."""
+    """Return Response II of m0, interpolated between a point and the next."""
     branch = found.branch
     two = slice(index, index + 2)
     place, size = branch.parameters[two], branch.response_ii[two, 0]
@@ -259,7 +259,7 @@ class BranchDiagram(Labelled):
         return tuple(found)
 
     def _strung(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
-        """Join all stretches of one stability, separated by NaN."""
+        """Return all stable (or unstable) stretches in one curve, separated by NaN."""
         places: list[Reals] = []
         sizes: list[Reals] = []
         for line in self.lines:

@@ -191,7 +191,7 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     Parameters
     ----------
     frequency_hz, drive_amplitude_m
-        As measured, in any order; shape (n,). The median of each bin is taken, so that one bad value has
+        Measured values in any order, shape (n,). The median of each bin is taken, so that one bad value has
         no effect.
     """
     known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)

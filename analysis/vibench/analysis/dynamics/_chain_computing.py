@@ -50,7 +50,7 @@ DECIBELS = 20.0 / math.log(10.0)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChainRun(Labelled):
-    """One chain under one drive; arrays by cell, counted from the base."""
+    """Results of one chain under one drive; arrays have one value per cell, counted from the base."""
 
     DOCUMENT: ClassVar = (
         "cells frequency_hz over_hz transmission transmission_error impacts observed_s energy_j "
@@ -64,7 +64,7 @@ class ChainRun(Labelled):
     over_hz: Reals
     """Frequencies of the transmission, shape (m,): one under a steady sine."""
     transmission: Reals
-    """|x of m0 at that frequency| over the base's, shape (m, cells)."""
+    """Amplitude of x of m0 over the base amplitude at each frequency, shape (m, cells)."""
     transmission_error: Reals
     """Relative error of the transmission, shape (cells,); NaN without a requested error or time."""
     largest_m: Reals
@@ -132,7 +132,7 @@ class ChainAnswer(Labelled):
         return np.linspace(top / LINES, top, LINES)
 
     def linear_transmission(self, cells: int) -> Reals:
-        """|x of m0 over U| without contact, at `linear_hz`, shape (LINES, cells)."""
+        """Return |x of m0 over U| without contact, at `linear_hz`, shape (LINES, cells)."""
         return np.asarray(np.abs(chain_transmissibility(self.request.chain(cells), self.linear_hz)[:, :, 0]))
 
     @property
@@ -147,7 +147,7 @@ class ChainAnswer(Labelled):
 
     @property
     def shown_cells(self) -> tuple[tuple[int, int, str], ...]:
-        """Length, place and name of cells to draw: the last of every chain, or several of a single chain."""
+        """Length, index and name of cells to draw: the last of every chain, or several of a single chain."""
         lengths = self.request.lengths
         if len(lengths) > 1:
             return tuple((cells, cells - 1, f"{cells} cells: last") for cells in lengths)
@@ -161,7 +161,7 @@ class ChainAnswer(Labelled):
         return next((run for run in reversed(self.runs) if run.outcome == REACHED), None)
 
     def driven_transmission(self, cells: int, place: int) -> tuple[Reals, Reals]:
-        """Frequencies and transmissions of all runs of a chain at one cell, in the order of the runs."""
+        """Return frequencies and transmissions of all runs of a chain at one cell, in order of the runs."""
         runs = [run for run in self.runs if run.cells == cells]
         if not runs:
             return np.zeros(0), np.zeros(0)
@@ -201,8 +201,8 @@ SHOWN_PERIODS = 16
 STRETCHES = 400
 """Number of stretches whose RMS is shown for a whole run."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
-"""Averaging time [s] of energies under a steady sine, after the responses were observed; with a requested
-error or time, at most this share of the run time before it."""
+"""Averaging time [s] of energies under a steady sine, after the responses were observed. With a requested
+error or time, it is at most this share of the run time before."""
 SWEEP_PARTS = 120
 """Number of frequencies of a swept transmission; each is averaged over `FEWEST_PERIODS` or more."""
 FEWEST_PERIODS = 12
@@ -338,7 +338,7 @@ def _bare_run(
     observed_s: float,
     frequency_hz: float = math.nan,
 ) -> ChainRun:
-    """Return a run with its outcome and impacts only, as for one that did not reach its end."""
+    """Return a run with its outcome and impacts only, such as a run that did not reach its end."""
     unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
     return ChainRun(
         cells=chain.size,
@@ -380,7 +380,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
 
 
 def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
-    """Return the component at the drive frequency, by Hann-weighted means over equal stretches of time."""
+    """Return frequencies and relative amplitudes at the drive frequency, by Hann-weighted means over time."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
     turning = np.exp(-2j * np.pi * drive.turns(run.time_s))

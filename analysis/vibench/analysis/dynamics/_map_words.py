@@ -91,7 +91,7 @@ def map_caption(results: MapResults) -> str:
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Return the name of a specimen and its differences from the shipped one of that name, or the paper's."""
+    """Return a specimen's name and its differences from the shipped specimen of that name, or the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"

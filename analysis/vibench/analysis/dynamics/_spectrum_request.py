@@ -91,7 +91,7 @@ class SpectrumRequest(SpecimenChoice):
 
 @dataclass(frozen=True)
 class SpectrumPoint:
-    """All exponents of the motion reached from rest."""
+    """All Lyapunov exponents of the motion reached from rest."""
 
     DOCUMENT: ClassVar = (
         "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
@@ -102,7 +102,7 @@ class SpectrumPoint:
     frequency_hz: float
     amplitude_m: float
     exponents_per_s: tuple[float, ...]
-    """Descending; minus infinity if a stop that holds m1 removes a direction, NaN if the run failed."""
+    """Descending order; minus infinity if a stop holds m1 and removes a direction, NaN if the run failed."""
     low_per_s: tuple[float, ...]
     high_per_s: tuple[float, ...]
     sum_per_s: float
