@@ -11,21 +11,21 @@ _SMALLEST_DEGREES_OF_FREEDOM = 1e-3
 
 
 def relative_sd(coherence: Reals, n_eff: float) -> Reals:
-    """Return the standard deviation of ln(magnitude), equal to that of the phase in radians.
+    """Return the standard deviation of ln(magnitude), and equally of the phase [rad].
 
-    sqrt((1 - g2) / (2 g2 n_eff)) for h1 and h2 (Bendat & Piersol, Random Data, 4th ed., section 9.2)
-    and for hv too: Fuller's variance of a regression with errors in both variables comes to the same
-    expression. Infinite where the coherence is zero.
+    sqrt((1 - g2) / (2 g2 n_eff)) for h1 and h2 (Bendat & Piersol, Random Data, 4th ed., section 9.2) and also
+    for hv: Fuller's variance of a regression with errors in both variables is the same expression. Infinite
+    where the coherence is zero.
     """
     with np.errstate(divide="ignore"):
         return np.asarray(np.sqrt((1 - coherence) / (2 * coherence * n_eff)))
 
 
 def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Reals:
-    """Half width of the two-sided bounds of a relative error whose spread was estimated from the data.
+    """Return the half width of the two-sided bounds of a relative error with estimated scatter.
 
-    Given the drive, h1 is a regression with 2 (n - 1) real degrees of freedom left over, so each of
-    its components is Student-distributed; the unbiased variance divides by n - 1.
+    Given the drive, h1 is a regression with 2 (n - 1) real residual degrees of freedom, so each component is
+    Student-distributed. The unbiased variance divides by n - 1.
     """
     freedom = max(2 * (n_eff - 1), _SMALLEST_DEGREES_OF_FREEDOM)
     quantile = float(scipy.stats.t.ppf((1 + confidence) / 2, freedom))
@@ -33,10 +33,10 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
 
 
 def standard_uncertainty(values: Reals | Complexes) -> float:
-    """Return the standard uncertainty of the mean of a few values; twice that covers 95 % of cases.
+    """Return the standard uncertainty of the mean of a few values; twice this covers 95 % of cases.
 
     It is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008, G.3.2). For
-    complex values it holds for the real and for the imaginary part, each alone.
+    complex values it applies to the real and to the imaginary part separately.
     """
     count, parts = values.size, 2 if np.iscomplexobj(values) else 1
     error = float(np.std(values, ddof=1)) / np.sqrt(parts * count)
@@ -45,10 +45,10 @@ def standard_uncertainty(values: Reals | Complexes) -> float:
 
 
 def magnitude_bounds(magnitude: Reals, half_width: Reals) -> tuple[Reals, Reals]:
-    """Bounds of a magnitude, symmetric on a logarithmic scale.
+    """Return the bounds of a magnitude, symmetric on a logarithmic scale.
 
-    ln(magnitude) is unbiased to second order in the error (the radial and the tangential part cancel),
-    which the magnitude itself is not.
+    ln(magnitude) is unbiased to second order in the error (the radial and the tangential part cancel); the
+    magnitude itself is biased.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         lower = magnitude * np.exp(-half_width)
@@ -57,19 +57,19 @@ def magnitude_bounds(magnitude: Reals, half_width: Reals) -> tuple[Reals, Reals]
 
 
 def phase_half_width(half_width: Reals) -> Reals:
-    """Half width of the bounds of a phase [rad]: arcsin of the relative half width, pi past 1.
+    """Return the half width of a phase's bounds [rad]: arcsin of the relative half width, pi above 1.
 
-    Fieller's argument: the part of the estimate perpendicular to the true direction is
-    Student-distributed whatever the magnitude is, so the arcsine is exact, not a linearisation.
+    The part of the estimate perpendicular to the true direction is Student-distributed for any magnitude
+    (Fieller), so the arcsine is exact, not a linearisation.
     """
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(half_width < 1, np.arcsin(np.minimum(half_width, 1)), np.pi))
 
 
 def coherence_significance(n_eff: float, confidence: float) -> float:
-    """Coherence that independent noises exceed with probability 1 - ``confidence``: 1 - a^(1/(n - 1)).
+    """Return the coherence that independent noises exceed with probability a = 1 - ``confidence``.
 
-    (Carter, Knapp & Nuttall 1973, IEEE Trans. Audio Electroacoust. 21, 337-344.)
+    It is 1 - a^(1/(n - 1)) (Carter, Knapp & Nuttall 1973, IEEE Trans. Audio Electroacoust. 21, 337-344).
     """
     if n_eff <= 1:
         return 1.0
@@ -77,7 +77,7 @@ def coherence_significance(n_eff: float, confidence: float) -> float:
 
 
 def chi_square_bounds(density: Reals, n_eff: float, confidence: float) -> tuple[Reals, Reals]:
-    """Bounds of an averaged spectral density: chi-square with 2 n_eff degrees of freedom."""
+    """Return bounds of an averaged spectral density: chi-square with 2 n_eff degrees of freedom."""
     freedom = 2 * n_eff
     high = float(scipy.stats.chi2.ppf((1 + confidence) / 2, freedom))
     low = float(scipy.stats.chi2.ppf((1 - confidence) / 2, freedom))
@@ -89,17 +89,17 @@ _ONE_IN = 1e-3
 
 
 def chi_square_of(squared: Reals, n_eff: float) -> Reals:
-    """Chi square with 2 degrees of freedom of a line's squared residual relative to its estimated scatter.
+    """Return chi square (2 degrees of freedom) of a line's squared residual over its estimated variance.
 
-    A residual over a standard deviation from n averages follows F(2, 2 (n - 1)), not chi square. The value
-    with the same probability is nu ln(1 + squared / nu), nu = 2 (n - 1). It is twice the negative logarithm
-    of Student's likelihood, except for a factor (nu + 2) / nu.
+    A squared residual over a variance from n averages follows F(2, 2 (n - 1)), not chi square. The value with
+    the same probability is nu ln(1 + squared / nu), nu = 2 (n - 1). It is twice the negative logarithm of
+    Student's likelihood, except for a factor (nu + 2) / nu.
     """
     freedom = max(2 * (n_eff - 1), 1.0)
     return np.asarray(freedom * np.log1p(squared / freedom))
 
 
 def chi_square_limit(freedom: int, lines_like_one: float = 1.0) -> float:
-    """Chi square per degree of freedom that one correct model in a thousand exceeds."""
+    """Return chi square per degree of freedom that one correct model in a thousand exceeds."""
     independent = max(freedom / lines_like_one, 1.0)
     return float(scipy.stats.chi2.isf(_ONE_IN, independent) / independent)

@@ -9,7 +9,7 @@ from ..tables import Labelled
 from .arrays import Reals
 
 DEFAULT_BINS = 1500
-"""More than the horizontal pixels of a figure."""
+"""Default number of bins, more than the horizontal pixels of a figure."""
 
 
 @dataclass(frozen=True)

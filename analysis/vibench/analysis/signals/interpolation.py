@@ -19,7 +19,7 @@ TRUSTED_BAND = 0.4
 _KAISER_BETA = 19.9
 """Kaiser's formula for 64 taps and a transition from 0.4 to 0.6 of the sample rate: 189 dB."""
 _PHASES = 512
-"""Number of tabulated fractions of a sample; cubic interpolation between them errs by 1e-10."""
+"""Number of tabulated fractions of a sample; cubic interpolation between them has an error of 1e-10."""
 
 
 def _weights_of_phases() -> Reals:
@@ -45,8 +45,8 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
     Parameters
     ----------
     samples
-        Shape (n,) or (channels, n). The signal is taken as zero outside, so values within `REACH` of an end
-        are wrong unless it is zero there.
+        Shape (n,) or (channels, n). The signal is assumed zero outside, so values within `REACH` of an end
+        are wrong unless the signal is zero there.
     positions
         Positions to evaluate, in samples from the first one, shape (m,).
     """
@@ -66,11 +66,11 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
 
 
 _CLOSE = 0.125
-"""Distance of the interpolated values around a maximum, in samples; their parabola errs by 1e-6 at most."""
+"""Distance of the interpolated values around a maximum, in samples; the parabola's error is at most 1e-6."""
 
 
 def sizes_with_maxima(samples: Reals) -> Reals:
-    """Return |value| of every sample, or that of the maximum beside the sample, shape (n,).
+    """Return |value| of every sample, or of the maximum beside the sample, shape (n,).
 
     At 16 samples per period, the largest sample may be 2 % below the maximum.
 
@@ -106,7 +106,7 @@ TRUSTED_FRACTION = 0.4
 
 
 class Decimator:
-    """Low-pass filter that keeps every n-th sample; sample k of the result lies at sample k n."""
+    """Low-pass filter that keeps every n-th sample; sample k of the result is at input sample k n."""
 
     def __init__(self, channels: int, factor: int) -> None:
         if factor < 1:
@@ -116,7 +116,7 @@ class Decimator:
         self._half = (taps.size - 1) // 2
         # The engine sums eight products at a time; padding gets zero weight.
         self._taps = np.concatenate([np.zeros(-taps.size % _TOGETHER), taps])
-        # Half of the filter needs later samples; those before the first one are zero.
+        # Half of the filter needs later samples; samples before the first are zero.
         self._pending = np.zeros((channels, self._taps.size - 1 - self._half if factor > 1 else 0))
         self._received = 0
         self._given = 0
@@ -129,7 +129,7 @@ class Decimator:
         return self._filtered(np.concatenate((self._pending, block), axis=1))
 
     def finish(self) -> Reals:
-        """Return the last samples, with zeros standing for the time after the record."""
+        """Return the last samples, assuming zeros after the record."""
         if self._factor == 1:
             return self._pending
         zeros = np.zeros((self._pending.shape[0], self._half))
@@ -154,7 +154,7 @@ class Decimator:
 
 
 def _taps(factor: int) -> Reals:
-    """Kaiser low-pass from 0.4 to 0.6 of the new rate; its half length is a multiple of the factor."""
+    """Return a Kaiser low-pass from 0.4 to 0.6 of the new rate; half its length is a multiple of factor."""
     if factor == 1:
         return np.ones(1)
     width = 2 * (1 - 2 * TRUSTED_FRACTION) / factor

@@ -44,7 +44,7 @@ class ConvertedSignal:
 
     @property
     def settled(self) -> Reals:
-        """The samples without their disturbed ends."""
+        """Samples without the disturbed ends."""
         return self.samples[self.edge_samples : self.samples.size - self.edge_samples]
 
 
@@ -55,7 +55,7 @@ _EDGE_PERIODS = 6
 
 
 def derivative_factor(frequency_hz: Reals, given: Quantity, wanted: Quantity) -> Complexes:
-    """Factor (i w)^n that turns a spectrum of the given quantity into the wanted one.
+    """Return the factor (i w)^n that converts a spectrum from the given to the wanted quantity.
 
     For integrals the factor at 0 Hz is NaN.
     """
@@ -77,7 +77,7 @@ def converted_signal(
     high_hz: float,
     lines_hz: Sequence[float] = (),
 ) -> ConvertedSignal:
-    """Integrate or differentiate a signal within a band, free of drift and of the trapezoid's gain error.
+    """Integrate or differentiate a signal within a band, without drift or the trapezoidal gain error.
 
     The spectrum of the whole signal is multiplied by (i w)^n and by a band with cosine edges. Each edge
     is half as wide as its frequency and lies outside the band, which passes unchanged. A straight line is
@@ -91,8 +91,8 @@ def converted_signal(
         The band to keep, 0 < low < high <= half the sample rate; choose ``low_hz`` well below the
         lowest line of interest and above the drift.
     lines_hz
-        Frequencies of steady lines, if known. Those in the band are converted in closed form, because the
-        band edge rings by 3e-4 of what is cut off at an end.
+        Frequencies of steady lines, if known. Those in the band are converted in closed form, because a line
+        cut off at an end would ring by 3e-4 at the band edge.
     """
     if not 0 < low_hz < high_hz <= sample_rate_hz / 2:
         raise InvalidRequest(
@@ -116,9 +116,9 @@ def converted_signal(
 
 
 def steady_line(samples: Reals, cycles_per_sample: float, beyond: int = 0) -> Complexes:
-    """Return the rotating line of a signal at a frequency; its real part is the line in the signal.
+    """Return the steady sine in a signal at a frequency, as a rotating phasor with the sine as real part.
 
-    The line is continued by ``beyond`` samples at both ends: shape (samples + 2 beyond,).
+    The sine is continued by ``beyond`` samples at both ends: shape (samples + 2 beyond,).
     """
     turn = np.exp(2j * np.pi * cycles_per_sample * np.arange(-beyond, samples.size + beyond))
     taper = np.hanning(samples.size)

@@ -32,7 +32,7 @@ the flat top as in D'Antona and Ferrero, Digital Signal Processing for Measureme
 
 
 def taper(window: Window | str, samples: int) -> Reals:
-    """Return the periodic form of a window, the one for spectra (``fftbins=True`` in scipy)."""
+    """Return a window in its periodic form, as used for spectra (``fftbins=True`` in scipy)."""
     if samples == 1:
         return np.ones(1)
     turns = np.arange(samples) / samples
@@ -46,7 +46,7 @@ def cosine_weights(window: Window | str) -> tuple[float, ...]:
 
 
 def window_by_name(window: Window | str) -> Window:
-    """Return the window of a name; raises InvalidRequest for unknown names."""
+    """Return the window with this name; raises InvalidRequest for unknown names."""
     try:
         return Window(window)
     except ValueError as unknown:
@@ -76,7 +76,7 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
     hop
         Distance D between the starts of neighbouring segments [samples].
     used
-        Which segments were averaged, in the order of time.
+        Flags of the averaged segments, in the order of time.
     """
     count = int(np.count_nonzero(used))
     if count == 0:
