@@ -1,4 +1,4 @@
-"""Spectral densities with confidence bounds, and amplitude spectra that read a sine as its amplitude."""
+"""Spectral densities with confidence bounds, amplitude spectra and spectrograms."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ class SpectralAverages:
     """Mean of conj(X_i) X_j over the used segments, shape (channels, channels, lines); not scaled."""
     segments_used: int
     segments_excluded: int
-    """Segments left out because they touched an invalid sample."""
+    """Number of segments left out because they contain an invalid sample."""
     n_eff: float
     """Number of independent averages, corrected for overlap and gaps."""
     segment_samples: int
@@ -39,11 +39,11 @@ class SpectralAverages:
     window_energy: float
 
     def frequency_hz(self, sample_rate_hz: float) -> Reals:
-        """Frequencies of the lines, from 0 Hz [Hz]."""
+        """Return the frequencies of the lines, from 0 Hz [Hz]."""
         return np.asarray(fft.rfftfreq(self.segment_samples, 1 / sample_rate_hz)[: self.products.shape[-1]])
 
     def density(self, first: int, second: int, sample_rate_hz: float) -> Complexes:
-        """One-sided (cross-)spectral density of two channels [product of their units per Hz]."""
+        """Return the one-sided (cross-)spectral density of two channels [product of their units per Hz]."""
         scale = np.full(self.products.shape[-1], 2 / (sample_rate_hz * self.window_energy))
         scale[0] /= 2
         if self.segment_samples % 2 == 0:
@@ -81,7 +81,7 @@ class SegmentSpectra:
         block
             Shape (channels, samples), contiguous with the previous block.
         valid
-            Validity of the samples, shape (samples,); segments with invalid samples are left out.
+            Flags of valid samples, shape (samples,); segments with invalid samples are left out.
         """
         marks = np.ones(block.shape[1], dtype=np.bool_) if valid is None else valid
         data = np.concatenate((self._carry, block), axis=1) if self._carry.shape[1] else block
@@ -193,7 +193,7 @@ class SpectralDensity(Labelled):
         return np.sqrt(self.density)
 
     def rms(self, low_hz: float, high_hz: float) -> float:
-        """Root mean square of the signal between two frequencies."""
+        """Return the root mean square of the signal between two frequencies."""
         kept = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
         return float(np.sqrt(np.sum(self.density[kept]) * self.sample_rate_hz / self.segment_samples))
 
@@ -247,7 +247,7 @@ def spectral_density(
 
 @dataclass(frozen=True)
 class AmplitudeSpectrum(Labelled):
-    """Amplitude spectrum: a sine of amplitude 1 reads 1."""
+    """Amplitude spectrum: a sine of amplitude 1 shows as 1."""
 
     OWN_UNITS: ClassVar = {"value": "{unit}", "amplitude": "{unit}"}
 
@@ -270,7 +270,7 @@ class AmplitudeSpectrum(Labelled):
         return self.sample_rate_hz / self.samples
 
     def converted(self, given: Quantity, wanted: Quantity) -> "AmplitudeSpectrum":
-        """Express in another quantity: velocity / (i w) is displacement. NaN at 0 Hz for integrals."""
+        """Return the spectrum of another quantity, such as velocity / (i w); integrals are NaN at 0 Hz."""
         return replace(self, value=self.value * derivative_factor(self.frequency_hz, given, wanted))
 
 
