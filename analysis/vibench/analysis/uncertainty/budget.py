@@ -23,7 +23,7 @@ RESULT_PATTERNS: Mapping[str, str] = {
     "response_i": r"\bResponse I\b",
     "response_ii": r"\bResponse II\b",
 }
-"""Names of quantities for each result that can end a recording, see `vibench.acquisition.plan.Until`."""
+"""Name patterns of quantities by result that can end a recording, see `vibench.acquisition.plan.Until`."""
 
 
 class Cause(StrEnum):
@@ -68,7 +68,7 @@ def from_scatter(cause: Cause, sd: float, value: float, source: str) -> Contribu
 
 @dataclass(frozen=True)
 class Budget(Labelled):
-    """One quantity of one measurement."""
+    """Uncertainty budget of one quantity of one measurement."""
 
     OWN_UNITS: ClassVar = {"value": "{0.unit}"}
     DOCUMENT: ClassVar = (
@@ -160,7 +160,7 @@ class Stated:
     """Relative standard uncertainties of the channels from a bench configuration."""
 
     response: tuple[Contribution, ...]
-    """Contributions of the channel that shows m0."""
+    """Contributions of the channel that measures m0."""
     base: tuple[Contribution, ...]
     """Contributions of the channel of the base."""
     clock: Contribution
@@ -181,8 +181,8 @@ class Stated:
 def stated_uncertainties(bench: Mapping[str, Any], response: str) -> Stated:
     """Return the stated uncertainties of a recording's bench; ``response`` is the channel of m0.
 
-    Calibrations are normal with their coverage factor. Misalignment scales by the cosine of a uniform
-    angle; the root mean square is taken (JCGM 100:2008, F.2.4.5). Clocks are uniform within bounds.
+    Calibration errors are normal with their coverage factor, clock errors uniform within bounds. Misalignment
+    scales by the cosine of a uniform angle; the rms value is used (JCGM 100:2008, F.2.4.5).
     """
     inputs = {each.get("role"): each for each in (bench.get("daq") or {}).get("channels") or ()}
     of_response, of_base = (tuple(_channel(bench, role, inputs.get(role, {}))) for role in (response, BASE))

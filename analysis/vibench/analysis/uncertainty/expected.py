@@ -1,4 +1,4 @@
-"""Expected uncertainty of a plan over recording time, and a distribution of time by it, before measuring."""
+"""Expected uncertainty of a plan before measuring, and distribution of recording time by this estimate."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -62,9 +62,9 @@ class SimulatedDwell:
     """Results of simulated dwells of the rig from several starts."""
 
     sd_largest: float
-    """Standard deviation of Response I, relative; 0 where nothing collides."""
+    """Relative standard deviation of Response I; 0 if nothing collides."""
     sd_second: float
-    """Standard deviation of Response II, relative; 0 where nothing collides."""
+    """Relative standard deviation of Response II; 0 if nothing collides."""
     has_several_motions: bool
     """Whether some runs collide and others do not, or they differ by more than chance."""
 
@@ -74,8 +74,8 @@ def simulated_dwell(
 ) -> SimulatedDwell | None:
     """Simulate amplifier, table and specimen under the plan's voltage, and analyse them like a recording.
 
-    Runs start more gently and harder than the generator's ramp: if both reach the same motion, the
-    measurement will too. None if a simulation fails, or the window is too short.
+    Some runs start more gently than the generator's ramp, others more abruptly: if all reach the same motion,
+    so will the measurement. None if a simulation fails, or the window is too short.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
     phase = 2 * np.pi * (np.arange(per_period) + 0.5) / per_period
@@ -113,7 +113,7 @@ def simulated_dwell(
 
 
 def _scatter(found: DwellResponse) -> tuple[float, float]:
-    """Return the relative scatter of both Responses, like the analysis."""
+    """Return the relative scatter of both Responses, as for a recording."""
     # A small non-repeating part counts as noise.
     like_noise = float(np.nan_to_num(found.noise_error_i)) / found.response_i
     chance = of_one_draw(found).relative or 0.0
@@ -152,10 +152,10 @@ class Expected(Labelled):
     time_s: float
     """Planned recording time, or the length of a sine's window."""
     scatter: float | None
-    """Relative standard uncertainty by noise or chance after that time; None if not stated."""
+    """Relative standard uncertainty by noise or chance after `time_s`; None if not stated."""
     cause: Cause
     lasting: float
-    """Stated contributions that time does not reduce: calibrations, alignment, clock."""
+    """Relative standard uncertainty that time does not reduce: calibrations, alignment, clock."""
     not_stated: tuple[Cause, ...]
 
     def after(self, time_s: float) -> float | None:
@@ -204,11 +204,11 @@ class Expected(Labelled):
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
     """Return the expected uncertainty of a plan's results; opens no instrument.
 
-    The results of noise are frequency, damping and transmissibility at each resonance of the linear specimen.
-    Those of a sine are both Responses over a window of at most 5 s. Their chance is the scatter of three
-    simulated runs of the rig, analysed like recordings; it is not stated if the runs settle on different
-    motions. Scatter falls with the root of the time. Other kinds of plan, and rigs without a channel for the
-    motion of m0 or the base's acceleration, have no expected results.
+    For noise, the results are frequency, damping and transmissibility at each resonance of the linear
+    specimen. For a sine, they are both Responses over at most 5 s. Their chance is the scatter of three
+    simulated runs, analysed like recordings; it is not stated if the runs settle on different motions.
+    Scatter falls with the root of the time. Other kinds of plan, and rigs without a channel for the motion of
+    m0 or the base's acceleration, have no expected results.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
 
 
 MOST_STEPS = 6
-"""Most stretches whose end is predicted; the others are assumed to last as long on average."""
+"""Most stretches whose end is predicted; the other stretches are assumed to last as long on average."""
 
 
 def recorded_s(measurement: Measurement) -> float:
@@ -273,7 +273,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield times of some stretches [s]: needed for all targets, until the first check, and planned."""
+    """Yield for some stretches the times [s] needed for all targets, until the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
@@ -318,7 +318,7 @@ def end_s(need_s: float, first_s: float, longest_s: float) -> float:
 
 
 def until_checks(facts: RecordingFacts) -> Iterator[Check]:
-    """Compare the duration of a recording with `until` with its prediction."""
+    """Compare the recorded time of a measurement with `until` to its prediction."""
     notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
     if not notes:
         return
@@ -339,7 +339,7 @@ def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
 
 
 def _densities(rig: Rig, frequency_hz: Reals) -> tuple[Reals, float] | None:
-    """Noise of m0's velocity [(m/s)^2/Hz] and of the base's acceleration [(m/s2)^2/Hz], one-sided.
+    """Return one-sided noise densities: m0's velocity [(m/s)^2/Hz], base acceleration [(m/s2)^2/Hz].
 
     None if not stated. An accelerometer on m0 has the noise of its sensor divided by omega.
     """
@@ -407,9 +407,9 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
 def _expected_lines(
     excitation: Excitation, rig: Rig, density_v: float, time_s: float
 ) -> FrequencyResponse | None:
-    """Return the linear transmission at the lines of a noise, each with its scatter after a recorded time.
+    """Return the linear transmission at the lines of a noise drive, with the scatter after a recorded time.
 
-    ``density_v`` is the one-sided density of the terminal voltage [V^2/Hz]. None if no noise of sensors is
+    ``density_v`` is the one-sided density of the terminal voltage [V^2/Hz]. None if no sensor noise is
     stated.
     """
     if isinstance(excitation, WhiteNoise | OddMultisine):
@@ -444,7 +444,7 @@ def _expected_lines(
 
 
 def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
-    """Return whether p of the linear specimen, taken as Gaussian over many cycles, reaches a stop."""
+    """Return whether p of the linear specimen, assumed Gaussian over many cycles, reaches a stop."""
     grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
     p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
     rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
@@ -454,7 +454,7 @@ def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_h
 def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
     """Yield the expected Responses of a sine.
 
-    None are yielded if a tenth of the window is shorter than a period, or the motion cannot be simulated.
+    Yield nothing if a tenth of the window is shorter than a period, or the motion cannot be simulated.
     """
     window_s = min(_WINDOW_S, sum(each.record_s for each in measurement.excitation.steps()))
     if at_hz * window_s < _TENTHS:
@@ -482,7 +482,7 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         elif scatter > STEADY:
             yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
         else:
-            # Noise of generator and amplifier moves the masses, and no rig states it.
+            # Noise of generator and amplifier moves the masses, and the rig does not state this noise.
             error = None if name == RESPONSE_I else by_noise
             yield Expected(name, window_s, error, Cause.NOISE, lasting, missing)
 
@@ -510,7 +510,7 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
     """Return the campaign with recording times that fill ``available_s``, and the share of each measurement.
 
     A measurement needs the time after which `expected_uncertainty` meets its `until`. All these times are
-    lengthened by one factor. Sweeps, and measurements without a prediction, keep their times.
+    multiplied by one factor. Sweeps, and measurements without a prediction, keep their times.
 
     Raises ConfigurationError when no measurement has targets with a prediction, or the time is too short for
     all targets.

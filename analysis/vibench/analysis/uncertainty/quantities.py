@@ -20,14 +20,14 @@ from ..sine.sweep_analysis import SweepAnalysis
 from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_uncertainties
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
-"""Usual and smallest number of parts of a window, whose maxima give the scatter of the largest."""
+"""Usual and smallest number of parts of a window; their maxima give the scatter of the largest value."""
 _ALIKE = 1e-12
 """Relative difference of maxima that is only rounding error."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Unstated chance, for a maximum or a sweep's interval of a tenth of a second without draws of the twin."""
+"""Chance, not stated: for a maximum, or a 0.1 s interval of a sweep, without draws of the twin."""
 _ENDS = 2
-"""Intervals at either end of a sweep; a largest value there is no peak, as it depends on where they begin."""
+"""Number of intervals at each end of a sweep; a largest value there depends on where intervals begin."""
 _PEAKED = 1.05
 """Ratio of Response I to Response II above which the motion in a step is not a sine."""
 _FEWEST_PERIODS = 20.0
@@ -147,7 +147,7 @@ def _of_change(relative: float) -> tuple[Contribution, ...]:
 
 
 def of_one_draw(found: DwellResponse) -> Contribution:
-    """Return the scatter of the largest |x| of a window, from its parts."""
+    """Return the scatter of the largest |x| of a window, from the maxima of its parts."""
     motion = found.displacement.settled
     window = np.where(found.is_clear, np.abs(motion[-found.is_clear.size :]), 0.0)
     blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
@@ -165,14 +165,14 @@ def of_one_draw(found: DwellResponse) -> Contribution:
 
 
 def sd_of_largest(maxima: Reals) -> float:
-    """Return the standard deviation of the largest of these maxima, taken as generalised extreme values.
+    """Return the standard deviation of the largest of maxima with a generalised extreme value distribution.
 
     With their shape k from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
     largest of n values is n^-k times the scale of one: smaller for a bounded motion, equal otherwise.
     """
     if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
         return 0.0
-    # Relative to the largest, because sums of the smallest floating-point numbers have no digits left.
+    # Divide by the largest, because sums of the smallest floating-point numbers have no digits left.
     ordered, count = np.sort(maxima) / np.max(maxima), maxima.size
     place = np.arange(count)
     first, second, third = (
@@ -193,7 +193,7 @@ def sweep_budgets(analysis: SweepAnalysis, overlay: AbstractOverlay[Any] | None)
     """Return budgets for base amplitude and largest Responses of a sweep, with their frequencies."""
     found = analysis.response
     top = found.largest(found.response_ii)
-    # A residual that sensor noise does not explain may be chaos, of which a sweep shows one draw.
+    # A residual that sensor noise does not explain may be chaos, and a sweep shows only one draw of chaos.
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
