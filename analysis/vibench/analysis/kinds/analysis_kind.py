@@ -28,7 +28,7 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 @dataclass(frozen=True, eq=False)
 class Result(Labelled, Generic[A, L]):
-    """A measurement and its simulation."""
+    """Analysis of a measurement and its comparison with the simulation."""
 
     analysis: A
     overlay: L | None
@@ -60,7 +60,7 @@ class AnalysisKind(Generic[P, A, L]):
     lay: Callable[[A, Drawn[Any]], L]
     """Compare the analysis with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
-    """Curves of the response, measured or simulated, of the recording with that name."""
+    """Yield curves of the measured or simulated response of the recording with this name."""
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
     """Return uncertainty budgets of the main results."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()

@@ -1,4 +1,4 @@
-"""Sweeps, dwells and steps: responses over frequency or at one, collisions, and kind of motion."""
+"""Sweeps, dwells and steps: responses over frequency or at a frequency, collisions, kind of motion."""
 
 from collections.abc import Callable
 from functools import partial
@@ -102,7 +102,7 @@ def _analyse_dwell(
     facts: RecordingFacts, channels: Channels, plan: DwellPlan, _: FrequencyResponseRequest
 ) -> DwellAnalysis:
     towards_hz = bound_frequencies_hz(facts)
-    # A dwell that lasts until its bound is met is analysed as a whole.
+    # A dwell that is recorded until its bounds are small enough is analysed as a whole.
     longest_s = WINDOW_S if facts.measurement.until is None else inf
     found = measured_dwell(channels, plan, towards_hz, longest_s)
     motion = dwell_motion(channels, found)
