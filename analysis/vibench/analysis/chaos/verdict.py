@@ -209,13 +209,13 @@ class MotionVerdict(Labelled):
 def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionVerdict:
     """Return the verdict on a motion from its points, one per drive period.
 
-    A motion is *periodic* if its points repeat within their noise, *quasi-periodic* if they lie on a closed
-    curve, and *chaotic* only if all tests agree: settled, far above the noise, on no closed curve, 0-1 test
-    near one without oversampling, and linear noise rejected by surrogates. Each test alone would accept some
-    noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a chaotic
-    transient ends, the last part is classified: always if its period is at most 4, otherwise only if it is
-    the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises InvalidRequest
-    when the drive frequency is not positive and finite.
+    A motion is *periodic* if its points repeat within their noise, and *quasi-periodic* if they lie on a
+    closed curve. It is *chaotic* only if all tests agree: settled, far above the noise, on no closed curve,
+    0-1 test near one without oversampling, and linear noise rejected by surrogates. Each test alone would
+    accept some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a
+    chaotic transient ends, the last part is classified: always if its period is at most 4, otherwise only if
+    it is the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises
+    InvalidRequest when the drive frequency is not positive and finite.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class Neighbours:
 
 
 def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> Neighbours:
-    """Find the nearest point that is not near in time.
+    """Find for each point the nearest point that is not near in time.
 
     Parameters
     ----------
@@ -196,10 +196,11 @@ def _slope(logarithms: Reals, first: int, last: int) -> tuple[float, float]:
 
 
 _LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
-"""Range of the frequencies c; others are prone to resonances (Gottwald and Melbourne, section 3.1)."""
+"""Range of the frequencies c; other frequencies are prone to resonances (Gottwald and Melbourne, section
+3.1)."""
 _FREQUENCIES = 100
 _CUT = 10
-"""The mean square displacement is computed for lags up to the length of the series over this number."""
+"""The mean square displacement is computed for lags up to the series length divided by this number."""
 FEWEST = 200
 OVERSAMPLED = 0.8
 """Correlation of neighbours above which a series is a flow sampled too finely for this test."""
@@ -218,7 +219,7 @@ class ZeroOne:
 
     @property
     def is_oversampled(self) -> bool:
-        """Return whether neighbours are too correlated for K to be valid."""
+        """Return whether successive values are too correlated for K to be valid."""
         return self.neighbour_correlation > OVERSAMPLED
 
 

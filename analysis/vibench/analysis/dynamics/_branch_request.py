@@ -34,9 +34,9 @@ class BranchMethod(StrEnum):
     """Method to find and follow motions."""
 
     SHOOTING = "shooting"
-    """Exact motions of any period, with every contact; every law."""
+    """Exact motions of any period with every contact, for any contact law."""
     BALANCE = "balance"
-    """Harmonic balance, with as many harmonics as it needs; motions of the drive's period, no rigid stops."""
+    """Harmonic balance with as many harmonics as needed: motions of the drive's period, no rigid stops."""
     FIRST_ORDER = "first-order"
     """Harmonic balance with one harmonic, the paper's eq. 5; power laws only."""
 

@@ -15,7 +15,7 @@ from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
 LONGEST_S = 1e5
-"""Longest averaging time [s]; longer ones would need more than some hundreds of megabytes."""
+"""Longest averaging time [s]; longer times would need more than some hundreds of megabytes."""
 ROUNDING = 1e-9
 """Relative rounding tolerance when the range is a multiple of the step."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
@@ -23,7 +23,7 @@ ELASTIC = ("hertz", "linear", "linear_gap", "power")
 
 
 class SpectrumRequest(SpecimenChoice):
-    """Request for all exponents at every frequency or level."""
+    """Request for all Lyapunov exponents at every frequency or level."""
 
     along: Parameter = Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""

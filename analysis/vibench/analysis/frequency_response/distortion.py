@@ -25,7 +25,7 @@ class Distortion(Labelled):
     realisations: int
     drift: Drift | None
     noise_share: float
-    """Relative standard deviation of one realisation by channel noise or chaos, from its periods."""
+    """Relative standard deviation of a realisation by channel noise or chaos, from scatter of periods."""
     distortion_share: float | None
     """Relative scatter of realisations beyond `noise_share`; None for a single realisation."""
     odd_m_per_s: float | None
@@ -39,7 +39,7 @@ class Distortion(Labelled):
 def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
     """Return noise and distortion of a periodic transmission.
 
-    Undriven lines include nonlinearity of amplifier and shaker as well as of the specimen.
+    Undriven lines show nonlinearity of amplifier and shaker, too, not only of the specimen.
     """
     magnitude = periodic.frequency_response.magnitude
     varied = periodic.distortion_variance

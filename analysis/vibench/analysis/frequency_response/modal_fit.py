@@ -52,7 +52,7 @@ class Resonance:
 
     @property
     def is_explained(self) -> bool:
-        """Whether the fitted modes describe the lines about this one, within their scatter."""
+        """Whether the fitted modes describe the lines about this mode, within their scatter."""
         # NaN for a single hit, whose lines have no known scatter.
         return not self.reduced_chi_square > max(self.chi_square_limit, WELL_FITTED)
 
@@ -98,7 +98,7 @@ _LEAST_NOISE = 0.02
 
 @dataclass(frozen=True)
 class Leakage:
-    """The effect of a window, its overlap and its length on a transmission."""
+    """Effect of the window, its overlap and its length on a transmission."""
 
     segment_s: float
     window: Window
@@ -313,7 +313,7 @@ class Lines:
 def mode_shapes(frequency_hz: Reals | Complexes, poles: Reals) -> Complexes:
     """Return two functions per mode for a fit with real factors, shape (lines, 2 modes), of order one.
 
-    These are 2 zeta / (1 - r^2 + 2 i zeta r) and i r times it, r = w / w0; `poles` has ln w0/2 pi, ln zeta.
+    2 zeta / (1 - r^2 + 2 i zeta r) and i r times this, with r = w / w0; `poles`: ln(w0 / 2 pi), ln(zeta).
     """
     columns = []
     for log_frequency, log_damping in poles.reshape(-1, 2):

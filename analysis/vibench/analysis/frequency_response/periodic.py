@@ -24,9 +24,9 @@ from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Share of a period that may be missing at the end of a record; it is continued periodically."""
+"""Share of a period that may be missing at the end of a record; the record is continued periodically."""
 _WEAKEST_LINE = 1e-3
-"""Least amplitude of a driven line relative to the strongest: 60 dB below it, above quantisation."""
+"""Least amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
 _ITERATIONS = 8
 _CONVERGED = 1e-9
 """Relative change of the period at which iteration stops; the remaining error is below a tenth of it."""
@@ -103,7 +103,7 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
 
 
 def driven_lines(spectra: Complexes) -> Flags:
-    """Return which lines are driven, from spectra of shape (periods or realisations, lines)."""
+    """Return flags of the driven lines, from spectra of shape (periods or realisations, lines)."""
     amplitude = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=0))
     amplitude[0] = 0.0
     strongest = float(np.max(amplitude))
@@ -191,7 +191,7 @@ class BestLinearApproximation:
     value: Complexes
     coherence: Reals
     relative_sd: Reals
-    """Standard deviation of ln(magnitude), equal to that of the phase [rad]."""
+    """Standard deviation of ln(magnitude), and equally of the phase [rad]."""
     steady_relative_sd: Reals
     """`relative_sd` smoothed over neighbouring lines."""
     noise_variance: Reals
@@ -381,7 +381,7 @@ class DetectionLines:
     response_amplitude: Reals
     """Rms over realisations of the response's amplitude [unit of the response]."""
     noise_amplitude: Reals
-    """Part of the amplitude by noise (standard deviation of the mean over periods)."""
+    """Part of the amplitude caused by noise (standard deviation of the mean over periods)."""
 
 
 @dataclass(frozen=True)
@@ -428,7 +428,7 @@ class PeriodicSums:
     sample_rate_hz
         Nominal rate of the converter, whose clock defines all frequencies.
     repetition_hz
-        Nominal repetition frequency of the drive; the true one is measured.
+        Nominal repetition frequency of the drive; the true frequency is measured.
     confidence
         Probability that the bounds of a line contain the true value.
     begun_with

@@ -97,7 +97,7 @@ class FrequencyResponse(Labelled):
 
     @property
     def phase_rad(self) -> Reals:
-        """Phase of the response ahead of the drive [rad], -pi to pi."""
+        """Phase lead of the response over the drive [rad], -pi to pi."""
         return np.angle(self.value)
 
     @property
@@ -118,17 +118,17 @@ class FrequencyResponse(Labelled):
 
     @property
     def phase_lower_rad(self) -> Reals:
-        """Lower bound of the phase [rad]; may pass -pi."""
+        """Lower bound of the phase [rad]; may be below -pi."""
         return np.asarray(self.phase_rad - phase_half_width(self.half_width))
 
     @property
     def phase_upper_rad(self) -> Reals:
-        """Upper bound of the phase [rad]; may pass pi."""
+        """Upper bound of the phase [rad]; may be above pi."""
         return np.asarray(self.phase_rad + phase_half_width(self.half_width))
 
     @property
     def is_significant(self) -> Flags:
-        """Lines with significant coherence and valid bounds.
+        """Flags of lines with significant coherence and valid bounds.
 
         If the drive explains less than a tenth of the response, linear bounds contain the true value in only
         3 to 75 % of cases, even with significant coherence.

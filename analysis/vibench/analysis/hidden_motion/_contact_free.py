@@ -58,7 +58,7 @@ class FreeImpacts(Labelled):
     samples: Reals
     """Centre of the contact, in samples of the motion."""
     sides: Reals
-    """-1 at the lower stop, +1 at the upper one."""
+    """-1 at the lower stop, +1 at the upper stop."""
     impulses: Reals
     """Magnitude of the impulse on m1 [N s]."""
     p: Reals
@@ -351,7 +351,7 @@ class Collisions(Labelled):
     """Start of contact, in samples of the motion."""
     durations_s: Reals
     sides: Reals
-    """-1 at the lower stop, +1 at the upper one."""
+    """-1 at the lower stop, +1 at the upper stop."""
     impulses: Reals
     """Magnitude of the impulse on m1 [N s]."""
     penetrations_m: Reals

@@ -1,7 +1,7 @@
 """Estimate gaps, m1, springs, dampers and contact law while the motion is tracked.
 
-The parameters are constant states of the filter. At first the filter assumes a larger velocity noise, so
-that it keeps the track with wrong parameters; after 0.1 s of tracked motion it uses the true noise.
+The parameters are constant states of the filter. At first the filter assumes a larger velocity noise, so that
+it keeps the track with wrong parameters. After 0.1 s of tracked motion it uses the true noise.
 """
 
 import math

@@ -37,7 +37,7 @@ from ._tracking_model import VY, VZ, TrackedSpecimen, W, tracked_specimen
 
 _RATES = {"m1": VY, "m2": VZ}
 _MOST_EXCESS = 1.25
-"""Largest ratio of the mean squared deviation to the expected one, as for a track's innovations."""
+"""Largest ratio of mean squared to expected squared deviation, as for the innovations of a track."""
 _ALLOWED = 0.02
 """Allowed relative deviation due to mounting, alignment and local modes at the sensor."""
 _MOST_EXPECTED = 0.2
@@ -54,7 +54,7 @@ class MassCheck:
     scale: float
     """Ratio of measured to tracked velocity."""
     unexplained: float
-    """Relative part of the measured velocity that the track does not explain (rms)."""
+    """Relative rms part of the measured velocity that the track does not explain."""
     expected: float
     """Unexplained part to be expected from noise, the track's uncertainty and the sensor's mounting."""
 

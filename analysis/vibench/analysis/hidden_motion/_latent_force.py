@@ -2,9 +2,9 @@
 
 Two relations hold for any law: z follows from m0's motion through a stable first-order filter, and the sum of
 m1 y'' and m2 z'' contains no contact force. A Kalman smoother combines both, with a white force held over
-each sample. In flight the force is zero: windows around its peaks are found first, then the force is set to
-zero elsewhere (switched variance, Rogers and Friis, arXiv 2303.03858). Otherwise the double integral of the
-second relation would drift.
+each sample. In flight the force is zero. Windows around the peaks of the force are found first; elsewhere the
+force is then set to zero (switched variance, Rogers and Friis, arXiv 2303.03858). With a force in flight, the
+double integral of the second relation would drift.
 """
 
 from dataclasses import dataclass

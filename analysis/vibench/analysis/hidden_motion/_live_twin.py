@@ -41,7 +41,7 @@ from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
 # sums the log likelihood ratio of two hypotheses: half of the blocks are outside, or one in a hundred. If at
 # most one in a hundred is outside without a change, the mean time between false alarms is at least
 # exp(threshold) blocks (Lorden, Ann. Math. Stat. 42, 1897, 1971). The threshold makes this `FALSE_ALARM_S`.
-# Five consecutive blocks outside are an alarm.
+# Five consecutive blocks outside raise an alarm.
 
 BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
@@ -55,7 +55,7 @@ THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
 """Number of blocks to learn the usual level."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block is outside if it exceeds 1.5 times the usual level and the usual level by 8 sd."""
+"""A block is outside if it exceeds both 1.5 times the usual level and the usual level plus 8 sd."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 
@@ -114,7 +114,7 @@ def keep_baseline(baseline: Baseline, path: Path) -> None:
 
 
 class ChangeWatch:
-    """Test for a change: whether the levels of blocks have left the usual level."""
+    """Test whether the levels of blocks have left the usual level."""
 
     def __init__(self, usual: Level | None = None) -> None:
         """Start with the stored level ``usual``; without it, learn the level from the first two seconds."""

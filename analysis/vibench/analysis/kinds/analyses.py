@@ -1,4 +1,4 @@
-"""The analysis of each kind of excitation; kinds of a family may share one."""
+"""The analysis of each kind of excitation; kinds of a family may share an analysis."""
 
 from collections.abc import Mapping
 from typing import Any

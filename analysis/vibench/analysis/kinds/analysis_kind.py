@@ -56,7 +56,7 @@ class AnalysisKind(Generic[P, A, L]):
     draws: Callable[[A], Callable[[SimulatedChannels], Draw[Any]]]
     """Return the function that estimates the recorded quantities from simulated channels."""
     compared: Callable[[A], tuple[Quantity, ...]]
-    """Return the measured quantities that are compared with the draws."""
+    """Return the measured quantities that are compared with the simulated records (draws)."""
     lay: Callable[[A, Drawn[Any]], L]
     """Compare the analysis with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]

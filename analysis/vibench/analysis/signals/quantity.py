@@ -79,8 +79,8 @@ def converted_signal(
 ) -> ConvertedSignal:
     """Integrate or differentiate a signal within a band, without drift or the trapezoidal gain error.
 
-    The spectrum of the whole signal is multiplied by (i w)^n and by a band with cosine edges. Each edge
-    is half as wide as its frequency and lies outside the band, which passes unchanged. A straight line is
+    The spectrum of the whole signal is multiplied by (i w)^n and by a band with cosine edges. Each edge is
+    half as wide as its frequency and lies outside the band; the band itself is unchanged. A straight line is
     subtracted first, so that offset and slow drift do not ring at the ends.
 
     Parameters

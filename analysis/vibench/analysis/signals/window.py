@@ -16,7 +16,7 @@ class Window(StrEnum):
     BOXCAR = "boxcar"
     """No taper; correct only for an integer number of periods."""
     FLAT_TOP = "flattop"
-    """Reads the amplitude of a sine between bins within 0.01 dB."""
+    """Accurate amplitude of a sine between bins, within 0.01 dB."""
     BLACKMAN_HARRIS = "blackmanharris"
     """Side lobes below -92 dB: a small line next to a large one."""
 

@@ -49,7 +49,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class CollisionRegion:
-    """A stretch of the sweep in which the masses collide."""
+    """Stretch of a sweep in which the masses collide."""
 
     DOCUMENT: ClassVar = "start stop reaches_start_of_sweep=reaches_start reaches_stop_of_sweep=reaches_stop"
 
@@ -83,10 +83,10 @@ class Collisions(Labelled):
     threshold: Reals
     """Largest residual of a smooth motion, shape (intervals,) [m/s]."""
     is_colliding: Flags
-    """Intervals inside a region, shape (intervals,)."""
+    """Flags of intervals inside a region, shape (intervals,)."""
     is_unexplained: Flags
-    """Intervals with a residual above the noise and distortion of the sensors, shape (intervals,). The
-    threshold also counts rattling during a whole sweep as noise."""
+    """Flags of intervals with a residual above the noise and distortion of the sensors, shape (intervals,).
+    The threshold also counts rattling during a whole sweep as noise."""
     too_fast_hz: tuple[tuple[float, float], ...]
     """Frequency limits of stretches where collisions are not determined, because ringing may hide them."""
     noise_rms: float

@@ -256,7 +256,7 @@ class DwellResponse(Labelled):
     slow_change: float
     """Relative standard uncertainty of Response I by slow change of base or response; NaN if unknown."""
     phase_rad: float
-    """Phase of x ahead of the base displacement at the drive frequency, without the channels' delay."""
+    """Phase lead of x over the base displacement at the drive frequency, without the channels' delay."""
     sd_phase_rad: float
     orders: tuple[float, ...]
     order_displacement: Complexes
@@ -270,7 +270,7 @@ class DwellResponse(Labelled):
     is_clear: Flags
     """Flags of the window's samples that no drop-out affects, shape (samples,)."""
     spectrum: AmplitudeSpectrum
-    """Displacement amplitudes over the window [m]."""
+    """Spectrum of x over the window [m]."""
     lines: tuple[Line, ...]
 
     def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
@@ -414,12 +414,12 @@ def _window(samples: int, edge: int, sample_rate_hz: float, window_s: float) -> 
 
 
 def clear_of_dropouts(bridged: Flags, sample_rate_hz: float, near_hz: float) -> Flags:
-    """Return flags of samples that bridged drop-outs do not affect: a period of the high-pass away."""
+    """Return flags of samples more than one period of the high-pass away from bridged drop-outs."""
     return far_from(bridged, round(sample_rate_hz / (_LOWEST_ORDER * near_hz)))
 
 
 def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window: slice) -> Flags:
-    """Return flags of the window's samples without effect of drop-outs; raises UnusableData if too few."""
+    """Return flags of window samples unaffected by drop-outs; raises UnusableData if there are too few."""
     if not bridged.any():
         return np.ones(window.stop - window.start, dtype=np.bool_)
     clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]

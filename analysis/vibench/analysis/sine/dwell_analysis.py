@@ -284,7 +284,7 @@ _TIME_BINS = 1200
 
 @dataclass(frozen=True, eq=False)
 class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
-    """A dwell: time signal, spectrum, responses and lines."""
+    """Analysis of a dwell: time signal, spectrum, responses and lines."""
 
     OWN_UNITS: ClassVar = {"displacement": "m"}
     DOCUMENT: ClassVar = "*response terminal_bands=terminal motion=motion.verdict"

@@ -60,7 +60,7 @@ def jumps(
     smooth: Flags | None = None,
     linear: Reals | None = None,
 ) -> tuple[Jump, ...]:
-    """Find the jumps of a response against time.
+    """Return the jumps of a response over time.
 
     At each interval straight lines are fitted to the logarithm of the response before and after. A jump is a
     local maximum of their difference of at least 1.5 dB and 8 standard errors. Resonances of a linear

@@ -62,7 +62,7 @@ class SteppedResponse(Labelled):
     frequency_hz: Reals
     """Frequency as measured on the drive."""
     direction: tuple[str, ...]
-    """``"up"`` or ``"down"``."""
+    """Direction of each step, ``"up"`` or ``"down"``."""
     amplitude_vpp: Reals
     """Setting of the generator [V]; NaN if feedback set it."""
     drive_amplitude_m: Reals
@@ -179,7 +179,7 @@ def settled_check(response: SteppedResponse) -> Check:
 
 @dataclass(frozen=True, eq=False)
 class SteppedSineAnalysis(AbstractAnalysis[Steps, SteppedResponse]):
-    """A stepped sine: responses at every frequency, or at every level."""
+    """Analysis of a stepped sine: responses at every frequency, or at every level."""
 
     DOCUMENT: ClassVar = "*response"
 

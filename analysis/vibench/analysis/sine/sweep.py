@@ -164,9 +164,9 @@ class SweptMotion(Labelled):
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: Reals
     phase_rad: Reals
-    """Phase of x ahead of the base displacement at the drive frequency, without the channels' delay."""
+    """Phase lead of x over the base displacement at the drive frequency, without the channels' delay."""
     is_clear: Flags
-    """Intervals without a drop-out, shape (intervals,)."""
+    """Flags of intervals without a drop-out, shape (intervals,)."""
     noise_rms: float
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
@@ -433,7 +433,7 @@ class SweepSums:
         return motion, intervals, data[-1], phase
 
     def _bridges(self) -> Flags:
-        """Return which decimated samples include a bridge over a drop-out."""
+        """Return flags of the decimated samples that include a bridged drop-out."""
         bridged = np.concatenate(self._bridged)
         bridged = np.append(bridged, np.zeros(-bridged.size % self._factor, dtype=np.bool_))
         return np.asarray(bridged.reshape(-1, self._factor).any(axis=1))

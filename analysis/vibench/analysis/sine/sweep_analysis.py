@@ -31,7 +31,7 @@ _SPECTROGRAM_ORDER = 3.2
 
 @dataclass(frozen=True, eq=False)
 class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
-    """A sweep: envelope, responses and collision regions."""
+    """Analysis of a sweep: envelope, responses and collision regions."""
 
     OWN_UNITS: ClassVar = {"spectrogram": "m s-1"}
     DOCUMENT: ClassVar = (
@@ -77,7 +77,7 @@ _NEAR = 12
 
 
 _BEHIND_STEPS = 1.5
-"""Tolerance in steps: a stepped sweep lags by at most half a step, and is measured within another half."""
+"""Tolerance in steps: a stepped sweep lags by up to half a step; measuring adds up to another half."""
 _LAST = 5
 """Number of intervals checked at the end."""
 

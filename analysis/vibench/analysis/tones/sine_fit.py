@@ -41,8 +41,8 @@ class Peak:
 def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int) -> tuple[Peak, ...]:
     """Find the largest peaks of a Hann spectrum in a band, the largest first.
 
-    For a sine between two lines, d = (2a - 1) / (a + 1) is its distance from the larger line, where a is the
-    ratio of the smaller line to the larger (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355). The
+    For a sine between two lines, d = (2a - 1) / (a + 1) is its distance from the larger line [lines]; a is
+    the ratio of the smaller to the larger line (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355). The
     amplitude is the larger line times (pi d / sin(pi d)) (1 - d^2).
 
     Parameters

@@ -132,7 +132,7 @@ def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
 _WINDOW_S, _TENTHS = 5.0, 10
 _GRID_HZ = 0.25
 _HIGHEST_TURN = 4.0
-"""Largest value of Gaussian noise relative to its rms, within some ten thousand cycles."""
+"""Largest value of Gaussian noise relative to its rms, within about ten thousand cycles."""
 _TIMES = (0.25, 1.0, 4.0, 16.0)
 _HALF_BAND_HZ = 25_600.0
 """Band of the white noise of a virtual accelerometer [Hz]."""
@@ -166,7 +166,7 @@ class Expected(Labelled):
 
     @property
     def curve(self) -> tuple[tuple[float, float | None], ...]:
-        """Recording times from 1/4 to 16 times the planned one [s], with the result of `after` for each."""
+        """Recording times from 1/4 to 16 times the planned time [s], with the result of `after` for each."""
         return tuple((factor * self.time_s, self.after(factor * self.time_s)) for factor in _TIMES)
 
     @property
@@ -477,7 +477,7 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         if chance.has_several_motions:
             yield Expected(name, window_s, None, Cause.CHANCE, lasting, missing)
         elif scatter > STEADY and name == RESPONSE_I:
-            # The largest value differs from window to window, which a longer recording does not reduce.
+            # The largest value scatters from window to window; a longer recording does not reduce this.
             yield Expected(name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
         elif scatter > STEADY:
             yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)

@@ -193,7 +193,7 @@ def sweep_budgets(analysis: SweepAnalysis, overlay: AbstractOverlay[Any] | None)
     """Return budgets for base amplitude and largest Responses of a sweep, with their frequencies."""
     found = analysis.response
     top = found.largest(found.response_ii)
-    # A residual that sensor noise does not explain may be chaos, and a sweep shows only one draw of chaos.
+    # A residual that sensor noise does not explain may be chaos; a sweep then shows only one random sample.
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
