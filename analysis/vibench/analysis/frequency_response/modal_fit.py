@@ -140,7 +140,7 @@ class Leakage:
         return np.asarray(ringing * np.divide(most, size, out=np.ones_like(size), where=size > most))
 
     def covariance(self, line: Integers, rung: Complexes, spread: Reals) -> Complexes:
-        """Return the covariance of the errors' real (or imaginary) part, lower bands (far lines, lines)."""
+        """Return the covariance of the real (or imaginary) errors, lower bands, shape (far lines, lines)."""
         noise = np.sqrt(spread**2 - np.abs(rung) ** 2)
         alike = self.ringing / (self.ringing[0] or 1.0)
         bands = np.zeros((_FAR_LINES, line.size), dtype=np.complex128)
