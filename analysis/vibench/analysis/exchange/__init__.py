@@ -1,8 +1,8 @@
 """Export recordings for other programs, and import their files; one module per format.
 
-Export writes CSV, MATLAB 5, UFF 58 and WAV in blocks, and a labelled xarray Dataset; a failed
-export leaves no file, and no file is overwritten. Import reads these, HDF5 of any layout and TDMS, with a
-mapping of channels; nothing in a file is ever executed. See docs/exchange.md.
+Export writes CSV, MATLAB 5, UFF 58, NeXus and WAV in blocks, or returns a labelled xarray Dataset. A failed
+export leaves no file, and no file is overwritten. Import reads these files, HDF5 of any layout and TDMS, with
+a mapping of channels. Nothing in a file is ever executed. See docs/exchange.md.
 
 >>> import numpy as np
 >>> from pathlib import Path

@@ -1,4 +1,4 @@
-"""Align the channels of a file by their times; raise an error if that is impossible."""
+"""Align the channels of a file by their times; raise an error if they cannot be aligned."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -55,42 +55,42 @@ _TIME = re.compile(
 )
 _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03bc]*)\s*", re.IGNORECASE)
 SAME_RATE = 1e-4
-"""Relative tolerance between two stated sample rates; two clocks differ by less."""
+"""Relative tolerance between two stated sample rates; different clocks deviate by less."""
 EVEN = 1e-3
-"""Largest spread of times about an even axis for which its rate counts as exact, in sample intervals."""
+"""Largest spread of times around an even axis with an exact rate, in sample intervals."""
 _PLACED = 0.1
-"""Tolerance of a time on an even axis in addition to rounding, in sample intervals."""
+"""Tolerance of a time on an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative deviation of an interval from the median, and share of such intervals that shows coarse times."""
+"""Relative deviation of an interval from the median; share of such intervals that means coarse times."""
 _LEAST_ROUNDED = 10
-"""Least differing intervals to recognize rounding; fewer could be lost samples at even distances."""
+"""Minimum number of differing intervals to recognize rounding; fewer could be regularly lost samples."""
 _ROUNDED_SPREAD = 1.05
-"""Largest deviation of rounded times from a line, in last digits."""
+"""Largest range of the deviations of rounded times from a line, in units of the last digit."""
 _COARSE_SPREAD = 1.25
-"""Largest deviation of coarse times from a line, in last digits; more shows missing samples."""
+"""Largest range of the deviations of coarse times from a line, in last digits; more means lost samples."""
 _RISING = 0.9
-"""Least share of non-negative intervals in a channel of times."""
+"""Minimum share of non-negative intervals in a channel of times."""
 _BIN = 512
-"""Number of samples of which only the two extremes are kept."""
+"""Number of samples in a group; only the two extremes of each group are kept."""
 _LEAST_RISING = 64
-"""Least number of evenly rising numbers to accept a channel of another name as times."""
+"""Minimum number of evenly rising values for a channel not named time to count as times."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
-"""Most samples by which times may go back; more means that another record begins."""
+"""Maximum number of samples by which times may go back; beyond it, another record begins."""
 FARTHEST = 2**40
-"""Largest counted gap between two times, in sample intervals."""
+"""Largest gap between two times that is counted, in sample intervals."""
 _DATENUM = (693_000, 770_000)
-"""Days since the year 0 from 1897 to 2108, as MATLAB's ``datenum`` counts them."""
+"""Range of MATLAB's ``datenum`` (days since the year 0) that is taken as a date: 1897 to 2108."""
 _LONGEST_PAUSE = 10
-"""Largest ratio of the time span, in sample intervals, to the samples; more means wrong times."""
+"""Largest ratio of the time span, in sample intervals, to the number of samples; more means wrong times."""
 
 
 def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the fields of a `SourceChannel` that facts state of times, from facts with the nearest first.
+    """Return the time fields of a `SourceChannel` from facts of a file; the nearest facts come first.
 
-    A fact is a rate, an interval, a start, or the unit of one; a name may end with the unit: ``"dt_ms"``,
-    ``"Sample rate [kHz]"``.
+    A fact is a sample rate, an interval, a start, or a unit of these. A name may end with the unit:
+    ``"dt_ms"``, ``"Sample rate [kHz]"``.
     """
     facts = tuple(facts)
     units = {name.strip().casefold(): _text(value).strip() for name, value in facts if "unit" in name.lower()}
@@ -131,7 +131,7 @@ def _rates_hz(facts: Iterable[tuple[str, Any]], units: Mapping[str, str], axis: 
 
 
 def _number(value: Any) -> tuple[float, str]:
-    """Return a single number, possibly written as text, and its unit; NaN for anything else."""
+    """Return a single number, which may be written as text, and its unit; NaN for anything else."""
     found = _QUANTITY.fullmatch(_text(value))
     return (nan, "") if found is None else (float(found[1]), found[2])
 
@@ -149,9 +149,9 @@ def _are_several(value: Any) -> bool:
 
 
 def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
-    """Return the stated time of a channel's first sample, from facts with the nearest first.
+    """Return the stated time of a channel's first sample [s]; the nearest facts come first.
 
-    If a date and an offset are stated, as in NI's waveforms, their sum is returned.
+    If the file states a date and an offset, as in NI waveforms, their sum is returned.
     """
     moments_s, offsets_s = [], []
     for name, value in facts:
@@ -167,7 +167,7 @@ def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
 
 
 def _moment(value: Any) -> float | None:
-    """Return a number or an ISO date as a number of seconds; None for other texts."""
+    """Return a number, or an ISO date in seconds since 1970; None for other texts."""
     number, _ = _number(value)
     if isfinite(number):
         return number
@@ -178,9 +178,9 @@ def _moment(value: Any) -> float | None:
 
 
 def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | None":
-    """Return the time axis from a channel of times, read once in blocks; None for other channels.
+    """Return the time axis that a channel of times contains, read once in blocks; None for other channels.
 
-    Any channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
+    A channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
     """
     found = _TIME.fullmatch(channel.label.strip())
     # Climate and Forecast conventions, 4.4: "seconds since 2026-03-01".
@@ -188,7 +188,7 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or unit in _NO_UNITS else None
     is_named = found is not None and unit in SECONDS
-    # Times that are all the same were rounded too much to contradict anything.
+    # Equal times were rounded too much to contradict anything.
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
@@ -201,13 +201,13 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
         return replace(axis, unit=unit or found["unit"] or "", is_named=True)
     if axis.interval == 1:
         return replace(axis, unit=None)
-    # Numbers under another name may have any unit, so the mapping must confirm the rate.
+    # Values under another name may have any unit, so the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
     return replace(axis, unit=unit if unit in SECONDS else "", uncertainty=uncertainty)
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
-    """Return whether a column under a name of times has times in any order; "t" and "temps" may be others."""
+    """Return whether a column named like times contains times; "t" and "temps" may be other quantities."""
     if found is not None and (channel.unit or found["unit"]):
         return True
     steps = np.diff(np.sort(first))
@@ -217,32 +217,32 @@ def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Times of samples, in the unit of the file."""
+    """Times of samples in the unit of the file."""
 
     start: float
     interval: float
     uncertainty: float
     """Uncertainty of the interval; 0 if exact."""
     rounding: float
-    """Uncertainty of the start by rounding."""
+    """Uncertainty of the start time due to rounding."""
     runs: tuple[tuple[int, int], ...]
     """For each regular stretch: its first sample, and the time of that sample in sample intervals."""
     trouble: str = ""
-    """Reason why the times cannot be used; empty if they can."""
+    """Reason why the times cannot be used; empty if they can be used."""
     unit: str | None = ""
-    """Unit; empty if the file states none, None for sample numbers."""
+    """Unit of the times; empty if the file states none, None for sample numbers."""
     is_named: bool = False
-    """Whether the channel is called time."""
+    """Whether the name of the channel means time."""
 
     @property
     def moments(self) -> tuple[object, ...]:
-        """Start and runs of the times, which are equal for simultaneous channels."""
+        """Start and runs of the times; they are equal for channels sampled at the same times."""
         return round(self.start / self.interval, 2), self.runs
 
     def of(self, channel: SourceChannel) -> SourceChannel:
-        """Return a channel with these times, which must agree with its stated rate.
+        """Return a channel with these times, and an error text if they contradict its stated rate.
 
-        Sample numbers (no unit) only show missing samples.
+        Sample numbers (no unit) only show which samples are missing.
         """
         trouble = channel.time_trouble or self.trouble
         if (unit := self.unit) is None:
@@ -261,7 +261,7 @@ class TimeAxis:
             channel,
             sample_rate_hz=rate if rate is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            # Times that start at zero are relative to the stated start.
+            # Times that start at zero count from the stated start.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second,
@@ -272,7 +272,7 @@ class TimeAxis:
 
 
 def agrees(rate_hz: float, bounds_hz: tuple[float, float]) -> bool:
-    """Return whether a rate lies within bounds, widened by the difference of two clocks."""
+    """Return whether a rate is within bounds, widened by the difference of two clocks."""
     low, high = bounds_hz
     return low * (1 - SAME_RATE) <= rate_hz <= high * (1 + SAME_RATE)
 
@@ -294,10 +294,10 @@ def _begin(block: Reals) -> "_Scan | None":
 
 
 def _last_digit(block: Reals, off: Reals) -> float:
-    """Return the last decimal digit of evenly spaced times whose rounding explains all intervals; 0 if none.
+    """Return the last decimal digit of evenly spaced times if rounding explains their intervals; else 0.
 
-    An interval of 1.04 digits looks like one digit, and one lost sample in 25. Lost samples move the times
-    after them away from a line; rounding does so by half a digit at most.
+    Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
+    later times away from a line; rounding moves each time by half a digit at most.
     """
     if off.size < _LEAST_ROUNDED:
         return 0.0
@@ -311,7 +311,7 @@ def _last_digit(block: Reals, off: Reals) -> float:
 
 
 class _Scan:
-    """Scan of times that keeps jumps and the extremes of the deviation from an even axis."""
+    """Scan of times; it keeps the jumps and the largest deviations from an even axis."""
 
     def __init__(self, interval: float, rounding: float) -> None:
         self._interval, self._rounding = interval, rounding
@@ -350,13 +350,13 @@ class _Scan:
         self._samples += block.size
 
     def axis(self) -> TimeAxis:
-        """Return the time axis fitted to all times added."""
+        """Return the time axis fitted to all times that were added."""
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
         slope, offset = 0.0, float(np.mean(distance))
         if np.ptp(places):
             fitted = np.polyfit(places / span, distance, 1)
-            # A line through the few extremes of a short file may be worse than the one through its ends.
+            # In a short file, a line through the few extremes may fit worse than the line through the ends.
             if np.ptp(distance - fitted[0] * places / span) < np.ptp(distance):
                 slope, offset = float(fitted[0]), float(fitted[1])
         off = distance - slope * places / span - offset
@@ -390,7 +390,7 @@ def _impossible(runs: list[tuple[int, int]], samples: int, span: float) -> str:
 
 @dataclass(frozen=True)
 class Piece:
-    """Stretch of evenly spaced samples of a file."""
+    """Stretch of evenly spaced samples in a file."""
 
     first: int
     """Index of the first sample in the file."""
@@ -400,14 +400,14 @@ class Piece:
 
     @property
     def end(self) -> int:
-        """Place one past the last sample."""
+        """Time one past the last sample, in sample intervals."""
         return self.place + self.samples
 
 
 def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
-    """Split a channel where its times jump; samples at repeated places are left out.
+    """Return the parts of a channel between jumps of its times; samples at repeated times are left out.
 
-    Raises InvalidRequest when the times go back by more than a few samples: two records were joined.
+    Raises InvalidRequest when the times go back by more than 100 samples, because two records were joined.
     """
     starts = channel.runs or ((0, 0),)
     kept: list[Piece] = []
@@ -432,7 +432,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
 def restarts(
     starts_s: Mapping[int, float], rate_hz: float | None, samples: int
 ) -> tuple[tuple[tuple[int, int], ...], str]:
-    """Return the runs (see `TimeAxis`) of a channel with several stated starts, and any contradiction."""
+    """Return runs (as in `TimeAxis`) of a channel with several stated starts, and a contradiction or ""."""
     runs = [(0, 0)]
     first_s = next(iter(starts_s.values()), 0.0)
     for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):
@@ -446,14 +446,14 @@ def restarts(
 
 
 _APART = 0.1
-"""Largest offset, in sample intervals, that channels analysed together may have."""
+"""Largest offset between channels that are analysed together, in sample intervals."""
 _IGNORE = 'give time = "even" and sample_rate_hz in the mapping to ignore it'
 _UNITS = ("s", "ms", "us", "ns", "min", "h", "d")
 
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Places of the samples of channels on one even axis."""
+    """Positions of the samples of several channels on one even time axis."""
 
     rate_hz: float
     places: int
@@ -461,15 +461,15 @@ class Alignment:
     pieces: tuple[tuple[Piece, ...], ...]
     """Pieces of each channel."""
     late_s: tuple[float, ...]
-    """Remaining delay of each channel after rounding to whole intervals; at most half an interval."""
+    """Delay of each channel that remains after rounding to whole intervals; at most half an interval."""
     remarks: tuple[str, ...]
-    """Remarks on times in the file, and on times that the mapping replaces."""
+    """Remarks on the times in the file, and on times that the mapping replaces."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:
-    """Put channels on one time axis.
+    """Return the positions of all channels on one time axis.
 
-    Raises InvalidRequest when the file contradicts itself or the mapping, or cannot be put on one axis.
+    Raises InvalidRequest when the file contradicts itself or the mapping, or no common axis exists.
     """
     remarks = dict.fromkeys(_overridden(channels, mapping))
     placed = [_with_unit(each, mapping) for each in channels]
@@ -529,7 +529,7 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
 
 
 def _with_unit(channel: SourceChannel, mapping: ImportMapping) -> SourceChannel:
-    """Return a channel with times in the mapping's unit, or in one that fits its sample rate."""
+    """Return a channel with times in the mapping's unit, or in a unit that fits the mapping's sample rate."""
     if mapping.time == "even":
         return SourceChannel(channel.name, channel.samples, channel.label)
     if channel.time_unit is None:
@@ -557,7 +557,7 @@ def _in_unit(channel: SourceChannel, unit: str) -> SourceChannel:
 
 
 def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> float:
-    """Return the sample rate of the mapping, otherwise of the file."""
+    """Return the sample rate of the mapping, or that of the file if the mapping gives none."""
     rates_hz = sorted({each.sample_rate_hz for each in channels if each.sample_rate_hz is not None})
     longest = max(each.samples for each in channels)
     given = mapping.sample_rate_hz
@@ -589,14 +589,14 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
 
 
 def _same(rates_hz: Sequence[float], samples: int) -> bool:
-    """Return whether channels of these sorted rates remain aligned over this many samples."""
+    """Return whether channels of these sorted rates stay aligned over this number of samples."""
     return all(
         (high / low - 1) * samples <= _APART for low, high in pairwise((*rates_hz[:1], *rates_hz[-1:]))
     )
 
 
 def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> None:
-    """Raise InvalidRequest if channels differ in a stated delay or start that cannot be interpreted."""
+    """Raise InvalidRequest if channels state different delays or starts whose meaning is unclear."""
     both = zip(channels, mapping.channels, strict=True)
     unclear = [each for each, mapped in both if "delay_s" not in mapped.model_fields_set]
     for first, each in pairwise(unclear):
@@ -609,10 +609,10 @@ def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping
 
 
 def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> list[float]:
-    """Return the start of each channel after the first one, in sample intervals."""
+    """Return the start of each channel relative to the earliest channel, in sample intervals."""
     known = {each.start_s: each for each in channels if each.start_s is not None}
     unknown = [each.name for each in channels if each.start_s is None]
-    # Channels without a stated start begin at zero, if that is where the others begin.
+    # Channels without a stated start begin at zero, if the others begin there too.
     stated = (*known, 0.0) if unknown else tuple(known)
     if not known or (max(stated) - min(stated)) * rate_hz < _APART / 100:
         return [0.0 for _ in channels]

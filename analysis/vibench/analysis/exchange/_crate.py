@@ -1,7 +1,7 @@
-"""Pack a folder of recordings as a Research Object Crate, a zip for a data repository.
+"""Pack a folder of recordings as a Research Object Crate, a zip file for a data repository.
 
-RO-Crate 1.1: ``ro-crate-metadata.json`` describes every file, and for recordings the excitation, end,
-channels, units and software.
+In RO-Crate 1.1, ``ro-crate-metadata.json`` describes every file. For recordings it also contains the
+excitation, the reason for the end, channels, units and software.
 """
 
 import hashlib
@@ -38,13 +38,13 @@ class CrateFacts:
     """Facts for the crate that are not in the folder."""
 
     licence: str
-    """Address of the licence: ``https://creativecommons.org/licenses/by/4.0/``."""
+    """Address of the licence, such as ``https://creativecommons.org/licenses/by/4.0/``."""
     authors: tuple[str, ...] = ()
     title: str = ""
-    """The folder's name if empty."""
+    """Title; the name of the folder if empty."""
     description: str = ""
     organisation: str = ""
-    """Publisher and affiliation of the authors."""
+    """Publisher, and affiliation of the authors."""
     organisation_url: str = ""
 
 
@@ -62,22 +62,22 @@ def pack_folder(
     folder
         Folder of recordings with journals, reports and tables; it is not changed.
     crate
-        The new zip; nothing is overwritten.
+        The new zip file; an existing file is not overwritten.
     facts
         Licence, authors and their organisation, title.
     untrusted
-        Reasons not to trust recordings, by path below the folder, from `vibench.acquisition.campaign`'s
-        ``verify_recordings``. They are packed unchanged, with a remark in the description.
+        Reasons not to trust recordings, keyed by path below the folder, from `vibench.acquisition.campaign`'s
+        ``verify_recordings``. Such recordings are packed unchanged, with a remark in the description.
     observer
         Receives the number of bytes packed since the last call.
 
     Raises
     ------
     NotEnoughData
-        When the folder holds no recording.
+        When the folder contains no recording.
     InvalidRequest
-        When the licence or the organisation's page is not an address, a link leads out of the folder, or the
-        zip exists or cannot be written.
+        When the licence or the organisation's page is not a web address, a link leads out of the folder, or
+        the zip file exists or cannot be written.
     """
     _require_addresses(facts)
     files = (each for each in sorted(folder.rglob("*")) if each.is_file() and each != crate)
@@ -170,7 +170,7 @@ def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
 
 
 def _licence_name(address: str) -> str:
-    """Return "CC BY 4.0" for addresses of Creative Commons, and the last part of any other."""
+    """Return "CC BY 4.0" and similar for Creative Commons; for other addresses, their last part."""
     found = _CREATIVE_COMMONS.search(address)
     if found is None:
         return address.rstrip("/").rpartition("/")[2]

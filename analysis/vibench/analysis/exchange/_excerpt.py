@@ -1,4 +1,4 @@
-"""Part of a recording for export: some channels and a stretch of time, read in blocks."""
+"""Part of a recording to export: some channels over a stretch of time, read in blocks."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -10,19 +10,19 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Reals
 
 BLOCK_SAMPLES = 51_200
-"""Samples in a block, as in one chunk of the file: 0.4 MB per channel."""
+"""Samples per block, as in one chunk of the file; 0.4 MB per channel."""
 
 TransferObserver = Callable[[int], None]
-"""Callback with the number of values written since its last call."""
+"""Callback that receives the number of values written since its last call."""
 
 
 def ignore_progress(_values: int) -> None:
-    """Ignore the progress."""
+    """Do nothing; the default observer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Excerpt:
-    """Channels and samples of a recording; made by :func:`excerpt`."""
+    """Channels and sample range of a recording; :func:`excerpt` creates it."""
 
     recording: Recording
     channels: tuple[ChannelHeader, ...]
@@ -42,7 +42,7 @@ class Excerpt:
 
     @property
     def values(self) -> int:
-        """Total number of values of all channels, for progress."""
+        """Total number of values of all channels, for the progress display."""
         return self.samples * len(self.channels)
 
     @property
@@ -66,25 +66,25 @@ def excerpt(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> Excerpt:
-    """Return an excerpt of some channels (by default all) and a stretch of time.
+    """Return an excerpt with some channels (by default all) over a stretch of time.
 
     Parameters
     ----------
     recording
-        Open.
+        An open recording.
     roles
-        Names of channels.
+        Names of the channels.
     from_s, to_s
-        Seconds since the first sample; to the end if absent.
+        Start and end in seconds since the first sample; by default start and end of the recording.
 
     Raises
     ------
     RecordingError
-        When there is no such channel.
+        When the recording has no such channel.
     InvalidRequest
-        When the stretch lies outside the recording, or a channel is named twice.
+        When the stretch is outside the recording, or a channel is named twice.
     NotEnoughData
-        When the recording holds no samples.
+        When the recording contains no samples.
     """
     wanted = tuple(roles) or recording.roles
     if len(set(wanted)) != len(wanted):
@@ -105,7 +105,7 @@ def excerpt(
 
 
 def _sample(place: float) -> int:
-    """Round to a sample; values that are not finite lie outside every recording."""
+    """Return the nearest sample; -1, outside every recording, for values that are not finite."""
     return round(place) if isfinite(place) else -1
 
 

@@ -41,10 +41,10 @@ def require_unused(path: Path) -> None:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary name; rename it to ``path`` on success, otherwise delete it.
+    """Yield a temporary name; rename that file to ``path`` on success, otherwise delete it.
 
-    Raises InvalidRequest when ``path`` or its temporary name exists, the folder does not exist, or
-    writing fails.
+    Raises InvalidRequest when ``path`` or its temporary name exists, the folder does not exist, or writing
+    fails.
     """
     unfinished = path.with_name(path.name + UNFINISHED)
     for each in (path, unfinished):
@@ -64,7 +64,7 @@ def new_file(path: Path) -> Iterator[Path]:
 
 
 def require_results(recording: Recording) -> Mapping[str, SavedResult]:
-    """Return the results; raises NotEnoughData when there are none."""
+    """Return the saved results of a recording; raises NotEnoughData when there are none."""
     found = recording.results
     if not found:
         raise NotEnoughData(
@@ -75,7 +75,7 @@ def require_results(recording: Recording) -> Mapping[str, SavedResult]:
 
 
 def result_paths(recording: Recording, path: Path) -> tuple[Path, ...]:
-    """Return the files that :func:`write_result_tables` makes; raises InvalidRequest if one exists."""
+    """Return the files that :func:`write_result_tables` would write; raises InvalidRequest if one exists."""
     paths = tuple(path.with_name(f"{path.stem}.{each.name}.csv") for each in _tables(recording))
     for each in paths:
         require_unused(each)
@@ -83,7 +83,7 @@ def result_paths(recording: Recording, path: Path) -> tuple[Path, ...]:
 
 
 def write_result_tables(recording: Recording, path: Path) -> tuple[Path, ...]:
-    """Write each result beside ``path``, as one file ``NAME.RESULT.AXIS.csv`` for every set of axes."""
+    """Write each result next to ``path``, in one file ``NAME.RESULT.AXIS.csv`` per set of axes."""
     paths = result_paths(recording, path)
     for each, content in zip(paths, _tables(recording), strict=True):
         with new_file(each) as unfinished:
@@ -92,7 +92,7 @@ def write_result_tables(recording: Recording, path: Path) -> tuple[Path, ...]:
 
 
 def matlab_results(recording: Recording) -> dict[str, Any]:
-    """Return the results as nested structs: ``results.noise.transmission.values``."""
+    """Return the results as nested structs, such as ``results.noise.transmission.values``."""
     return {
         _identifier(name): {
             "settings_json": json.dumps(dict(result.settings)),
@@ -112,7 +112,7 @@ def matlab_results(recording: Recording) -> dict[str, Any]:
 
 
 def _identifier(name: str) -> str:
-    """Convert the name of a result to a MATLAB name: ``noise-2`` becomes ``noise_2``."""
+    """Return the name of a result as a valid MATLAB name: ``noise-2`` becomes ``noise_2``."""
     return "".join(each if each.isalnum() else "_" for each in name)
 
 
@@ -124,7 +124,7 @@ def _tables(recording: Recording) -> Iterator[Table]:
 
 
 def _table(name: str, arrays: Mapping[str, ResultArray], axes: tuple[str, ...]) -> Table:
-    """Join all values over the same axes into one table, one row per grid point."""
+    """Return one table of all values over the same axes, with one row per grid point."""
     grid = np.meshgrid(*(arrays[axis].values for axis in axes), indexing="ij")
     columns = {_heading(axis, arrays[axis].unit): values for axis, values in zip(axes, grid, strict=True)}
     for key, array in arrays.items():
@@ -146,18 +146,18 @@ def _heading(name: str, unit: str) -> str:
 
 
 class Format(StrEnum):
-    """Export formats; the value is also the file's suffix."""
+    """Export formats; the value is also the file suffix."""
 
     CSV = "csv"
-    """Text with units in its headings."""
+    """Text with units in the headings."""
     UFF = "uff"
     """Universal file, datasets 58: samples binary, spectra as text."""
     MAT = "mat"
-    """MATLAB 5: a struct for each channel."""
+    """MATLAB 5 with one struct per channel."""
     NEXUS = "nxs"
-    """HDF5 after the NeXus standard: silx and others plot it with labels."""
+    """HDF5 in the NeXus standard, which silx and other programs plot with labels."""
     WAV = "wav"
-    """Sound: 32 bits, full scale is 1."""
+    """Sound with 32 bits; full scale is 1."""
 
 
 class Results(Enum):
@@ -174,17 +174,17 @@ def export_samples(
     results: Results = Results.LEFT_OUT,
     observer: TransferObserver = ignore_progress,
 ) -> tuple[Path, ...]:
-    """Write the excerpt to ``path``, and facts that its format cannot store to ``PATH.facts.json``.
+    """Write the excerpt to ``path``, and facts that the format cannot store to ``PATH.facts.json``.
 
-    Results become structs in a MATLAB file, and ``NAME.RESULT.AXIS.csv`` beside other formats. Returns the
-    written files. Nothing is ever overwritten.
+    Results become structs in a MATLAB file; for other formats they are written to ``NAME.RESULT.AXIS.csv``.
+    Returns the written files. Nothing is ever overwritten.
 
     Parameters
     ----------
     excerpt
-        As `excerpt` gives it.
+        Channels and sample range, from `excerpt`.
     to
-        The format.
+        Export format.
     path
         The new file.
     results
@@ -195,11 +195,11 @@ def export_samples(
     Raises
     ------
     InvalidRequest
-        When a name is taken, writing fails, or the format cannot store so much; no file is left.
+        When a file name exists, writing fails, or the excerpt is too large for the format; no file is left.
     UnusableData
-        When the recording is not as it was sealed.
+        When the recording was changed after it was sealed.
     NotEnoughData
-        When results are requested and none is saved.
+        When results are requested but none is saved.
     """
     require_intact(excerpt.recording)
     return EXPORTERS[to].export(excerpt, path, results, observer)
@@ -208,19 +208,19 @@ def export_samples(
 def export_functions(
     excerpt: Excerpt, functions: Sequence[UniversalFunction], to: Format, path: Path
 ) -> tuple[Path, ...]:
-    """Write frequency responses and spectra of an excerpt to ``path``, and its facts beside it.
+    """Write frequency responses and spectra of an excerpt to ``path``, and its facts to a file next to it.
 
-    Raises InvalidRequest when the format cannot store them, a name is taken, or writing fails; no file is
+    Raises InvalidRequest when the format cannot store them, a file name exists, or writing fails; no file is
     left.
 
     Parameters
     ----------
     excerpt
-        Source of the functions.
+        Excerpt from which the functions were estimated.
     functions
         Functions in the order of writing.
     to
-        A format that can store them.
+        Export format that can store functions.
     path
         The new file.
     """
@@ -247,12 +247,12 @@ def export_scan(
 ) -> Path:
     """Write the nodes of a scan and their frequency responses to a universal file.
 
-    Raises InvalidRequest when the name is taken or writing fails; no file is left.
+    Raises InvalidRequest when the file exists or writing fails; no file is left.
 
     Parameters
     ----------
     nodes
-        Coordinates x, y and z [m] by the number of the node.
+        Coordinates x, y and z [m], keyed by node number.
     functions
         Functions in the order of writing, each with its recording.
     path
@@ -276,21 +276,21 @@ WriteAll = Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
 
 @dataclass(frozen=True)
 class Exporter:
-    """Exporter of one format, a row of `EXPORTERS`."""
+    """Exporter of one format, an entry of `EXPORTERS`."""
 
     write: WriteSamples | None = None
-    """Writes samples; facts and results are written beside them."""
+    """Writes samples; facts and results go to separate files."""
     require: Callable[[Excerpt], None] = _accept
-    """Raises InvalidRequest for an excerpt that the format cannot hold."""
+    """Raises InvalidRequest for an excerpt that the format cannot store."""
     write_functions: WriteFunctions | None = None
-    """Writes frequency responses and spectra; None if the format cannot."""
+    """Writes frequency responses and spectra; None if the format cannot store them."""
     write_all: WriteAll | None = None
     """Writes samples, facts and results into one file."""
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
     ) -> tuple[Path, ...]:
-        """Write and return the files after checking that all names are free."""
+        """Check that all file names are free, write the files, and return them."""
         recording, facts, written = excerpt.recording, facts_path(path), [path]
         are_included = results is Results.INCLUDED
         self.require(excerpt)
@@ -317,4 +317,4 @@ EXPORTERS: Mapping[Format, Exporter] = {
     Format.NEXUS: Exporter(write_nexus),
     Format.WAV: Exporter(write_wav, require_sound),
 }
-"""Exporters by format. A new format needs a module with its writer, a value above, and a row here."""
+"""Exporters by format. A new format needs a writer module, a value in `Format`, and an entry here."""

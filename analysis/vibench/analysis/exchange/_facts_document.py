@@ -1,4 +1,4 @@
-"""Facts of a recording beside its samples as JSON, for formats that cannot store them."""
+"""Facts of a recording as a JSON file next to its samples, for formats that cannot store them."""
 
 import json
 from dataclasses import asdict
@@ -11,12 +11,12 @@ SUFFIX = ".facts.json"
 
 
 def facts_path(path: Path) -> Path:
-    """Return the path of the facts: ``NAME.csv.facts.json`` beside ``NAME.csv``."""
+    """Return the path of the facts file: ``NAME.csv.facts.json`` for ``NAME.csv``."""
     return path.with_name(path.name + SUFFIX)
 
 
 def facts_document(excerpt: Excerpt) -> dict[str, Any]:
-    """Return the facts; samples are counted from the first one of the recording."""
+    """Return the facts of an excerpt; sample numbers count from the first sample of the recording."""
     recording = excerpt.recording
     return {
         "recording": excerpt.name,

@@ -20,29 +20,29 @@ from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
-"""HDF5's message for a truncated file."""
+"""Error message of HDF5 for a truncated file."""
 MOST_LETTERS = 1000
-"""Longest text of MATLAB that is read."""
+"""Maximum length of MATLAB texts that are read."""
 
 Facts = tuple[tuple[str, Any], ...]
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Location of a channel's numbers in the file."""
+    """Location of a channel's values in the file."""
 
     path: str
     row: int | None
-    """Row or column of a table; None for a dataset of one dimension."""
+    """Row or column of a two-dimensional dataset; None for a one-dimensional dataset."""
     has_time_first: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Hdf5Source:
-    """One-dimensional datasets, and the rows or columns of two-dimensional ones: ``"/data#1"``, from one.
+    """Channels in an HDF5 file: 1-D datasets, and rows or columns of 2-D ones, named ``"/data#1"``, ...
 
-    CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. A file whose data lie in other files
-    (external links and storage, virtual datasets) is refused unless external data are allowed.
+    CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. Files that refer to data in other
+    files (external links and storage, virtual datasets) are refused unless external data are allowed.
     """
 
     file: h5py.File
@@ -144,13 +144,13 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int, place: int, beside:
 
 
 def _origin(file: h5py.File) -> Origin | None:
-    """Read the origin stated by a recording or by an export of one."""
+    """Return the origin stated by a recording or by the export of a recording; None if not stated."""
     origin = str(file.attrs.get("origin", ""))
     return Origin(origin) if origin in set(Origin) else None
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Return named attributes, texts and single values of a group."""
+    """Return the attributes, texts and single values of a group, with their names."""
     if group.name not in known:
         hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
         items = [(name, group[name]) for name in hard]
@@ -160,14 +160,14 @@ def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
 
 
 def _facts_above(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Return the facts of the groups that contain a group, the nearest first."""
+    """Return the facts of all groups that contain a group, the nearest group first."""
     if group.name == "/":
         return ()
     return (*_facts(group.parent, known), *_facts_above(group.parent, known))
 
 
 def _value(dataset: h5py.Dataset) -> Any:
-    """Return a single value, or texts of MATLAB (codes of letters, in cells references to them)."""
+    """Return a single value, or MATLAB texts (stored as letter codes, in cells as references to these)."""
     if dataset.size > MOST_LETTERS or dataset.size == 0:
         return None
     match dataset.attrs.get("MATLAB_class"):
@@ -181,7 +181,7 @@ def _value(dataset: h5py.Dataset) -> Any:
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float, place: int) -> float:
-    """Return an attribute, or its value for a row or column of a table."""
+    """Return an attribute as a number; for one number per row or column, the number at ``place``."""
     numbers = np.ravel(dataset.attrs.get(name, otherwise))
     if numbers.size not in {1, min(dataset.shape)}:
         raise UnusableData(f"{dataset.name} has {numbers.size} numbers in {name}; export the file again")

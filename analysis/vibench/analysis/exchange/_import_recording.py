@@ -1,6 +1,6 @@
-"""Import a file as a recording, with its mapping, origin and checksum.
+"""Import a file as a recording, with a mapping, an origin and a checksum.
 
-The mapping gives the times of the plan's parts; otherwise the parts follow one after the other.
+The mapping gives the times of the plan's parts; without times, the parts follow one another.
 """
 
 import hashlib
@@ -40,7 +40,7 @@ from ._source_channel import SourceChannel
 
 @dataclass(frozen=True)
 class LaidPart:
-    """A part of the plan as a range of samples."""
+    """A part of the plan as a range of samples in the file."""
 
     segment: Segment
     start: int
@@ -56,10 +56,9 @@ class _Planned:
 
 
 def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[LaidPart, ...]:
-    """Place the plan's parts in the file; parts after its end are left out, the last may be cut.
+    """Return the plan's parts as sample ranges; parts after the end of the file are left out or cut.
 
-    Raises InvalidRequest for too many or overlapping parts, or if none lies inside the
-    file.
+    Raises InvalidRequest when there are too many parts, parts overlap, or no part begins inside the file.
     """
     planned = list(_recorded_steps(mapping.measurement.excitation))
     stretches = _stated_times(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
@@ -77,7 +76,7 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
 
 
 def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_Planned]:
-    """Join the steps that a run records as one."""
+    """Yield the parts of the plan; steps that a run records without interruption are joined."""
     joined = 0
 
     def part(step: Step) -> int:
@@ -117,14 +116,14 @@ def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterat
 FARTHEST = 2.0**62
 """Sample number beyond the end of any file."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e100
-"""Range of a channel's largest number, so that squares and steps stay finite."""
+"""Range of a channel's largest value, so that squares and steps stay finite."""
 NEAR_FULL_SCALE = 0.95
-"""Share of the full scale from which a sample counts as overloaded, as at the bench."""
+"""Share of full scale from which a sample counts as overloaded, as during acquisition."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Wanted:
-    """One channel to import, with mapping and source."""
+    """One channel to import, with its mapping and its source channel."""
 
     mapped: ChannelMapping
     source: SourceChannel
@@ -132,7 +131,7 @@ class _Wanted:
     late_s: float
 
     def read(self, source: Source, start: int, stop: int) -> Reals:
-        """Read a stretch of the common time axis; places without a sample are NaN."""
+        """Return samples of the common time axis from ``start`` to ``stop``; missing samples are NaN."""
         values = np.full(stop - start, np.nan)
         begin = bisect_right(self.pieces, start, key=lambda piece: piece.end)
         for piece in self.pieces[begin:]:
@@ -147,12 +146,11 @@ class _Wanted:
 def import_recording(
     path: Path, mapping: ImportMapping, out: Path, observer: TransferObserver = ignore_progress
 ) -> Path:
-    """Make the recording ``out`` from a file, in blocks.
+    """Write the recording ``out`` from a file, in blocks; return its path.
 
-    Channels are aligned by the times in the file. Missing samples and values that are not finite count as
-    lost samples of all channels. The stored "volts" are the
-    numbers in the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
-    two above their largest.
+    Channels are aligned by the times in the file. Missing samples, and values that are not finite, count as
+    lost samples of all channels. The stored "volts" are the numbers in the file: integers of up to 31 bits
+    are stored exactly, other numbers to 2^-30 of the power of two above the largest.
 
     Parameters
     ----------
@@ -162,11 +160,11 @@ def import_recording(
     Raises
     ------
     InvalidRequest
-        When mapping and file do not fit together.
+        When mapping and file contradict each other.
     UnusableData
         When the file is damaged.
     RecordingError
-        When ``out`` exists or cannot be written. Nothing is left of a failed import.
+        When ``out`` exists or cannot be written. A failed import leaves no file.
     """
     with opened_source(path) as source:
         found = [find_channel(source, each.source, path) for each in mapping.channels]
@@ -192,7 +190,7 @@ def import_recording(
             _write(writer, source, wanted, parts, samples, observer)
             _require_samples(writer, path)
         except BaseException:
-            # An incomplete import is deleted, since its source still exists.
+            # An incomplete import is deleted; its source still exists.
             writer.finish(RecordingState.FAILED, "the import was not completed")
             out.unlink(missing_ok=True)
             raise
@@ -205,7 +203,7 @@ def _require_samples(writer: RecordingWriter, path: Path) -> None:
 
 
 def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
-    """Return the origin; one simulated channel makes the whole recording simulated."""
+    """Return the origin of the recording; it is simulated if any channel is simulated."""
     origins = {each.source.origin for each in wanted if each.source.origin is not None}
     if mapping.origin is not None and origins - {mapping.origin}:
         raise InvalidRequest(
@@ -267,7 +265,7 @@ def _peak(source: Source, channel: SourceChannel) -> float:
 
 
 def _power_of_two_above(peak: float, name: str) -> float:
-    """Return the smallest power of two that is not below a peak in the file of this name.
+    """Return the smallest power of two that is at least ``peak``; ``name`` is used in the error.
 
     Raises UnusableData when a recording cannot store the peak.
     """
@@ -285,7 +283,7 @@ def _power_of_two_above(peak: float, name: str) -> float:
 def _bench(
     path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], remarks: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what is known of the bench, and facts on the imported file."""
+    """Return the known facts of the bench, and facts on the imported file."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     bench: dict[str, Any] = {
@@ -333,7 +331,7 @@ def _write(
 
 
 def _blocks(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator[Block]:
-    """Yield blocks without missing numbers, and mark samples near full scale."""
+    """Yield blocks without missing values, with marks on samples near full scale."""
     for start, stop in _runs(np.all(np.isfinite(values), axis=0)):
         kept = np.ascontiguousarray(values[:, start:stop])
         yield Block(first + start, kept, tuple(_overloads(kept, first + start, wanted)))

@@ -1,4 +1,4 @@
-"""Samples for other Python packages: dictionaries for SDyPy (SEP 005), and a labelled xarray.Dataset."""
+"""Samples for other Python packages: SEP 005 dictionaries for SDyPy, and a labelled xarray.Dataset."""
 
 import json
 from collections.abc import Sequence
@@ -22,18 +22,18 @@ QUANTITIES = {"velocity": "v", "acceleration": "a", "displacement": "d", "force"
 
 
 def sep005(excerpt: Excerpt) -> list[dict[str, Any]]:
-    """Return the channels of an excerpt as SDyPy's packages expect them; lost samples are NaN.
+    """Return the channels of an excerpt in the form that SDyPy packages read; lost samples are NaN.
 
     Parameters
     ----------
     excerpt
-        Result of `excerpt` for an open recording.
+        Excerpt of an open recording.
 
     Returns
     -------
     list of dict
-        For each channel ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` if SEP
-        005 defines a letter for it, ``start_timestamp`` of the first sample, and ``group``, the recording.
+        For each channel: ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` if SEP
+        005 defines a letter for it, ``start_timestamp`` of the first sample, and ``group``: the recording.
     """
     recording = excerpt.recording
     rate = recording.sample_rate_hz
@@ -62,14 +62,14 @@ def xarray_dataset(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> "xarray.Dataset":
-    """Return channels in their physical units over ``time`` [s since the first sample], in memory.
+    """Return channels in physical units over ``time`` [s since the first sample], in memory.
 
-    Lost samples are NaN. ``segment`` is the segment number of each sample, -1 between segments; the
-    attribute ``segments_json`` describes them. Open a finished file larger than memory directly:
+    Lost samples are NaN. ``segment`` is the segment number of each sample, -1 between segments; the attribute
+    ``segments_json`` describes the segments. Open a finished file that is larger than memory directly:
     ``xarray.open_dataset(path, engine="h5netcdf")``.
 
-    Raises InvalidRequest when xarray is not installed, or the stretch lies outside the recording;
-    UnusableData when the recording is not as it was sealed.
+    Raises InvalidRequest when xarray is not installed, or the stretch is outside the recording; UnusableData
+    when the recording was changed after it was sealed.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def xarray_dataset(
     roles
         Channels; by default all.
     from_s, to_s
-        Stretch of time [s]; by default the whole recording.
+        Start and end of the stretch [s]; by default the whole recording.
     """
     try:
         import xarray  # noqa: PLC0415 - an optional extra
@@ -117,7 +117,7 @@ def _attributes(channel: ChannelHeader) -> dict[str, str | float]:
 
 
 def _numbers_of_segments(recording: Recording, start: int, stop: int) -> NDArray[np.int16]:
-    """Return the segment number of each sample."""
+    """Return the segment number of each sample, -1 between segments."""
     numbers = np.full(stop - start, BETWEEN, dtype=np.int16)
     for number, each in enumerate(recording.segments):
         numbers[max(each.start - start, 0) : max(each.stop - start, 0)] = number

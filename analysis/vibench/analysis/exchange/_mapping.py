@@ -1,4 +1,4 @@
-"""Mapping of a foreign file, as TOML: its channels and the excitation."""
+"""Mapping of a foreign file, written as TOML: its channels and the excitation."""
 
 import re
 from datetime import date
@@ -25,24 +25,24 @@ KNOWN_ROLES = {
 
 
 _NO_UNIT = {"", "-", "1", "none", "None"}
-"""Texts of a unit in a file that mean no unit."""
+"""Texts that mean "no unit" in a file."""
 _LARGEST_CORRECTION = 0.2
-"""Largest relative correction by a scale, beyond which the scale contradicts the unit in the file."""
+"""Largest relative difference between a scale and the file's unit; a larger one is a contradiction."""
 
 
 def _is_another_quantity(file_unit: str) -> bool:
-    """Return whether a unit is one of motion or force, which a scale cannot convert to another quantity."""
+    """Return whether a unit is one of motion or force; a scale cannot convert it to another quantity."""
     return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
 
 
 def unit_in_name(name: str) -> str:
-    """Return the unit at the end of a name: ``"v / mm/s"``, ``"v_mm_s"``; empty if there is none."""
+    """Return the unit at the end of a name, as in ``"v / mm/s"``, ``"v_mm_s"``; empty if there is none."""
     for found in _BEFORE_UNIT.finditer(name):
         unit, sign = name[found.end() :].strip(" ])"), found[0].strip()
         unit = unit.replace("_", "/") if sign == "_" else unit
         is_letter = sign in {"", "_"} and (len(unit) == 1 or unit == "in")
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
-        # As in DIN 461, such as "a / Gal"; a longer word may be another name.
+        # DIN 461 writes "a / Gal"; a longer word may be another name.
         is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
         if sign == "[" or is_unknown or (is_known and (not is_letter or (unit == "g" and sign))):
             return unit
@@ -57,18 +57,18 @@ class ChannelMapping(FrozenModel):
     """One channel: ``value = factor * number in the file + offset``, in ``unit``."""
 
     source: str = Field(min_length=1)
-    """Its name in the file, as `vibench import FILE` lists it."""
+    """Name of the channel in the file, as `vibench import FILE` lists it."""
     role: str = Field(pattern=f"^{ROLE_PATTERN.pattern}$")
-    """Its name in the recording: ``drive_voltage``, ``base_acceleration``, ``m0_velocity``,
+    """Name of the channel in the recording: ``drive_voltage``, ``base_acceleration``, ``m0_velocity``,
     ``m0_acceleration``, ``m0_displacement``, or any other."""
     quantity: str = ""
     unit: str = ""
-    """UDUNITS text of the value; known for the channels that an analysis needs."""
+    """Unit of the value in UDUNITS notation; known for the channels that an analysis needs."""
     file_unit: str = ""
-    """Unit of the numbers in the file, if missing or wrong there: ``"g"``, ``"mm/s"``, ``"V"``."""
+    """Unit of the numbers in the file, if it is missing or wrong there: ``"g"``, ``"mm/s"``, ``"V"``."""
     scale: float | str | None = None
-    """Unit per number in the file; by default from the unit in the file, else 1. For a file in volts, the
-    sensor's sensitivity: ``"100 mV/g"``."""
+    """Factor from numbers in the file to ``unit``; by default from the unit in the file, else 1. For a file
+    in volts: the sensitivity of the sensor, such as ``"100 mV/g"``."""
     offset: float = 0.0
     full_scale: PositiveFloat | None = None
     """Full scale of the input, as a number in the file; values near it are marked as overloads."""
@@ -107,7 +107,7 @@ class ChannelMapping(FrozenModel):
         return self
 
     def factor(self, file_unit: str) -> float:
-        """Return the factor from numbers in ``file_unit`` (empty if the file states none) to the unit.
+        """Return the factor from numbers in ``file_unit`` (empty if the file states none) to ``unit``.
 
         Raises ValueError when the scale contradicts the unit, or is needed and missing.
         """
@@ -140,12 +140,12 @@ class ChannelMapping(FrozenModel):
 
     @property
     def kind(self) -> tuple[str, str]:
-        """Quantity and unit, by default from its role."""
+        """Quantity and unit of the channel, by default those of its role."""
         return KNOWN_ROLES.get(self.role, (self.quantity, self.unit))
 
 
 class Part(FrozenModel):
-    """Place of a part of the plan in the file [s since its first sample]."""
+    """Start and end of a part of the plan in the file [s since its first sample]."""
 
     start_s: NonNegativeFloat
     stop_s: PositiveFloat
@@ -160,27 +160,27 @@ class Part(FrozenModel):
 
 
 class ImportMapping(FrozenModel):
-    """Information for the analysis that is not in the file."""
+    """Information that an analysis needs and that is not in the file."""
 
     started_utc: AwareDatetime
-    """Time of the measurement with time zone: ``2026-03-01T12:00:00Z``."""
+    """Time of the measurement with time zone, such as ``2026-03-01T12:00:00Z``."""
     sample_rate_hz: PositiveFloat | None = None
     """Sample rate; needed if the file does not state it exactly (HDF5, universal files)."""
     time: Literal["file", "even"] = "file"
     """``"even"``: samples are simultaneous and even at ``sample_rate_hz``; ignores times in the file."""
     time_unit: Literal["s", "ms", "us"] | None = None
-    """Unit of the times in the file, if missing or wrong there."""
+    """Unit of the times in the file, if it is missing or wrong there."""
     origin: Origin | None = None
     """``"real"`` or ``"simulated"``; by default as in the file, else real."""
     measurement: Measurement
-    """Measurement as in a campaign: name, excitation, notes."""
+    """Measurement as in a campaign file: name, excitation, notes."""
     begins_s: NonNegativeFloat = 0.0
-    """Start of the excitation including settling [s since the first sample]."""
+    """Start of the excitation, including its settling time [s since the first sample]."""
     parts: tuple[Part, ...] = ()
-    """Place of each part of the plan, if they do not follow one another."""
+    """Start and end of each part of the plan, if the parts do not follow one another."""
     channels: tuple[ChannelMapping, ...] = Field(min_length=1)
     specimen: SpecimenTable | None = None
-    """The specimen, if it is not the paper's."""
+    """The specimen, if it is not that of the paper."""
     calibration_valid_days: PositiveInt | None = None
     confirmations: dict[str, str | float] = Field(default_factory=dict)
     """Remarks for the report."""

@@ -1,6 +1,6 @@
-"""Write MATLAB 5 files with a struct for each channel and a struct of facts.
+"""Write MATLAB 5 files with one struct per channel and a struct of facts.
 
-Read MATLAB files: 7.3 is HDF5; the default of ``save`` is MATLAB 5, read into memory.
+Read MATLAB files: version 7.3 is HDF5; version 5, the default of ``save``, is read into memory.
 """
 
 import json
@@ -27,19 +27,19 @@ from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
 from ._source_channel import MOST_CHANNELS, SourceChannel, TableSource, exact_step, scale_among, unit_among
 
-# The elements of a MATLAB 5 file are checked first, because scipy's reader crashes on wrong types.
+# The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
 #
-# Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format": a head of 128 bytes, then elements of a tag
-# (type, bytes) and data, padded to eight bytes; matrices hold elements, compressed ones hold one.
+# Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format". A header of 128 bytes, then elements: a tag
+# (type, bytes) and data padded to eight bytes. A matrix contains elements, a compressed element one.
 
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15
 PLAIN = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
 """Type codes of numbers and text."""
 SMALL_BYTES = 4
-"""An element of up to this many bytes may lie in its tag."""
+"""Largest element whose data may be stored in its tag [bytes]."""
 DEEPEST = 30
-"""Deepest nesting of cells and structs."""
+"""Maximum depth of nested cells and structs."""
 
 
 def require_whole(path: Path) -> None:
@@ -48,13 +48,13 @@ def require_whole(path: Path) -> None:
     if len(content) < HEAD_BYTES:
         raise ValueError("it ends within its head")
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[HEAD_BYTES - 2 : HEAD_BYTES]))
-    # Version 4 files have no such head; scipy checks their few types itself.
+    # Version 4 files have no such header; scipy checks their few types itself.
     if order is not None:
         _look(content[HEAD_BYTES:], order, 0)
 
 
 def _look(content: memoryview, order: str, depth: int) -> None:
-    """Check consecutive elements and those nested in them."""
+    """Check consecutive elements and the elements nested in them."""
     if depth > DEEPEST:
         raise ValueError(f"more than {DEEPEST} nested structs or cells")
     while len(content) >= TAG_BYTES:
@@ -93,14 +93,14 @@ def _decompressed(data: memoryview) -> bytes:
 
 
 LARGEST_BYTES = 2**31
-"""Largest MATLAB 5 file: sizes of variables have 31 bits, and in many readers those of files too."""
+"""Largest MATLAB 5 file: sizes of variables have 31 bits, and many readers limit files to 31 bits too."""
 VALUE_BYTES = 8
 LONGEST_NAME = 63
-"""Longest name of a MATLAB variable; longer names of channels are cut."""
+"""Longest name of a MATLAB variable; longer channel names are cut."""
 
 
 def require_small(excerpt: Excerpt) -> None:
-    """Raise InvalidRequest when samples and times do not fit into a MATLAB 5 file."""
+    """Raise InvalidRequest when samples and times are too large for a MATLAB 5 file."""
     columns = len(excerpt.channels) + 1
     size = excerpt.samples * columns * VALUE_BYTES
     if size >= LARGEST_BYTES:
@@ -115,9 +115,9 @@ def require_small(excerpt: Excerpt) -> None:
 def write_mat(
     excerpt: Excerpt, path: Path, results: Mapping[str, Any], observer: TransferObserver = ignore_progress
 ) -> None:
-    """Write one variable after the other, so that one channel at a time is in memory.
+    """Write the variables one after the other, so that only one channel is in memory at a time.
 
-    Raises InvalidRequest when it would be larger than the format allows.
+    Raises InvalidRequest when the file would be larger than the format allows.
     """
     require_small(excerpt)
     with path.open("xb") as file:
@@ -157,7 +157,7 @@ def _channel(channel: ChannelHeader, values: Reals) -> dict[str, Any]:
 
 
 def _facts(excerpt: Excerpt) -> dict[str, Any]:
-    """Return facts: numbers and texts unchanged, nested values as JSON for ``jsondecode``."""
+    """Return the facts: numbers and texts unchanged, nested values as JSON for ``jsondecode``."""
     facts = facts_document(excerpt)
     del facts["segments"]
     plain = {name: value for name, value in facts.items() if type(value) in {str, int, float}}
@@ -166,7 +166,7 @@ def _facts(excerpt: Excerpt) -> dict[str, Any]:
 
 
 def _segments(excerpt: Excerpt) -> dict[str, Any]:
-    """Return columns of the segments in the excerpt, with indices into its arrays that count from one."""
+    """Return the segments in the excerpt as columns; their sample indices start at 1, as in MATLAB."""
     touched = [
         each
         for each in excerpt.recording.segments
@@ -188,7 +188,7 @@ FEWEST_SAMPLES = 2
 
 @contextmanager
 def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
-    """Open a file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``.
+    """Open a MATLAB file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``.
 
     Raises ValueError when the file is damaged.
     """
@@ -205,7 +205,7 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     except (MatReadError, zlib.error) as error:  # neither is a subclass of ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
-    # Our own exports state the rate beside the channels.
+    # Files exported by vibench state the sample rate beside the channels.
     about = own.get("recording")
     yield TableSource(dict(_numbers(own, "", tuple(about.items()) if isinstance(about, dict) else ())))
 
@@ -243,7 +243,7 @@ def _holds_samples(values: np.ndarray[Any, Any]) -> bool:
 
 
 def _channels(name: str, values: np.ndarray[Any, Any]) -> Iterator[tuple[SourceChannel, Any]]:
-    """Yield a channel for each row of a matrix, or for each column where there are fewer columns."""
+    """Yield a channel for each row of a matrix, or for each column if there are fewer columns than rows."""
     rows = np.atleast_2d(values) if values.ndim == 1 or values.shape[0] < values.shape[1] else values.T
     label = name.removesuffix(".values").rsplit(".", 1)[-1]
     for number, row in enumerate(rows, start=1):

@@ -1,7 +1,7 @@
-"""Write NeXus: an NXentry with an NXdata for each channel, which silx plots with labels.
+"""Write NeXus files: an NXentry with one NXdata per channel, which silx plots with labels.
 
-As in the NeXus standard (NXdata, version 2024.02), a group names its ``signal`` and ``axes``. Values are
-physical, since readers do not apply scales. Their errors are half a step of the converter.
+As in the NeXus standard (NXdata, version 2024.02), each group names its ``signal`` and ``axes``. Values are
+in physical units, because readers do not apply scales. Errors are half a converter step.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Sources of an import: the channels of a file, and their samples in any range."""
+"""Files that can be imported: their channels, and the samples of a channel in any range."""
 
 import re
 import struct
@@ -28,14 +28,14 @@ from ._wav import open_wav
 
 
 class Source(Protocol):
-    """An open file."""
+    """An open file to import."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
         """All data in the file that can become channels of a recording."""
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Return numbers scaled as the file states, with NaN for lost samples, shape (stop - start,)."""
+        """Return samples, scaled as the file states and NaN if lost, shape (stop - start,)."""
 
 
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
@@ -65,21 +65,21 @@ DAMAGE = (
     UnboundLocalError,
     struct.error,
 )
-"""Errors of h5py, npTDMS and scipy for damaged files."""
+"""Errors that h5py, npTDMS and scipy raise for damaged files."""
 
 
 CHANNELS_SHOWN, NAME_SHOWN = 20, 60
-"""Most channels that a message names, and most letters of each name."""
+"""Maximum number of channels in a message, and maximum length of each name."""
 MOST_CHANNELS = 4096
-"""More channels mean a transposed table or a damaged file."""
+"""Maximum number of channels; more mean a transposed table or a damaged file."""
 
 
 @contextmanager
 def opened_source(path: Path) -> Iterator[Source]:
-    """Open a file by its suffix. Nothing in it is ever executed: no pickles, no macros.
+    """Open a file with the reader for its suffix. Nothing in it is ever executed: no pickles, no macros.
 
-    Raises InvalidRequest when there is no such file, or no reader for its suffix; UnusableData when it is
-    damaged, or contains no channel.
+    Raises InvalidRequest when the file does not exist or has no reader for its suffix; UnusableData when it
+    is damaged or contains no channel.
     """
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
@@ -107,7 +107,7 @@ def opened_source(path: Path) -> Iterator[Source]:
 
 
 def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
-    """Yield the channels with their times from the file."""
+    """Yield the channels, each with the times that the file contains for it."""
     read = {each: time_axis(each, channel_blocks(source, each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
     for number, each in enumerate(source.channels):
@@ -123,7 +123,7 @@ def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
             isinstance(source.source, Hdf5Source)
             and len({axes[time].moments for time in near if axes[time].unit is not None}) > 1
         ):
-            # HDF5 sorts names by alphabet, so their order does not show which times belong to a channel.
+            # HDF5 sorts names alphabetically, so their order does not show which times belong to a channel.
             named = ", ".join(shortened(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
             axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
         channel = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
@@ -136,19 +136,19 @@ def _group(channel: SourceChannel) -> str:
 
 
 def channel_blocks(source: Source, channel: SourceChannel) -> Iterator[Reals]:
-    """Yield a channel of a file in blocks."""
+    """Yield the samples of a channel in blocks."""
     for start in range(0, channel.samples, BLOCK_SAMPLES):
         yield source.read(channel, start, min(start + BLOCK_SAMPLES, channel.samples))
 
 
 @dataclass(frozen=True)
 class _CheckedSource:
-    """A source that converts every failure to an error of one sentence."""
+    """A source that converts every failure to a vibench error with a one-sentence message."""
 
     path: Path
     source: Source
     found: Mapping[SourceChannel, SourceChannel]
-    """Channels of the reader, by channel with times."""
+    """Channels of the reader, keyed by the channel with times."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
@@ -182,9 +182,9 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
-    """Return the channel of that name, or the only one of that label.
+    """Return the channel with the name ``wanted``, or the only channel with this label.
 
-    Raises InvalidRequest when there is none, or more than one; the message lists the channels.
+    Raises InvalidRequest when there is none or more than one; the message lists the channels.
     """
     found = [each for each in source.channels if each.name == wanted]
     found = found or [each for each in source.channels if each.label == wanted]

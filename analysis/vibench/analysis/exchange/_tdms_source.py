@@ -1,4 +1,4 @@
-"""Read National Instruments' TDMS with npTDMS."""
+"""Read TDMS files of National Instruments with npTDMS."""
 
 import logging
 import re
@@ -18,17 +18,17 @@ from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
 LONGEST_NS = 1000 * 86400 * 10**9
-"""Time stamps are taken modulo a thousand days, so that a double resolves them to 15 ns."""
+"""Period of time stamps: a thousand days [ns], so that a double resolves them to 15 ns."""
 SCALES = {"Linear", "Polynomial", "RTD", "Table", "Thermocouple", "Thermistor", "Strain", "Add", "Subtract"}
-"""Scales that npTDMS applies by numbers in the file."""
+"""Scales that npTDMS applies with the numbers in the file."""
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 START_ERROR_S = 1e-6
-"""Start times are stored in microseconds."""
+"""Resolution of start times, which are stored in microseconds [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class TdmsSource:
-    """Channels named ``"group/channel"``, scaled as the file says."""
+    """Channels named ``"group/channel"``, scaled as the file states."""
 
     found: Mapping[SourceChannel, Any]
 
@@ -47,7 +47,7 @@ class TdmsSource:
 
 @contextmanager
 def open_tdms(path: Path) -> Iterator[TdmsSource]:
-    """Open a file.
+    """Open a TDMS file.
 
     Raises InvalidRequest when npTDMS is not installed, and UnusableData when it is not TDMS.
     """
@@ -70,7 +70,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
-            """Keep the statements of each segment by sample; npTDMS keeps only the last one."""
+            """Keep the properties stated in each segment, by sample; npTDMS keeps only the last ones."""
 
             def _update_object_metadata(self, segment: Any) -> None:
                 self._before = {path: each.num_values for path, each in self.object_metadata.items()}
@@ -79,7 +79,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
             def _update_object_properties(self, properties: Any) -> None:
                 super()._update_object_properties(properties)
                 for name in properties or ():
-                    # npTDMS's text of a time is wrong by a second near the end of a second.
+                    # The text of npTDMS for a time is wrong by a second near the end of a second.
                     statements.setdefault(name, {})[self._before.get(name, 0)] = tuple(
                         (each, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
                         for each, value in self.object_metadata[name].properties.items()

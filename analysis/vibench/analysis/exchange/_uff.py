@@ -1,12 +1,12 @@
-"""Samples as Universal File Format, dataset 58 in its binary form, with dataset 164 for the units.
+"""Universal File Format: samples as dataset 58 in binary form, with units as dataset 164.
 
-Layout: SDRC universal dataset 58, "Function at Nodal DOF", and its binary variant 58b (Structural
-Dynamics Research Laboratory, University of Cincinnati). The increment of time has five decimals, an error
-of 0.5 ms after 200 s at 51.2 kHz, so ID line 5 contains the exact rate.
+Layout: SDRC universal dataset 58, "Function at Nodal DOF", and its binary variant 58b (Structural Dynamics
+Research Laboratory, University of Cincinnati). Its time increment has five decimals, an error of 0.5 ms after
+200 s at 51.2 kHz. ID line 5 therefore contains the exact rate.
 
-The reader takes the time responses in datasets 58, text or binary, as from Polytec's software. The mapping
-must give the sample rate. The number of binary samples comes from the header, because the end of a dataset
-differs between makers.
+The reader takes time responses from datasets 58, text or binary, such as those of Polytec's software. The
+mapping must give the sample rate. The number of binary samples is taken from the header, because the end of a
+dataset differs between makers.
 """
 
 import re
@@ -52,23 +52,23 @@ ORIGIN = re.compile(rf"\borigin=({'|'.join(Origin)})\b")
 
 
 def id_line(text: str) -> str:
-    """Return one of the five ID lines, with NONE for an empty text."""
+    """Return the text as one of the five ID lines; NONE for an empty text."""
     return f"{text.strip() or 'NONE':<{ID_WIDTH}.{ID_WIDTH}}"
 
 
 def rate_line(sample_rate_hz: float, first_sample: int, origin: Origin) -> str:
-    """Return a line with the exact sample rate and the origin."""
+    """Return an ID line with the exact sample rate and the origin."""
     return f"sample_rate_hz={sample_rate_hz!r} first_sample={first_sample} origin={origin.value}"
 
 
 def exact_rate_hz(line: str) -> float | None:
-    """Read the rate of :func:`rate_line`; None for other lines."""
+    """Return the sample rate from a line of :func:`rate_line`; None for other lines."""
     found = RATE.search(line)
     return None if found is None else float(found[1])
 
 
 def read_origin(line: str) -> Origin | None:
-    """Read the origin of :func:`rate_line`; None for other lines."""
+    """Return the origin from a line of :func:`rate_line`; None for other lines."""
     found = ORIGIN.search(line)
     return None if found is None else Origin(found[1])
 
@@ -78,13 +78,13 @@ SI_UNITS = (
     + "".join(f"{factor:25.16E}" for factor in (1.0, 1.0, 1.0))
     + f"\n{273.15:25.16E}\n{DELIMITER}\n"
 ).replace("E+", "D+")
-"""Dataset 164: units code 1, absolute temperature, factors to SI and the offset of the Celsius scale."""
+"""Dataset 164: units code 1 (SI), absolute temperature, factors to SI and offset of the Celsius scale."""
 SCALAR = 0
-"""Direction of the response, which recordings do not contain."""
+"""Direction of the response: none, because recordings do not contain it."""
 
 
 def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write one dataset for each channel in blocks; lost samples are NaN."""
+    """Write one dataset per channel in blocks; lost samples are NaN."""
     with path.open("xb") as file:
         file.write(SI_UNITS.encode("ascii"))
         for number, channel in enumerate(excerpt.channels, start=1):
@@ -120,12 +120,12 @@ def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[s
 
 
 def axis_record(kind: int, exponents: "tuple[int, ...] | list[int]", label: str, unit: str) -> str:
-    """Write one of records 8 to 11: data type, exponents of length, force and temperature, label, unit."""
+    """Return a line of records 8 to 11: data type, length, force and temperature exponents, label, unit."""
     return f"{kind:10d}{''.join(f'{each:5d}' for each in exponents)} {label:<20.20} {unit:<20.20}"
 
 
 def date_line(started_utc: str) -> str:
-    """Write ID line 3: ``"22-NOV-26 21:04:05"``."""
+    """Return ID line 3, such as ``"22-NOV-26 21:04:05"``."""
     moment = datetime.fromisoformat(started_utc)
     return f"{moment.day:02d}-{MONTHS[moment.month - 1]}-{moment:%y} {moment:%H:%M:%S}"
 
@@ -133,25 +133,25 @@ def date_line(started_utc: str) -> str:
 HEADER_LINES = 11
 UNITS = "164"
 LENGTHS = {1.0: "m", 100.0: "cm", 1000.0: "mm", 39.37: "in"}
-"""Unit of length by the number of units in a metre (dataset 164)."""
+"""Unit of length, keyed by the number of these units per metre (dataset 164)."""
 MOTIONS = {8: "m", 11: "m/s", 12: "m/s2"}
-"""Units of displacement, velocity and acceleration, by data type."""
+"""Units of displacement, velocity and acceleration, keyed by data type."""
 LEAST_TEXT = 2
-"""Least characters per number in free text: a digit and a separator."""
+"""Minimum number of characters per number in free text: a digit and a separator."""
 DIGITS = 5e-6
-"""Relative rounding of an increment of time with six digits."""
+"""Relative rounding error of a time increment with six digits."""
 IEEE = 2
 BYTE_ORDERS = {1: "<", 2: ">"}
 WIDTHS = {REAL_SINGLE: 13, REAL_DOUBLE: 20}
-"""Characters of a number in text."""
+"""Number of characters per number in fixed-width text."""
 SIZES = {REAL_SINGLE: SINGLE_BYTES, REAL_DOUBLE: DOUBLE_BYTES}
 TIME_FUNCTIONS = {0, TIME_RESPONSE}
-"""Kinds of function: unknown, or a time response."""
+"""Function types that are read: unknown, and time response."""
 
 
 @dataclass(frozen=True)
 class _Body:
-    """Location and format of the numbers of a dataset."""
+    """Location and format of the numbers in a dataset."""
 
     offset: int
     end: int
@@ -168,7 +168,7 @@ class UffSource:
     path: Path
     bodies: Mapping[SourceChannel, _Body]
     parsed: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Numbers parsed from text, by channel."""
+    """Numbers parsed from text, keyed by channel."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
@@ -176,7 +176,7 @@ class UffSource:
         return tuple(self.bodies)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read a stretch; text is parsed once and kept."""
+        """Return samples from ``start`` to ``stop``; text is parsed once and kept in memory."""
         body = self.bodies[channel]
         if not body.order:
             if channel.name not in self.parsed:
@@ -217,12 +217,12 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
         found.append((header, length, _body(file, kind, header)))
     for number, (header, length, body) in enumerate(found, start=1):
         if body is not None:
-            # Units may also follow the functions.
+            # The dataset of units may also follow the functions.
             yield _channel(number, header, length or first), body
 
 
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
-    """Locate the numbers and skip them; None if they are not samples over time."""
+    """Return the location of the numbers, and skip them; None if they are not samples over time."""
     ordinate, count, spacing = (_whole(header[6][at : at + 10]) for at in (0, 10, 20))
     if count < 0:
         raise ValueError(f"a dataset of {count} numbers")
@@ -255,7 +255,7 @@ def _whole(text: str) -> int:
 
 
 def _line(file: BinaryIO) -> str:
-    """Read a line of a header."""
+    """Read one line of a header."""
     return text_of(file.readline())
 
 
@@ -308,7 +308,7 @@ def _real(text: str) -> float | None:
 
 
 def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
-    """Return all numbers of a text dataset, of fixed width or separated by blanks."""
+    """Return all numbers of a text dataset, either of fixed width or separated by blanks."""
     with path.open("rb") as file:
         file.seek(body.offset)
         text = file.read(body.end - body.offset).upper().replace(b"D", b"E")
@@ -327,30 +327,30 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
     return cells.astype(np.float64)
 
 
-# Functions of frequency as Universal File Format: frequency responses, coherences and densities, as text.
+# Universal File Format for functions of frequency, as text: frequency responses, coherences and densities.
 #
 # Layout: SDRC universal dataset 58, records 1 to 12, function types 4 (frequency response function), 6
-# (coherence) and 9 (power spectral density), double precision. Text holds frequencies to six digits, so
-# lines are written evenly spaced if six digits hold the first line and the spacing. A frequency response or
-# coherence at multiples of another spacing is interpolated to the nearest spacing of six digits, since modal
-# programs expect even lines that begin at a multiple of their spacing. All other lines are written each with
-# its frequency.
+# (coherence) and 9 (power spectral density), double precision. Frequencies have six digits, so lines are
+# written as evenly spaced only if six digits represent the first line and the spacing. Modal programs expect
+# even lines that begin at a multiple of their spacing. A frequency response or coherence at multiples of
+# another spacing is therefore interpolated to the nearest six-digit spacing. All other lines are written with
+# their frequencies.
 
 _COMPLEX_DOUBLE = 6
 _COLOUR = 11
-"""Colour of nodes: any of the definition's 16."""
+"""Colour of nodes: any of the 16 colours of the definition."""
 _FREQUENCY_AXIS = 18
 _PER_LINE = 4
 _LEAST_STEP = 1e-9
-"""Relative error of a frequency up to which lines count as evenly spaced."""
+"""Relative frequency error up to which lines count as evenly spaced."""
 _LARGEST_OFFSET = 1e-3
-"""Largest offset of the first line from a multiple of the spacing, in spacings."""
+"""Largest offset of the first line from a multiple of the spacing, relative to the spacing."""
 _SPACINGS_TRIED = 1000
-"""Candidates on each side of the nearest spacing of six digits; about every second one works."""
+"""Number of candidates tried on each side of the nearest six-digit spacing; about half are suitable."""
 
 
 class FunctionType(IntEnum):
-    """Type of a function, as in record 6."""
+    """Type of a function as in record 6."""
 
     FREQUENCY_RESPONSE = 4
     COHERENCE = 6
@@ -359,7 +359,7 @@ class FunctionType(IntEnum):
 
 @dataclass(frozen=True)
 class FunctionAxis:
-    """Axis of a function: the motion of a channel, or none."""
+    """Axis of a function: the motion of a channel, or no motion."""
 
     role: str = ""
     """Role of the channel."""
@@ -369,9 +369,9 @@ class FunctionAxis:
     """Quantity such as ``"velocity"``; determines data type and exponents."""
     unit: str = "NONE"
     node: int | None = None
-    """Number of the node; None for the number of the channel."""
+    """Node number; None to use the channel number."""
     direction: int = SCALAR
-    """1, 2 or 3 along x, y or z, negative against them; 0 if unknown."""
+    """1, 2 or 3 along x, y or z, negative in the opposite direction; 0 if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -380,7 +380,7 @@ class UniversalFunction:
 
     kind: FunctionType
     frequency_hz: Reals
-    """Frequencies of the lines, ascending, shape (lines,)."""
+    """Frequencies of the lines in ascending order, shape (lines,) [Hz]."""
     values: Reals | Complexes
     """Values at these frequencies, shape (lines,)."""
     response: FunctionAxis
@@ -390,7 +390,7 @@ class UniversalFunction:
 
 
 def write_uff_functions(excerpt: Excerpt, functions: Sequence[UniversalFunction], path: Path) -> None:
-    """Write one dataset for each function, after the units."""
+    """Write the units, then one dataset per function."""
     with path.open("x", encoding="ascii", errors="replace", newline="\n") as file:
         file.write(SI_UNITS)
         for number, each in enumerate(functions, start=1):
@@ -402,7 +402,7 @@ def write_uff_scan(
     functions: Sequence[tuple[RecordingDescription, UniversalFunction]],
     path: Path,
 ) -> None:
-    """Write the coordinates of nodes as dataset 15, and one dataset 58 for each function."""
+    """Write the node coordinates as dataset 15, then one dataset 58 per function."""
     with path.open("x", encoding="ascii", errors="replace", newline="\n") as file:
         file.write(f"{SI_UNITS}{DELIMITER}\n{15:6d}\n")
         for node, place in nodes.items():
@@ -449,7 +449,7 @@ def _node(axis: FunctionAxis, recording: RecordingDescription) -> int:
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
-    """Return the function, its first frequency, and its spacing in six digits; 0 if uneven."""
+    """Return the function, its first frequency, and its spacing with six digits; zeros if uneven."""
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0
@@ -467,7 +467,7 @@ def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float
     if np.iscomplexobj(function.values):
         values = CubicSpline(hz, function.values)(even_hz)
     else:
-        values = np.interp(even_hz, hz, function.values)  # a spline of a coherence may rise above 1
+        values = np.interp(even_hz, hz, function.values)  # a spline of a coherence may exceed 1
     return replace(function, frequency_hz=even_hz, values=values), first, step
 
 
@@ -476,9 +476,9 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 
 
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
-    """Return a first frequency and a spacing that divides it, in six digits; zeros if none was found.
+    """Return a first frequency and a spacing that divides it, with six digits; zeros if none is found.
 
-    pyEMA and sdypy-EMA compute the number of lines below the first; a rounding error would add one.
+    pyEMA and sdypy-EMA compute the number of lines below the first; a rounding error would add a line.
     """
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
         step = _six_digits(spacing + number * _last_digit(spacing))
@@ -496,13 +496,13 @@ def _last_digit(value: float) -> float:
 
 
 def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[str]:
-    """Return the lines of record 12, with frequencies if these are uneven."""
+    """Return the lines of record 12; uneven lines include their frequencies."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     columns = [[f"{value:20.11E}" for value in part] for part in parts]
     if frequency_hz is not None:
         columns.insert(0, [f"{hz:13.5E}" for hz in frequency_hz])
     points = ["".join(row) for row in zip(*columns, strict=True)]
-    # Four numbers a line; with frequencies two real ones, or one complex.
+    # Four numbers per line; with frequencies, two real values or one complex value.
     width = _PER_LINE // len(parts) // (1 if frequency_hz is None else 2)
     for start in range(0, len(points), width):
         yield "".join(points[start : start + width])

@@ -1,6 +1,6 @@
-"""Write 32-bit WAV, with full scale of each channel as 1.
+"""Write 32-bit WAV files in which 1 is the full scale of each channel.
 
-Read WAV; integers are fractions of full scale, -1 to 1.
+Read WAV files; integers become fractions of full scale, -1 to 1.
 """
 
 import struct
@@ -44,9 +44,9 @@ def require_sound(excerpt: Excerpt) -> None:
 
 
 def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write all channels in blocks; lost samples are zero, and larger values are clipped to full scale.
+    """Write all channels in blocks; lost samples become zero, larger values are clipped to full scale.
 
-    Counts of a converter of up to 32 bits stay exact.
+    Counts of converters of up to 32 bits stay exact.
     """
     full_scales = np.array([[abs(each.physical_per_volt) * each.range_v] for each in excerpt.channels])
     with path.open("xb") as raw, wave.open(raw, "wb") as file:
@@ -62,22 +62,22 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 
 
 ORDERS = {b"RIFF": "<", b"RIFX": ">"}
-"""Byte orders of sizes; RF64 files over 4 GiB store them elsewhere."""
+"""Byte orders of the sizes; RF64 files above 4 GiB store sizes elsewhere and are not read."""
 FIRST_CHUNK = 12
 EXTENSIBLE_BYTES = 40
 """Size of a format chunk that states how many bits of a sample are used."""
 UNKNOWN_SIZE = 2**32 - 1
-"""Size field of a file that was streamed, so that its size was not known."""
+"""Size field of a streamed file, whose size was unknown when it was written."""
 OFFSETS = {"u": 128.0}
-"""Offset of unsigned integers, which WAV uses for eight bits."""
+"""Zero level of unsigned integers, which WAV uses for eight bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class WavSource:
-    """Channels named ``"1"``, ``"2"``, ..."""
+    """Channels of a WAV file, named ``"1"``, ``"2"``, ..."""
 
     data: NDArray[Any]
-    """Shape (samples, channels); memory-mapped except for 24 bits."""
+    """Samples, shape (samples, channels); memory-mapped except for 24 bits."""
     channels: tuple[SourceChannel, ...]
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
@@ -88,8 +88,8 @@ class WavSource:
 
 @contextmanager
 def open_wav(path: Path) -> Iterator[WavSource]:
-    """Open a file; raises ValueError when it is not WAV, compressed or truncated."""
-    bits = _valid_bits(path)
+    """Open a WAV file; raises ValueError when it is not WAV, compressed or truncated."""
+    _require_whole(path)
     rate, data = _read(path)
     table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
     is_integer = table.dtype.kind in "iu"
@@ -111,9 +111,8 @@ def open_wav(path: Path) -> Iterator[WavSource]:
     )
 
 
-def _valid_bits(path: Path) -> int:
-    """Return the stated bits of a sample; raises ValueError for a truncated file or several data chunks."""
-    bits = 8 * BYTES
+def _require_whole(path: Path) -> None:
+    """Raise ValueError for a truncated file or for several chunks of samples."""
     with path.open("rb") as file:
         order = ORDERS.get(file.read(4))
         file.seek(FIRST_CHUNK)
@@ -147,7 +146,7 @@ def _read(path: Path) -> tuple[int, NDArray[Any]]:
         try:
             return wavfile.read(path, mmap=True)
         except ValueError:
-            # Samples of 24 bits cannot be memory-mapped; scipy reads them as the upper bytes of 32.
+            # Samples of 24 bits cannot be memory-mapped; scipy reads them as the upper bytes of 32 bits.
             return wavfile.read(path)
 
 
