@@ -1,7 +1,7 @@
-"""Figures of measurements and simulations, drawn without a display; one module for each figure.
+"""Figures of measurements and simulations, drawn without a display; one module per figure.
 
-Each has a caption and tables of the plotted numbers. It is saved as PNG, SVG or PDF, and CSV; the same data
-give the same bytes. Colour-blind readers can distinguish the colours.
+Each figure has a caption and tables of the plotted numbers. It is saved as PNG, SVG or PDF, and CSV; the same
+data give the same bytes. The colours are distinguishable for colour-blind readers.
 """
 
 from vibench.acquisition import need_extra

@@ -1,4 +1,4 @@
-"""A tracked resonance: frequency and amplitude over the base level, and the backbone curve."""
+"""Figure of a tracked resonance: frequency and amplitude over base level, and the backbone curve."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,9 +24,9 @@ from .stepped_sine import tracked_caption
 
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15
-"""Margin around the points, as a share of their range, so that no point lies on the frame."""
+"""Margin around the points relative to their range, so that no point is on the frame."""
 _MOST_MARKS = 5
-"""Most tick intervals on the backbone's frequency axis, because labels such as 266.385 are wide."""
+"""Maximum number of tick intervals on the backbone's frequency axis; labels such as 266.385 are wide."""
 _LEVEL = "base acceleration [m/s²]"
 _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
@@ -72,7 +72,7 @@ def backbone_figure(
 
 
 def _broken(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
-    """Insert NaN at the lost levels, so that lines are interrupted there."""
+    """Insert NaN at the levels without a resonance, so that lines are interrupted there."""
     nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
     gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
     return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
@@ -83,7 +83,7 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 
 
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
-    """Return amplitudes in a readable unit, and factor and name of the unit."""
+    """Return amplitudes in a readable unit, with the factor from metres and the name of the unit."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
     scale, unit = style.prefixed(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
@@ -149,7 +149,7 @@ def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
 def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None
 ) -> Reals | None:
-    """Return m0's simulated amplitude at each level, if each level has one recorded stretch."""
+    """Return m0's simulated amplitude at each level; None unless it can be assigned to every level."""
     if (
         overlay is None
         or not levels[0].is_fundamental

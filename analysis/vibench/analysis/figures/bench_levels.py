@@ -1,4 +1,4 @@
-"""Extremes of every channel from the bench check to the last ramp: the first figure to look at."""
+"""Figure of the smallest and largest values of every channel, from bench check to last ramp."""
 
 from ..recordings.channel_levels import ChannelLevel
 from ..recordings.facts import RecordingFacts
@@ -8,11 +8,11 @@ from . import style
 _ROW_IN = 0.85
 _FRAME_IN = 0.6
 _UNITS = {"m s-1": "m/s", "m s-2": "m/s²"}
-"""Readable forms of units that files give as UDUNITS text."""
+"""Readable forms of units that files state in UDUNITS notation."""
 
 
 def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
-    """Draw the extremes of every channel over the whole recording."""
+    """Draw the smallest and largest values of every channel over the whole recording."""
     with style.styled():
         figure = style.new_figure(_FRAME_IN + _ROW_IN * len(facts.channels))
         panels = figure.subplots(len(facts.channels), 1, sharex=True, squeeze=False)[:, 0]
@@ -41,7 +41,7 @@ def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
 
 
 def bench_levels_caption(facts: RecordingFacts) -> str:
-    """Return the caption with the peak of each channel, also relative to its range."""
+    """Return the caption with the peak of each channel, also relative to the input range."""
     parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
     return f"Extremes of every channel, ramps and waits included. Peaks: {', '.join(parts)}."
 

@@ -1,4 +1,4 @@
-"""Branches of periodic motions: stable ones solid, unstable ones dashed, special points marked."""
+"""Figure of branches of periodic motion: stable solid, unstable dashed, special points marked."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ from . import style
 
 _HEIGHT_IN = 5.6
 _GROWTH_HEIGHT_IN = 1.8
-"""Height [in] of the third panel, which shows what a bench can hold."""
+"""Height of the third panel, which shows which unstable motions a bench can hold [in]."""
 EVENT_MARKS = {
     "fold": ("o", "#d55e00"),
     "period doubling": ("s", "#009e73"),
@@ -33,18 +33,18 @@ _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPO
 def branches_figure(
     diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
 ) -> style.DrawnFigure:
-    """Draw Responses I and II of m0 on every branch over the varied parameter, and recordings behind them.
+    """Draw Responses I and II of m0 along every branch, with recordings behind them.
 
-    If the request names a bench's control loop, a third panel shows which unstable motions it can hold.
+    If the request names a control loop, a third panel shows which unstable motions the loop can hold.
 
     Parameters
     ----------
     diagram
-        The branches.
+        Computed branches.
     measured
         Responses of stepped sines and sweeps; drawn for branches along frequency.
     tracked
-        Tracked resonances; drawn with a branch of phase resonance, in a first panel of frequencies.
+        Tracked resonances; a branch of phase resonance shows their frequencies in its first panel.
     """
     with style.styled():
         holdable = diagram.holdable
@@ -79,7 +79,7 @@ def branches_figure(
 
 
 def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
-    """Draw a branch, ``size`` over ``place``, into ``axes``: stable parts solid, unstable ones dashed."""
+    """Draw a branch, ``size`` over ``place``, into ``axes``: stable parts solid, unstable parts dashed."""
     colour = (
         style.PREDICTED
         if line.periods == 1
@@ -95,7 +95,7 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
 
 
 def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
-    """Draw the frequency of a phase resonance instead of Response I, and tracked resonances."""
+    """Draw the frequency of a phase resonance in place of Response I, and the tracked resonances."""
     panels[0].clear()
     for line in diagram.lines:
         draw_line(panels[0], line, _place(diagram, line), line.frequency_hz)
@@ -116,7 +116,7 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
 def _growth(
     axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
 ) -> None:
-    """Draw the growth rates of unstable motions; this bench cannot hold motions below the line."""
+    """Draw the growth times of unstable motions; the bench cannot hold motions below the line."""
     for line, held in zip(diagram.lines, holdable, strict=True):
         place, grows = _place(diagram, line), ~line.is_stable
         for label, chosen, colour in (
@@ -172,7 +172,7 @@ def _across(axes: Axes, diagram: BranchDiagram) -> None:
 
 
 def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
-    """Return tables of all points of the branches, and of the special points."""
+    """Return one table with all points of the branches, and one with their special points if any."""
     lines = diagram.lines
     if not lines:
         return ()

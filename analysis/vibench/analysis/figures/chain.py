@@ -1,4 +1,4 @@
-"""A chain: waves of the infinite chain, transmission between cells, motion over place and time, energy."""
+"""Figure of a chain: waves, transmission between cells, motion over place and time, energy."""
 
 import math
 
@@ -13,17 +13,17 @@ from ..tables import Table, table
 from . import style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
-"""Heights [in] of the figure without and with runs."""
+"""Height of the figure without runs, and with runs [in]."""
 _SMALLEST = 1e-8
-"""Smaller transmissions are drawn at the bottom of the axis."""
+"""Smallest drawn transmission; smaller values are drawn at this value."""
 _DECADES = 4.0
-"""Decades shown below the largest value of a map of motion."""
+"""Number of decades shown below the largest motion."""
 _NOTHING = 1e-300
-"""Replaces zero motion before a logarithm is taken."""
+"""Value that replaces zero motion on a logarithmic scale."""
 
 
 def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
-    """Draw waves and transmission, and the motion, energies and impacts of the last run, if any."""
+    """Draw waves and transmission; if there are runs, also motion, energies and impacts of the last run."""
     last = found.shown_run
     with style.styled():
         figure = style.new_figure(_WAVES_IN if last is None else _RUNS_IN)

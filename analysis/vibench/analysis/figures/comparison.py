@@ -1,4 +1,4 @@
-"""Overlaid curves as on the window's Compare page, in light colours for printing."""
+"""Figure of overlaid curves as on the Compare page of the window, in light colours for printing."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -24,9 +24,9 @@ _STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
     CurveOrigin.STABLE: ("-", ":"),
     CurveOrigin.UNSTABLE: ("--", "-."),
 }
-"""Line styles by origin: for the transmission or Response I, and for Response II."""
+"""Line styles by origin: the first for transmission and Response I, the second for Response II."""
 _LONE = 1
-"""Most points of a curve that is drawn as a marker."""
+"""Maximum number of points of a curve that is drawn as a marker."""
 _SINGLE_BAND = 0.2
 
 
@@ -36,16 +36,16 @@ def comparison_figure(
     pair: tuple[Curve, Curve] | None = None,
     markers_hz: Sequence[float] = (),
 ) -> style.DrawnFigure:
-    """Draw curves with their bounds, the difference of two of them, and markers.
+    """Draw curves with their bounds, the difference of two curves, and vertical markers.
 
     Raises InvalidRequest when there is no curve, and NotEnoughData when the pair has no frequency in common.
 
     Parameters
     ----------
     name
-        Name of the files.
+        Name of the files, without suffix.
     pair
-        Curve and reference; their difference is drawn below.
+        A curve and its reference; their difference is drawn below the curves.
     """
     if not curves:
         raise InvalidRequest("a figure of no curves was requested; choose one or more")
@@ -103,7 +103,7 @@ def _difference(axes: Axes, difference: CurveDifference) -> None:
 
 
 def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Return limits of the axis that fit the curves; bounds may exceed them."""
+    """Return limits of the magnitude axis that fit the curves; bounds may exceed these limits."""
     known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in curves])
     positive = known[known > 0]
     return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
@@ -116,7 +116,7 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
-    """Return the caption: note of each curve, and the difference of the pair."""
+    """Return the caption: the note of each curve, and the difference of the pair."""
     sentences = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     sentences.append("Shaded: two standard deviations.")
     if pair is not None:
@@ -131,7 +131,7 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
 def comparison_tables(
     name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
 ) -> tuple[Table, ...]:
-    """Return tables of every curve, its peaks and the difference, with units in the headings."""
+    """Return tables of every curve, of its peaks and of the difference."""
     found = [
         table(
             f"{name}_{number}_{_file_word(curve)}",

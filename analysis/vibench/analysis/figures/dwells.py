@@ -1,4 +1,4 @@
-"""Dwells at one frequency and several levels: time signals and spectra (the paper's Fig. 14)."""
+"""Figure of dwells at one frequency and several levels: time signals and spectra (Fig. 14 of the paper)."""
 
 from collections.abc import Sequence
 
@@ -33,7 +33,7 @@ Pair = tuple[DwellAnalysis, DwellOverlay | None]
 
 
 def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
-    """Draw one row for each level, weak to strong: whole dwell, last periods, spectrum of the window."""
+    """Draw one row per level, weak to strong: whole dwell, last periods, spectrum of the analysed window."""
     rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
     at = model_resonances(specimen_of(rising[0][0].facts.bench))
     with style.styled():
@@ -71,7 +71,7 @@ def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
 
 
 def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
-    """Return time before the window's end [s] and x [m] for the last periods of the window."""
+    """Return time relative to the end of the window [s] and x [m] for its last 12 drive periods."""
     rate = response.displacement.sample_rate_hz
     count = round(_ZOOM_PERIODS / response.drive.frequency_hz * rate)
     time_s: Reals = (np.arange(count, dtype=np.float64) - count) / rate
@@ -105,7 +105,7 @@ def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None,
 
 
 def dwells_caption(rising: Sequence[Pair]) -> str:
-    """Return the caption with responses and terminal-band amplitudes for each level."""
+    """Return the caption with responses and terminal-band levels of each dwell."""
     sentences = []
     for analysis, overlay in rising:
         found = analysis.response

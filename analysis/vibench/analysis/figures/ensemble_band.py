@@ -1,4 +1,4 @@
-"""Median and 95 % band of the draws of a twin, for figures, tables and captions."""
+"""Median and 95 % band of simulated draws, for figures, tables and captions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from ..tables import Table, columns, table
 from . import style
 
 ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
-"""Attribute of a result for each response to sines."""
+"""Attribute of a result that contains each response to sines."""
 RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Response II\n|x at f| / A0"}
 
 
 def draw_sines(axes: Axes, along: Reals, sines: ResponsePrediction, what: str, label: str) -> None:
-    """Draw the response without contact as a line, and steady sines as dots, over the abscissae ``along``."""
+    """Draw the response without contact as a line and that to steady sines as dots, over ``along``."""
     rising = np.argsort(along)
     axes.plot(along[rising], sines.linear[rising], **style.LINEAR_CURVE)
     axes.plot(along, getattr(sines, ATTRIBUTES[what]), ".", color=style.PREDICTED, label=label)
@@ -42,9 +42,9 @@ def draw_band(
     name: str,
     shown: Callable[[Reals], Reals] = lambda values: values,
 ) -> Reals | None:
-    """Fill the 95 % band of one quantity, and return its median; None without an ensemble.
+    """Fill the 95 % band of one quantity and return its median; None unless there are several draws.
 
-    ``along`` has the abscissae of the quantity; ``shown`` converts its values to those of the axis.
+    ``along`` contains the abscissae of the quantity; ``shown`` converts its values to those of the axis.
     """
     found = overlay.quantity(name)
     if found is None or overlay.run.draws == 1:
@@ -56,7 +56,7 @@ def draw_band(
 
 
 def run_text(overlay: AbstractOverlay[Any]) -> str:
-    """Return sentences on the simulation, and on where the measurement lies among its draws."""
+    """Return sentences on the simulation, and on the position of the measurement among its draws."""
     run = overlay.run
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
@@ -79,7 +79,7 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
 
 
 def agreement_text(overlay: AbstractOverlay[Any]) -> str:
-    """Return the end of a sentence: where the measurement lies among the draws; empty under a base motion."""
+    """Return agreement and escape rate as the end of a sentence; empty if simulated under a base motion."""
     if not overlay.run.driven.by_voltage:
         return ""
     parts = [*overlay.agreement]
@@ -95,7 +95,7 @@ def sines_table(name: str, sines: ResponsePrediction) -> Table:
 
 
 def band_columns(overlay: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
-    """Return table columns with median and band of the draws of a quantity."""
+    """Return table columns with the median, band, z and rank of a quantity; empty without several draws."""
     found = overlay.quantity(name)
     if found is None or overlay.run.draws == 1:
         return {}
@@ -118,21 +118,21 @@ def simulated_responses(overlay: SweepOverlay | SteppedSineOverlay) -> dict[str,
 
 
 _LABEL_HEIGHT = 1.01
-"""Height of labels, just above the axis, relative to the axis height."""
+"""Height of frequency labels just above the panel, relative to the panel height."""
 _FREE_LABEL = "resonances without contact"
 _BOUND_LABEL = "terminal resonances (m1 stuck to m2)"
 
 
 @dataclass(frozen=True)
 class ModelResonances:
-    """The model's resonances [Hz]."""
+    """Resonances of the model [Hz]: without contact, and with m1 stuck to m2."""
 
     free_hz: tuple[float, ...]
     bound_hz: tuple[float, ...]
 
 
 def model_resonances(specimen: Specimen) -> ModelResonances:
-    """Return the undamped natural frequencies with and without contact."""
+    """Return the undamped natural frequencies without contact, and those with m1 stuck to m2."""
     return ModelResonances(
         tuple(float(each) for each in specimen.natural_frequencies_hz),
         tuple(float(each) for each in specimen.bound_frequencies_hz),
@@ -140,7 +140,7 @@ def model_resonances(specimen: Specimen) -> ModelResonances:
 
 
 def mark_resonances(axes: Axes, at: ModelResonances) -> None:
-    """Draw dashed lines at resonances without contact, dotted ones at those with m1 stuck to m2."""
+    """Draw dashed lines at resonances without contact, and dotted lines at those with m1 stuck to m2."""
     for number, frequency in enumerate(at.free_hz):
         label = _FREE_LABEL if number == 0 else None
         axes.axvline(frequency, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
@@ -150,7 +150,7 @@ def mark_resonances(axes: Axes, at: ModelResonances) -> None:
 
 
 def label_resonances(axes: Axes, at: ModelResonances) -> None:
-    """Write the frequencies above the axis."""
+    """Write the frequencies of the resonances above the panel."""
     _write(axes, at.free_hz, "#555555")
     _write(axes, at.bound_hz, style.TERMINAL)
 

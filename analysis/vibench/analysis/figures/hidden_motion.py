@@ -1,4 +1,4 @@
-"""Hidden motion of one recording: p between the stops, and the impacts."""
+"""Figures of the hidden motion in one recording: p between the stops, and the impacts."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,14 +12,14 @@ _MICRO = 1e6
 _COLUMNS = 1200
 _ZOOM_S = 0.025
 _BOUND = 1.96
-"""Half width of a 95 % bound in standard deviations."""
+"""Half width of a 95 % interval in standard deviations."""
 _BINS = 40
 _DEEPEST_SHOWN_M = 2e-6
 _POINTS = 200
 
 
 def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
-    """Draw p between the stops, over the whole stretch and over a short part of it."""
+    """Draw p between the stops over the whole stretch, and over a short part of it."""
     with style.styled():
         figure = style.new_figure(4.4)
         whole, zoom = figure.subplots(2, 1)
@@ -68,7 +68,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
 
 
 def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
-    # Enlarge the part around the middle impact, or without impacts the middle of the motion.
+    # Enlarge the part around the middle impact; without impacts, the middle of the motion.
     count = round(_ZOOM_S * motion.sample_rate_hz)
     impacts = motion.tracked.collisions.samples
     middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2
@@ -89,7 +89,7 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 
 def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
-    """Draw impulses over time, force against penetration, energy lost at impacts, and measured gaps."""
+    """Draw impulses over time, force over penetration, energy lost at impacts, and measured gaps."""
     with style.styled():
         figure = style.new_figure(5.2)
         (impulses, force), (energy, gaps) = figure.subplots(2, 2)
@@ -142,7 +142,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 
 def _band(depth: Reals, at_1um: FoundParameter, exponent: FoundParameter) -> tuple[Reals, Reals]:
-    """Return the envelope of all laws whose two parameters lie within their bounds."""
+    """Return the envelope of all force laws whose two parameters are within their bounds."""
     exponents = (exponent.low, exponent.high) if exponent.is_determined else (exponent.described,) * 2
     laws = np.stack([f * (_MICRO * depth) ** n for f in (at_1um.low, at_1um.high) for n in exponents])
     return np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))

@@ -1,4 +1,4 @@
-"""Sweeps up and down in one figure, to show where the response depends on the direction."""
+"""Figure of sweeps up and down, which shows where the response depends on the direction."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _HEIGHT_IN = 3.4
 
 
 def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigure:
-    """Draw Response II in both directions, the jumps, and the bands where the directions differ."""
+    """Draw Response II in both directions, the jumps, and the bands in which the directions differ."""
     found = hysteresis(up.response, down.response, up.jumps, down.jumps)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
@@ -49,7 +49,7 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
 
 
 def jumps_text(jumps: tuple[Jump, ...]) -> str:
-    """Return text on jumps with their bounds."""
+    """Return jumps with their bounds as text."""
     if not jumps:
         return "no jump"
     return " and ".join(

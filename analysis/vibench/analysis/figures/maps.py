@@ -1,4 +1,4 @@
-"""Maps, basins of attraction and bifurcation diagrams: the kinds of motion and one quantity."""
+"""Figures of maps, basins of attraction and bifurcation diagrams: kinds of motion and one quantity."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -42,19 +42,19 @@ def map_figure(
     diagram: BranchDiagram | None = None,
     levels: Sequence[RecordedLevel] = (),
 ) -> style.DrawnFigure:
-    """Draw a map over two quantities, or a bifurcation diagram along one.
+    """Draw a map over two quantities, or a bifurcation diagram along one quantity.
 
     Parameters
     ----------
     results
         Results of a map, complete or still being computed.
     shown
-        Quantity of `SHOWN` to draw beside the kinds of motion. None: Response I, or for a basin map, the
-        time for which each start was followed.
+        Quantity of `SHOWN` to draw below the kinds of motion. By default Response I; for a basin map, the
+        duration for which each start was followed.
     diagram
-        Branches to overlay on a diagram along one quantity.
+        Branches to draw into a diagram along one quantity.
     levels
-        Levels of recordings, overlaid on a map of frequency and amplitude as lines.
+        Levels of recordings, drawn as lines into a map of frequency and amplitude.
     """
     with style.styled():
         if len(results.plan.varied) == 1:
@@ -209,7 +209,7 @@ def _section(line: BranchLine) -> Reals:
 
 
 def motion_table(motions: Sequence[MapMotion]) -> Table:
-    """Return a table of a map's motions and their shares."""
+    """Return a table of a map's motions with their responses and shares."""
     return table(
         "map_motions",
         motion=[str(each.motion) for each in motions],

@@ -1,4 +1,4 @@
-"""Figures of noise: distortion and undriven lines, transmission at all levels, and the planned voltage."""
+"""Figures of noise: distortion at undriven lines, transmission at all levels, and the planned voltage."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ _EVEN, _ODD = style.LINEAR, style.SIMULATED
 
 
 def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> style.DrawnFigure:
-    """Draw the shares of noise and distortion in the scatter, and the levels at undriven lines."""
+    """Draw the standard deviations due to noise and distortion, and the levels at undriven lines."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
     with style.styled():
@@ -71,7 +71,7 @@ def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     axes.plot(frequency_hz, noise, color=style.BOUNDS, linewidth=0.9, label=label)
     varied = periodic.distortion_variance
     if varied is not None:
-        # If noise explains all of the scatter, there is no distortion to draw.
+        # If noise explains the whole scatter, there is no distortion to draw.
         seen = np.where(varied > 0, _share(varied, periodic), np.nan)
         axes.plot(frequency_hz, seen, ".-", color=style.MEASURED, linewidth=0.7, label="nonlinear distortion")
     style.magnitude_axis(axes)
@@ -94,7 +94,7 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
 
 
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
-    """Return the caption with the shares of noise and distortion in the scatter."""
+    """Return the caption with the contributions of noise and distortion to the scatter."""
     found = distortion(periodic)
     parts = [
         (
@@ -106,7 +106,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     if found.distortion_share is None:
         parts.append("; one realisation cannot show distortion.")
     else:
-        # Near a narrow mode whose frequency drifts, some of the drift remains and counts as distortion.
+        # Near a narrow mode with a drifting frequency, some of the drift remains and counts as distortion.
         most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
         parts.append(f", distortion {most}{_percent(found.distortion_share)}.")
     if periodic.drift is not None:
@@ -115,7 +115,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
 
 
 def _percent(share: float) -> str:
-    """Return a percentage with two digits, without powers of ten: in chaos it often exceeds 100 %."""
+    """Return a percentage with two digits, without powers of ten; in chaos it often exceeds 100 %."""
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
 
 
@@ -135,7 +135,7 @@ _LEVELS_HEIGHT_IN = 4.0
 
 
 def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.DrawnFigure:
-    """Draw the transmissions of several noise levels, weak to strong; at least one is needed."""
+    """Draw the transmissions at several noise levels (at least one), weak to strong."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     view = rising[0].view
     at = model_resonances(specimen_of(rising[0].facts.bench))
@@ -199,12 +199,12 @@ _EXCITATION_HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
 """Samples per period of the highest frequency: enough for a figure, few enough for a long sweep."""
 _SMALLEST_PART = 0.2
-"""Least size of a shown line relative to the largest one (14 dB); sets the frequency range."""
+"""Smallest line, relative to the largest (-14 dB), that sets the ends of the frequency axis."""
 _EXCITATION_COLUMNS = 2000
 
 
 def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
-    """Draw the planned voltage in time and as a spectrum."""
+    """Draw the planned voltage over time, and its spectrum."""
     excitation = measurement.excitation
     rate_hz = _SAMPLES_PER_CYCLE * excitation.highest_frequency_hz
     seen = excitation.preview(rate_hz)
@@ -246,7 +246,7 @@ def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
 
 
 def _largest_lines(seen: SignalPreview) -> tuple[Reals, Reals]:
-    """Return frequency and amplitude of the largest line in each column, above 0 Hz."""
+    """Return frequency and amplitude of the largest line in each column, without 0 Hz."""
     frequency_hz, size = seen.frequency_hz[1:], seen.spectrum_v[1:]
     width = -(-size.size // _EXCITATION_COLUMNS)
     starts = np.arange(0, size.size, width)

@@ -1,4 +1,4 @@
-"""Phase portraits of dwells with Poincaré sections, one for each level."""
+"""Phase portraits of dwells with Poincaré sections, one panel for each level."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from . import style
 _PANEL_IN = 2.9
 _COLUMNS = 3
 _ORBIT_PERIODS = 60.0
-"""Number of last drive periods of the orbit to draw; more would fill the panel."""
+"""Number of drive periods drawn, up to the end of the dwell; more would fill the panel."""
 _MOST_POINTS = 2000
 
 

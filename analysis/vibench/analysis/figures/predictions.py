@@ -16,20 +16,20 @@ from ..tables import Table, rows, table
 from . import style
 
 _LEAST = 1e-14
-"""Least error drawn; smaller ones are rounding."""
+"""Smallest error drawn; smaller errors are due to rounding."""
 
 
 def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigure:
-    """Draw the error of the responses over time, a panel for each scene and a line for each method.
+    """Draw the error of the responses over time, one panel for each scene and one line for each method.
 
     Parameters
     ----------
     curves
-        Error and processor time of each method, as `vibench tradeoff` measured them, by name of the scene.
+        Error and processor time of each method, measured by `vibench tradeoff`, keyed by scene.
 
     """
     methods = list(dict.fromkeys(each.method for points in curves.values() for each in points))
-    # Methods beyond the number of colours differ by their markers.
+    # Methods beyond the number of colours have other markers.
     looks = {
         method: (
             style.LEVELS[place % len(style.LEVELS)],
@@ -87,7 +87,7 @@ _SPECTRUM_HEIGHT_IN = 5.2
 
 
 def exponent_spectrum_figure(found: ExponentSpectrum) -> style.DrawnFigure:
-    """Draw six exponents with their intervals, and below them the Kaplan-Yorke dimension."""
+    """Draw six Lyapunov exponents with their intervals, and below them the Kaplan-Yorke dimension."""
     request = found.request
     is_frequency = request.along is Parameter.FREQUENCY
     place = found.column("frequency_hz") if is_frequency else 1e6 * found.column("amplitude_m")
@@ -152,18 +152,18 @@ def _numbers(found: ExponentSpectrum) -> Table:
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
-"""Range of p on both sides of a stop; power laws begin at -gap. The paper fits up to 1 um beyond the stop."""
+"""Range of p before and beyond a stop. Power laws start at -gap; the paper fits up to 1 um beyond."""
 _GREY = "#9a9a9a"
 _SPEED_M_PER_S = 0.1
-"""Speed for laws that depend on it: the impact speed of the paper's specimen at 5 um and 260 Hz."""
+"""Speed for laws that depend on it: the impact speed in the paper's specimen at 5 um and 260 Hz."""
 _POINTS = 801
 
 
 def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigure:
-    """Draw the force that pushes m1 back over p = y - z, in one panel per specimen, titled by its label.
+    """Draw the force that pushes m1 back over p = y - z; each specimen has a panel titled by its key.
 
-    The nearer stop is shown. A law that depends on the speed is drawn for loading and unloading at
-    0.1 m/s. Rigid stops, which have no finite force, are drawn as a wall.
+    The stop with the smaller gap is shown. A law that depends on speed is drawn for loading and unloading at
+    0.1 m/s. Rigid stops have no finite force and are drawn as a wall.
     """
     rows = -(-len(specimens) // _COLUMNS)
     tables = []
@@ -192,7 +192,7 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
     below_m, above_m = specimen.gaps_m
     nearer_m = min(below_m, above_m)
     first_m = -nearer_m if isinstance(specimen.contact, PowerLaw) else nearer_m - _BEFORE_M
-    # Go from free motion into the nearer stop; `side` is the sign of p there.
+    # p goes from free motion into the nearer stop; `side` is the sign of p at this stop.
     side = -1.0 if below_m < above_m else 1.0
     stop_m, p = side * nearer_m, side * np.linspace(first_m, nearer_m + _BEYOND_M, _POINTS)
     axes.axvline(1e6 * stop_m, color=_GREY, linewidth=0.8)

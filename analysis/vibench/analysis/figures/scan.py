@@ -1,4 +1,4 @@
-"""Transmission and phase over the points of a scan, at each resonance."""
+"""Figure of transmission and phase over the points of a scan, at each resonance."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +10,7 @@ from . import style
 
 _HEIGHT_IN = 4.6
 _MOST_NAMES = 16
-"""Largest number of points whose names are written at the axis; otherwise it shows their nodes."""
+"""Largest number of points whose names are written at the axis; with more points, node numbers are."""
 
 
 def scan_figure(scan: Scan) -> style.DrawnFigure:
@@ -69,7 +69,7 @@ def scan_figure(scan: Scan) -> style.DrawnFigure:
 
 
 def scan_caption(scan: Scan) -> str:
-    """Return the caption with the resonances and the bounds."""
+    """Return the caption with the resonances and the meaning of the bars."""
     where = ", ".join(f"{each.frequency_hz:.1f}" for each in scan.shapes)
     confidence = scan.analyses[0].response.frequency_response.settings.confidence
     return (

@@ -1,4 +1,4 @@
-"""Responses I and II at each frequency or level of a stepped sine, separately for both directions."""
+"""Figure of Responses I and II at each frequency or level of a stepped sine, per direction."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,19 +39,19 @@ P = TypeVar("P")
 
 @dataclass(frozen=True)
 class SteppedLook(Generic[P]):
-    """Axis, title and caption of the figure for one stepped quantity."""
+    """Axis, title and caption of the figure for one kind of stepped sine."""
 
     along: Callable[[SteppedResponse], Reals]
     axis: str
     title: Callable[[P, SteppedResponse], str]
     caption: Callable[[P, SteppedResponse], str]
-    """First sentences of the caption, without feedback and simulation."""
+    """First sentences of the caption, before those on feedback and simulation."""
 
 
 def stepped_sine_figure(
     analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, look: SteppedLook[Any]
 ) -> style.DrawnFigure:
-    """Draw Responses I and II over the stepped quantity, with one marker for each direction."""
+    """Draw Responses I and II over the stepped quantity, with a different marker for each direction."""
     along = look.along(analysis.response)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
@@ -115,7 +115,7 @@ def _draw_simulated(
 def _caption(
     analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, look: SteppedLook[Any]
 ) -> str:
-    """Return the caption, with the agreement of the simulation if there is one."""
+    """Return the caption, with the agreement if there is a simulation."""
     text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if overlay is None:
@@ -135,7 +135,7 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
 
 
 def stepped_level_caption(found: SteppedResponse) -> str:
-    """Return the caption with the levels at which the motion jumps, and the hysteresis."""
+    """Return the caption with the levels at which the motion jumps, and their hysteresis."""
     text = (
         f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."

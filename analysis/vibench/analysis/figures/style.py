@@ -23,17 +23,17 @@ from ..tables import Table, write_tables
 
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"
-"""Simulation under the recorded voltage or base motion (vermillion of Okabe & Ito's palette)."""
+"""Colour of simulations under the recorded voltage or base motion (vermillion of Okabe and Ito)."""
 PREDICTED = "#0072b2"
-"""Simulation under sines (blue)."""
+"""Colour of simulations under sines (blue)."""
 LINEAR = "#56b4e9"
-"""Specimen without contact (sky blue, always dashed)."""
+"""Colour of the specimen without contact (sky blue, always dashed)."""
 TERMINAL = "#8a3b7a"
-"""Resonances with m1 stuck to m2 (purple, always dotted)."""
+"""Colour of resonances with m1 stuck to m2 (purple, always dotted)."""
 BOUNDS = "#9a9a9a"
 COLLIDING = "#d9d9d9"
 LEVELS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
-"""Colours of several levels in one figure, weak to strong, in addition to line styles."""
+"""Colours of several levels in one figure, weak to strong; line styles differ too."""
 LEVEL_STYLES = ("-", "--", "-.", ":", "-", "--")
 SIMULATED_CURVE: Mapping[str, Any] = {
     "color": SIMULATED,
@@ -41,7 +41,7 @@ SIMULATED_CURVE: Mapping[str, Any] = {
     "linestyle": (0, (4, 2)),
     "zorder": 3.5,
 }
-"""Line style of a simulated curve drawn over a measured one."""
+"""Line style of a simulated curve that is drawn over a measured curve."""
 LINEAR_CURVE: Mapping[str, Any] = {
     "color": LINEAR,
     "linestyle": "--",
@@ -50,15 +50,15 @@ LINEAR_CURVE: Mapping[str, Any] = {
 }
 
 WIDTH_IN = 7.2
-"""Width that fits the text of A4 and a report's column."""
+"""Width of figures that fits A4 text and a column of a report [in]."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""Relative margin at both ends of the axis, because measured lines lie a few ppm off round numbers."""
+"""Relative margin at both ends of a frequency axis; measured lines are a few ppm off round numbers."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratio of the ends of a frequency axis: linear below 5; ticks at 3 and 7 only below 60."""
+"""Ratio of the ends of a frequency axis; linear below 5, with ticks at 3 and 7 below 60."""
 _FEW_DECADES = (1.5, 0.5)
-"""Decades of a magnitude axis below which some, and all, ticks between powers of ten are labelled."""
+"""Decades of a magnitude axis below which some, or all, ticks between powers of ten are labelled."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
@@ -94,25 +94,25 @@ STYLE: Mapping[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Apply the style inside a ``with`` block, and nowhere else."""
+    """Apply the style inside a ``with`` block only."""
     with mpl.rc_context(dict(STYLE)):
         yield
 
 
 def plain_label(name: str) -> str:
-    """Escape a name so that Matplotlib shows it unchanged, even if it contains dollar signs."""
+    """Return a name, escaped so that Matplotlib shows it unchanged even with dollar signs."""
     return printable(name).replace("$", r"\$")
 
 
 def new_figure(height_in: float) -> Figure:
-    """Make a figure of the common width and of ``height_in`` inches, laid out without overlaps."""
+    """Return a new figure of the common width and of ``height_in`` inches, laid out without overlaps."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None:
-    """Put one legend for all ``axes`` in ``columns`` above the ``figure``, where it covers no data."""
+    """Draw one legend for all ``axes`` in ``columns`` above the ``figure``, where it covers no data."""
     found = {
         label: handle
         for each in axes
@@ -136,14 +136,14 @@ def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
 
 
 def magnitude_axis(axes: Axes) -> None:
-    """Give ``axes`` a logarithmic magnitude axis with ticks at powers of ten, or more in a narrow range."""
+    """Give ``axes`` a logarithmic magnitude axis; in a narrow range, more than powers of ten are labelled."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.yaxis.set_minor_formatter(_Between(minor_thresholds=_FEW_DECADES))
 
 
 class _Between(LogFormatter):
-    """Formatter that labels the same ticks as matplotlib, but writes 0.4 instead of 4e−01."""
+    """Formatter that labels the same ticks as Matplotlib's, but writes 0.4 instead of 4e−01."""
 
     def __call__(self, value: float, place: int | None = None) -> str:
         return _plain(value) if super().__call__(value, place) else ""
@@ -158,7 +158,7 @@ def _plain(value: float, _place: int | None = None) -> str:
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
-    """Return factor and unit with an SI prefix so that a quantity lies between 1 and 1000."""
+    """Return a factor, and a unit with SI prefix, that bring a quantity between 1 and 1000."""
     fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
     scale, prefix = fitting[-1]
     return 1 / scale, f"{prefix}{unit}"
@@ -174,10 +174,10 @@ SCREEN = (ImageKind.PNG, ImageKind.SVG)
 
 @dataclass(frozen=True, eq=False)
 class DrawnFigure:
-    """One figure, ready to be saved or put in a report."""
+    """One figure, ready to be saved or put into a report."""
 
     name: str
-    """Name of the files."""
+    """Name of the files, without suffix."""
     title: str
     caption: str
     figure: Figure
@@ -203,12 +203,12 @@ class DrawnFigure:
         metadata = {"svg": _NO_DATE, "pdf": _NO_PDF_DATE}.get(kind)
         with styled():
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
-        # Drawing computes the layout, which is half of the cost; the next format reuses it.
+        # Drawing computes the layout, half of the cost; the next format reuses this layout.
         self.figure.set_layout_engine("none")
         return target.getvalue()
 
     def save(self, folder: Path, kinds: Sequence[ImageKind] = SCREEN) -> tuple[Path, ...]:
-        """Write the requested images, and the tables as CSV; replace an older figure of that name."""
+        """Write the requested images, and the tables as CSV; replace older files of the same name."""
         folder.mkdir(parents=True, exist_ok=True)
         drawn = []
         for kind in kinds:

@@ -1,4 +1,4 @@
-"""Sweep: envelope over time, responses over frequency, collisions (the paper's Fig. 13 d)."""
+"""Figures of a sweep: envelope over time, responses over frequency, collisions (Fig. 13 d of the paper)."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ _HEIGHT_IN = 6.4
 
 
 def sweep_figure(analysis: SweepAnalysis, overlay: SweepOverlay | None = None) -> style.DrawnFigure:
-    """Draw the envelope in time with a frequency axis, and Responses I and II over frequency."""
+    """Draw the envelope over time with a frequency axis, and Responses I and II over frequency."""
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
@@ -71,7 +71,7 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None)
 
 
 def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
-    """Add a frequency axis above the time axis; ticks beyond the sweep have no time and are not drawn."""
+    """Add a frequency axis above the time axis; ticks outside the sweep have no time and are not drawn."""
     order = np.argsort(found.frequency_hz)
     known = found.frequency_hz[order], found.time_s[order]
 
@@ -139,7 +139,7 @@ def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
 
 
 def regions_text(found: Collisions) -> str:
-    """Return the frequency ranges in which a sweep had collisions, as text."""
+    """Return the frequency ranges with collisions in a sweep as text."""
     unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
     unclear = f"; {unclear} the sweep was too fast to distinguish ringing from collisions" if unclear else ""
     if not found.regions:
@@ -150,7 +150,7 @@ def regions_text(found: Collisions) -> str:
         low_hz, high_hz = region.start.lower_hz, region.start.upper_hz
         middle = plus_minus(0.5 * (low_hz + high_hz), 0.5 * (high_hz - low_hz))
         begin = "the sweep's beginning" if region.reaches_start else f"{middle} Hz"
-        # The end of collisions is random, so that of one run has no bounds.
+        # The end of collisions is random, so the end in one run has no bounds.
         end = "the sweep's end" if region.reaches_stop else f"{region.stop.frequency_hz:.1f} Hz in this run"
         parts.append("during the whole sweep" if whole else f"from {begin} to {end}")
     return f"the masses collide {' and '.join(parts)}{unclear}"
@@ -175,12 +175,12 @@ def _tables(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> tuple[Tabl
 _ORDERS_HEIGHT_IN = 6.0
 _RANGE_DB = 80.0
 _ORDERS_SHOWN = (0.5, 1.0, 1.5, 2.0, 3.0)
-"""Orders that are drawn; the table has all."""
+"""Orders that are drawn; the table contains all orders."""
 _ORDER_STYLES = ("-", "-", "--", "-.", ":")
 
 
 def sweep_orders_figure(analysis: SweepAnalysis) -> style.DrawnFigure:
-    """Draw the spectrogram of the velocity, and the displacement at orders of the drive."""
+    """Draw the spectrogram of the velocity, and the displacement at multiples (orders) of the drive."""
     with style.styled():
         figure = style.new_figure(_ORDERS_HEIGHT_IN)
         picture, orders = figure.subplots(2, 1, height_ratios=(1.3, 1.0))

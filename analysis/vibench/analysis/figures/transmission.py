@@ -1,4 +1,4 @@
-"""Transmission at one noise level, as the paper's Fig. 13 a to c, with coherence and bounds."""
+"""Figure of the transmission at one noise level, with coherence and bounds (Fig. 13 a to c of the paper)."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,16 +26,16 @@ from .ensemble_band import (
 
 _HEIGHT_IN = 6.4
 _LARGEST_BOUND_RATIO = 10.0
-"""Largest ratio of drawn bounds to the curve; bounds of uncertain lines would fill the figure."""
+"""Largest ratio of drawn bounds to the curve; wider bounds of uncertain lines would fill the figure."""
 _DIFFERENCE_LIMIT_DB = 12.0
 _LINEAR_POINTS = 4000
 _HALF_TURN_DEG = 180.0
 _BELOW = 0.5
-"""Lower end of the axis relative to the smallest value."""
+"""Lower end of the magnitude axis relative to the smallest value."""
 
 
 def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = None) -> style.DrawnFigure:
-    """Draw the measured transmission with bounds, the simulation, coherence and difference."""
+    """Draw the measured transmission with bounds, phase, coherence, and simulation with its difference."""
     at = model_resonances(specimen_of(analysis.facts.bench) if overlay is None else overlay.run.specimen)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
@@ -108,7 +108,7 @@ def _magnitudes(
 
 
 def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances) -> None:
-    """Draw the phase in degrees, -180 to 180, with bounds where they are narrower than a turn."""
+    """Draw the phase from -180 to 180 degrees, with bounds where these are narrower than a full turn."""
     view = analysis.view
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
@@ -127,7 +127,7 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, a
 
 
 def _unbroken(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
-    """Interrupt a phase curve where it wraps, so that no line crosses the panel."""
+    """Return a phase curve interrupted where it wraps, so that no line crosses the panel."""
     wraps = np.flatnonzero(np.abs(np.diff(phase_deg)) > _HALF_TURN_DEG) + 1
     return np.insert(frequency_hz, wraps, frequency_hz[wraps]), np.insert(phase_deg, wraps, np.nan)
 
@@ -185,7 +185,7 @@ def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) 
 
 
 def estimate_sentence(response: NoiseResponse) -> str:
-    """Return sentences on the estimator, the resolution, and the data left out."""
+    """Return sentences on the estimator, the resolution, and the data that were left out."""
     found = response.frequency_response
     how = found.settings
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"
