@@ -1,4 +1,4 @@
-"""Level meters with peak hold: the share of its input range that a channel uses."""
+"""Level meters with peak hold: the share of the input range that each channel uses."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -9,15 +9,15 @@ from ..signals.arrays import Reals
 from ._ring import Values
 
 OVER_SHARE = 0.95
-"""Share of full scale above which clipping is near."""
+"""Share of full scale from which a channel is close to clipping."""
 QUIET_SHARE = 0.01
-"""Share of full scale below which the range is too large or the sensor is missing."""
+"""Share of full scale below which the input range is too large or the sensor is missing."""
 QUIET_AFTER_S = 3.0
 HOLD_S = 1.5
 
 
 class LevelVerdict(Enum):
-    """Meaning of a level."""
+    """Assessment of a level: too high, good, or too low."""
 
     OVER = auto()
     GOOD = auto()
@@ -26,24 +26,24 @@ class LevelVerdict(Enum):
 
 @dataclass(frozen=True)
 class Level:
-    """Level of one channel as shares of full scale; more than 1 is overload."""
+    """Level of one channel, relative to full scale; a value above 1 is an overload."""
 
     peak_share: float
     rms_share: float
     held_share: float
-    """Largest peak of the last 1.5 s."""
+    """Largest peak of the last 1.5 s, relative to full scale."""
     verdict: LevelVerdict
 
 
 class LevelMeters:
-    """Level meters, one per channel.
+    """Level meters for several channels.
 
     Parameters
     ----------
     full_scale
         Full scale of each channel in the unit of the samples, shape (channels,).
     sample_rate_hz
-        Sample rate, which sets the peak hold.
+        Sample rate, from which the time of the peak hold is counted.
     """
 
     def __init__(self, full_scale: Reals, sample_rate_hz: float) -> None:
@@ -55,7 +55,7 @@ class LevelMeters:
         self._levels: tuple[Level, ...] = ()
 
     def add(self, values: Values) -> tuple[Level, ...]:
-        """Add the next samples, shape (channels, samples), and return the levels."""
+        """Add the next samples, shape (channels, samples), and return the new levels."""
         known = values[:, np.isfinite(values).all(axis=0)]
         if known.shape[1] == 0:
             return self._levels

@@ -1,8 +1,8 @@
-"""Outline of a signal for drawing.
+"""Lower and upper edges of a signal, for drawing.
 
-If a column of the picture is shorter than a period, its extremes beat with the period: the outline of a
-steady sine would look like a comb. Such a column takes the extremes of a whole period around it. If a period
-spans many columns, the waveform is drawn; if a column contains a whole period, its own extremes are drawn.
+If a column of the picture is shorter than a period, its extremes beat with the period, and a steady sine
+would look like a comb. The extremes are then taken over a whole period around the column. If a period spans
+many columns, the waveform is drawn. If a column contains a whole period, its own extremes are drawn.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,29 +29,29 @@ from ..errors import InvalidRequest
 from ..recordings.channels import RESPONSE
 from ..signals.arrays import Reals
 
-# Envelopes: the smallest and largest sample of every column of the picture.
-# Every sample belongs to one column, so an impact of three samples is visible at any zoom. Drawing every
-# n-th sample would show it in a few percent of the frames.
+# Envelopes: the smallest and largest sample in every column of the picture. Every sample belongs to a column,
+# so an impact of three samples is visible at any zoom. Drawing every n-th sample would show it in only a few
+# percent of the frames.
 
 Samples = NDArray[np.float32] | NDArray[np.float64]
 
 
 def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
-    """Reduce signals to their extremes, column by column.
+    """Return the smallest and largest sample of each column of a picture.
 
-    Raises InvalidRequest when there is no column.
+    Raises InvalidRequest when no column is requested.
 
     Parameters
     ----------
     samples
-        Shape (..., samples). Lost samples are NaN; a column is NaN where all of its samples are lost.
+        Signals, shape (..., samples). Lost samples are NaN; a column is NaN if all of its samples are lost.
     columns
-        Number of columns. Fewer samples than columns are returned unchanged.
+        Number of columns. If there are no more samples than columns, the samples are returned.
 
     Returns
     -------
     Smallest and largest value of each column, shape (..., columns). Column c starts at sample
-    ``c * n // columns``, see `column_starts`.
+    ``c * n // columns``, as in `column_starts`.
     """
     if columns < 1:
         raise InvalidRequest(f"{columns} columns were requested; a picture has 1 or more")
@@ -67,9 +67,9 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
-    """First sample of each column of `envelope`.
+    """Return the first sample of each column of `envelope`, shape (columns,).
 
-    Returns an array of shape (columns,).
+    There are no more columns than samples.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
 
 
 def zigzag(low: Reals, high: Reals) -> Reals:
-    """Join both edges of an envelope into one line, low and high alternating.
+    """Return both edges of an envelope as one line that alternates between low and high.
 
-    Returns an array of shape (..., 2 columns).
+    The shape is (..., 2 columns).
 
     Parameters
     ----------
@@ -96,22 +96,22 @@ def zigzag(low: Reals, high: Reals) -> Reals:
 
 
 LEGIBLE_COLUMNS = 6.0
-"""Periods of at least this many columns are drawn as a waveform."""
+"""Minimum length of a period that is drawn as a waveform [columns]."""
 _MARGIN = 1.25
-"""Number of periods over which a column takes extremes; above 1, as the period of a sweep changes."""
+"""Number of periods over which a column takes extremes; above 1, because a sweep changes its period."""
 _CLEAR = 0.25
-"""Hysteresis of zero crossings, as a share of the typical amplitude."""
+"""Hysteresis of zero crossings relative to the typical peak-to-peak value."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
-"""Number of stretches in which periods are counted, and the fewest columns of each."""
+"""Number of stretches in which periods are counted, and minimum columns of each stretch."""
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
-    """Reduce signals to lower and upper edges, column by column, with the columns of `envelope`.
+    """Return the lower and upper edges of signals in each column; the columns are those of `envelope`.
 
     Parameters
     ----------
     samples
-        Shape (..., samples).
+        Signals, shape (..., samples).
     columns
         Number of columns of the picture.
 
@@ -131,7 +131,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
-    """Return the number of columns whose extremes each column takes; 1 leaves its edges unchanged."""
+    """Return over how many columns each column takes its extremes; 1 leaves its own extremes."""
     low, high = edges
     count = low.size
     blocks = max(1, min(_BLOCKS, count // _LEAST_COLUMNS))
@@ -145,7 +145,7 @@ def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[
 
 
 def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the reach of each column: the longest period [columns] of its stretch and both neighbours."""
+    """Return the reach of each column: the longest period in its stretch and both neighbours [columns]."""
     is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
     reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
     beside = np.pad(reach, 1, mode="edge")
@@ -169,7 +169,7 @@ def period_of(samples: Samples, low: Samples, high: Samples) -> float:
 
 
 def widen_extremes(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
-    """Return, for every column, the extremes of this many columns around it."""
+    """Return, for every column, the extremes over ``reach`` columns around it."""
     lowest, highest = low.copy(), high.copy()
     for each in np.unique(reach[reach > 1]):
         here = reach == each
@@ -179,7 +179,7 @@ def widen_extremes(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tup
 
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
-    """Return, for every column, the extreme of this many columns around it."""
+    """Return, for every column, the extreme over ``reach`` columns around it."""
     before, found = (reach - 1) // 2, edge.copy()
     padded = np.pad(edge, (before, reach - 1 - before), mode="edge")
     for shift in range(reach):
@@ -187,18 +187,18 @@ def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
     return found
 
 
-# Pictures of bounded width of any stretch of a recording.
-# Long stretches are drawn from the extremes stored in the file, short ones from the samples; no sample is
-# skipped, so an impact of three samples is in every picture.
+# Pictures of bounded width, of any stretch of a recording. Long stretches are drawn from the extremes stored
+# in the file, short stretches from the samples. No sample is skipped, so an impact of three samples is in
+# every picture.
 #
-# A thumbnail shows a whole recording in a hundred columns, for lists of recordings.
+# A thumbnail shows a whole recording in about a hundred columns, for lists of recordings.
 
 _COARSER = 16
-"""Bins of one level per bin of the next."""
+"""Number of bins of one level that form one bin of the next level."""
 _LEAST_BINS = 20_000
-"""A level with fewer bins needs no coarser one: reducing it takes 0.1 ms."""
+"""Number of bins up to which no coarser level is needed; reducing them takes 0.1 ms."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
-"""Places where periods of a long recording are counted: number, columns of each, maximum samples."""
+"""Stretches of a long recording in which periods are counted: number, columns of each, maximum samples."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
@@ -207,7 +207,7 @@ OnRead = Callable[[int, int], None]
 
 
 def ignore_reading(done: int, total: int) -> None:
-    """Ignore the progress."""
+    """Do nothing; the default callback."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,9 +215,9 @@ class Picture:
     """A stretch of some channels, for drawing."""
 
     time_s: Reals
-    """Left edge of each column, since the first sample, shape (columns,)."""
+    """Left edge of each column [s since the first sample], shape (columns,)."""
     low: Samples
-    """Lower edges, shape (channels, columns), in the channels' units; NaN where all samples were lost."""
+    """Lower edges, shape (channels, columns), in the unit of each channel; NaN if all samples were lost."""
     high: Samples
     samples_per_column: float
     """Samples per column; 1 if the samples themselves are shown."""
@@ -225,7 +225,7 @@ class Picture:
 
 @dataclass(frozen=True, eq=False)
 class OverviewLevel:
-    """Extremes of bins of one length in the channel's unit, shape (bins,)."""
+    """Smallest and largest values in bins of equal length, in the unit of the channel, shape (bins,)."""
 
     bin_samples: int
     low: NDArray[np.float32]
@@ -234,16 +234,16 @@ class OverviewLevel:
 
 @dataclass(frozen=True, eq=False)
 class RecordingOverview:
-    """A recording with its overview, from `overview_of`."""
+    """A recording with the extremes of its bins; `overview_of` creates it."""
 
     recording: Recording
     levels: dict[str, tuple[OverviewLevel, ...]]
-    """Levels by role, fine to coarse."""
+    """Levels keyed by role, from fine to coarse."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
-        """Return samples ``start`` to ``stop`` (exclusive) of some channels in about this many columns.
+        """Return samples ``start`` to ``stop`` (exclusive) of some channels in about ``columns`` columns.
 
-        Raises InvalidRequest when the stretch or the width is empty.
+        Raises InvalidRequest when no sample, column or channel is requested.
         """
         begin, end = max(0, start), min(stop, self.recording.samples)
         if not (begin < end and columns >= 1 and roles):
@@ -279,9 +279,9 @@ class RecordingOverview:
         return Picture(time_s, lows, highs, per_column)
 
     def _reach(self, role: str, begin: int, end: int, columns: int) -> NDArray[np.int64]:
-        """Return periods in columns, from the samples of some places.
+        """Return the reach of each column, from periods in some stretches of samples.
 
-        Stored bins are too long to show a period of less than two columns.
+        Stored bins are too long to show periods of less than two columns.
         """
         borders = np.linspace(0, columns, _STRETCHES + 1).astype(np.int64)
         wide = (end - begin) / columns
@@ -297,14 +297,14 @@ class RecordingOverview:
 
 
 def has_overview(recording: Recording) -> bool:
-    """Return whether the file contains an overview, so that drawing reads little data."""
+    """Return whether the file contains an overview, so that little data is read for drawing."""
     return recording.read_overview(recording.roles[0]) is not None
 
 
 def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingOverview:
-    """Read the overview from the file, or compute it from all samples if there is none.
+    """Return the overview from the file; compute it from all samples if the file contains none.
 
-    Growing, interrupted and older recordings have none; half a gigabyte of samples takes one to two
+    Growing, interrupted and older recordings contain none. Half a gigabyte of samples takes one to two
     seconds.
     """
     return RecordingOverview(recording, overview_levels(recording, on_read))
@@ -313,7 +313,7 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
 def overview_levels(
     recording: Recording, on_read: OnRead = ignore_reading
 ) -> dict[str, tuple[OverviewLevel, ...]]:
-    """Return the extremes of every channel, fine to coarse; ``on_read`` receives the progress."""
+    """Return the extremes of every channel, from fine to coarse; ``on_read`` receives the progress."""
     levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
@@ -325,9 +325,9 @@ def overview_levels(
 
 
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
-    """Return the stored extremes of the channel ``role``, fine to coarse; see `has_overview`.
+    """Return the stored extremes of the channel ``role``, from fine to coarse; see `has_overview`.
 
-    Raises InvalidRequest when the file contains none.
+    Raises InvalidRequest when the file contains no overview.
     """
     kept = recording.read_overview(role)
     if kept is None:
@@ -370,19 +370,19 @@ def _scaled(counts: Counts, channel: ChannelHeader) -> NDArray[np.float32]:
 
 THUMBNAIL_COLUMNS = 120
 READ_WHOLE_SAMPLES = 50_000_000
-"""Most values to read for the thumbnail of a file without an overview: about one second."""
+"""Maximum number of values to read for the thumbnail of a file without an overview; about one second."""
 
 
 @dataclass(frozen=True, eq=False)
 class Thumbnail:
-    """Outline of the response of a whole recording, between -1 and 1."""
+    """Lower and upper edge of the response over a whole recording, scaled to -1 to 1."""
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
 
 
 def thumbnail(path: Path) -> Thumbnail | None:
-    """Return a thumbnail; None if the recording is empty or too slow to read."""
+    """Return a thumbnail; None if the recording is empty, unreadable or too slow to read."""
     try:
         with open_recording(path) as recording:
             if recording.samples == 0 or not (

@@ -1,4 +1,4 @@
-"""Phase portrait and Poincaré points of the newest periods."""
+"""Phase portrait and Poincaré points of the newest drive periods."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ from ._sine_response import drive_tone, drive_turns, look_samples, motion_of
 
 SHOWN_PERIODS = 20
 _EDGE_PERIODS = 25
-"""Periods at each end of the stretch that integration and drive phase need."""
+"""Additional periods at each end of the stretch, needed for integration and drive phase."""
 POINTS_A_PERIOD = 120
-"""Points per period of the orbit: 2400 points in 20 periods are painted in about 1 ms."""
+"""Points per period of the orbit; 2400 points in 20 periods are painted in about 1 ms."""
 MOST_POINTS = 3000
-"""Maximum number of Poincaré points; the oldest are dropped."""
+"""Maximum number of Poincaré points; older points are dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class Portrait(Labelled):
     """Displacement and velocity of the orbit, shape (samples,)."""
     strobe_displacement_m: Reals
     strobe_velocity_m_per_s: Reals
-    """Points at the maxima of the drive, a cosine; shape (periods,)."""
+    """Poincaré points at the maxima of the drive, a cosine; shape (periods,)."""
     strobe_sample: Reals
-    """Times of these points, in samples since the run started."""
+    """Times of the Poincaré points, in samples since the start of the run."""
 
 
 def portrait(
@@ -44,16 +44,16 @@ def portrait(
     *,
     delay_s: float = 0.0,
 ) -> Portrait | None:
-    """Return the newest periods; None without a sine or with too few samples.
+    """Return the portrait of the newest periods; None without a sine drive or with too few samples.
 
     Parameters
     ----------
     window
-        Samples in physical units, about `portrait_samples` of them.
+        Newest samples in physical units; `portrait_samples` of them are needed.
     delay_s
-        Lag of the response channel behind the drive channel.
+        Lag of the response channel behind the drive channel [s].
     quantity
-        Quantity of the response's channel.
+        Quantity of the response channel.
     """
     look = look_samples(sample_rate_hz)
     drive = np.asarray(window.values[drive_row], dtype=np.float64)
@@ -81,13 +81,13 @@ def portrait(
 
 
 def portrait_samples(frequency_hz: float, sample_rate_hz: float) -> int:
-    """Return the number of samples for a portrait."""
+    """Return the number of samples needed for a portrait."""
     wanted = (SHOWN_PERIODS + 2 * _EDGE_PERIODS) * sample_rate_hz / frequency_hz
     return fft.next_fast_len(int(np.ceil(wanted)), real=True)
 
 
 class PoincareSection:
-    """Poincaré points collected from overlapping portraits, each point once."""
+    """Poincaré points collected from overlapping portraits; each point is collected once."""
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
@@ -98,7 +98,7 @@ class PoincareSection:
         self._newest = -np.inf
 
     def add(self, found: Portrait) -> None:
-        """Add the new points: those at least half a period after the newest."""
+        """Add the new points: those at least half a period later than the newest collected point."""
         if found.strobe_sample.size == 0:
             return
         spacing = float(np.min(np.diff(found.strobe_sample))) if found.strobe_sample.size > 1 else 1.0

@@ -12,23 +12,23 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class RingWindow:
-    """Consecutive samples that end with the newest."""
+    """Consecutive samples up to the newest sample."""
 
     first_sample: int
-    """Index of the first sample since the start of the run."""
+    """Index of the first sample, counted from the start of the run."""
     values: Values
-    """Shape (channels, samples); a view that the next samples overwrite; lost samples are NaN."""
+    """Samples, shape (channels, samples); a view that later samples overwrite. Lost samples are NaN."""
 
     @property
     def stop_sample(self) -> int:
-        """Index after the newest sample."""
+        """Index one past the newest sample."""
         return self.first_sample + int(self.values.shape[1])
 
 
 class Ring:
     """Ring buffer that returns its samples without copying.
 
-    Every sample is written twice, one capacity apart, so that any stretch is contiguous.
+    Every sample is written twice, one capacity apart, so that the newest samples are always contiguous.
     """
 
     def __init__(self, channels: int, capacity: int) -> None:
@@ -40,7 +40,7 @@ class Ring:
         self._values: Values = np.full((channels, 2 * capacity), np.nan, dtype=np.float32)
         self._begun: int | None = None
         self.next_sample = 0
-        """Index of the next sample."""
+        """Index of the next sample to add."""
 
     @property
     def held(self) -> int:
@@ -64,13 +64,13 @@ class Ring:
         self.next_sample = first_sample + values.shape[1]
 
     def newest(self, samples: int) -> RingWindow:
-        """Return this many of the newest samples, or all if there are fewer."""
+        """Return the newest ``samples`` samples, or all if there are fewer."""
         count = min(max(samples, 0), self.held)
         end = self.next_sample % self._capacity + self._capacity
         return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
     def since(self, sample: int) -> RingWindow:
-        """Return the samples from an index on, as far as they are still available."""
+        """Return the available samples from index ``sample`` on."""
         return self.newest(self.next_sample - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:

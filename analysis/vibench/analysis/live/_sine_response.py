@@ -1,4 +1,4 @@
-"""Live Responses I and II of a sine or a slow sweep."""
+"""Live Responses I and II during a sine or a slow sweep."""
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -14,31 +14,31 @@ from ._outline import Samples
 from ._ring import RingWindow
 
 _LEAST_SHARE = 0.5
-"""Smallest share of the power that a sine has in its strongest line and the neighbours."""
+"""Minimum share of the power of a sine in its strongest line and the neighbouring lines."""
 _NEIGHBOURS = 3
-"""Lines on each side that belong to a sine under a Hann window, also if its frequency changes slowly."""
+"""Lines on each side that belong to a sine under a Hann window, even if its frequency changes slowly."""
 _LEAST_LINE = 4
-"""Fewest periods in a stretch, so that the sine's line is clear of the offset's."""
+"""Minimum number of periods in a stretch, so that the line of the sine is separate from the offset."""
 
 
 @dataclass(frozen=True)
 class DriveTone:
-    """Sine in a short stretch of the drive."""
+    """Sine in a short stretch of the drive signal."""
 
     frequency_hz: float
-    """Frequency; that of a sweep in the middle of the stretch."""
+    """Frequency [Hz]; in a sweep, the frequency at the middle of the stretch."""
     amplitude: float
-    """Peak [unit of the channel]."""
+    """Peak amplitude [unit of the channel]."""
 
 
 @lru_cache(maxsize=32)
 def _hann(samples: int) -> Reals:
-    """Return a cached window: computing one costs as much as a Fourier transform."""
+    """Return a cached Hann window; computing it costs as much as a Fourier transform."""
     return taper(Window.HANN, samples)
 
 
 def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
-    """Find the sine in a short stretch of the drive, shape (samples,); None if it is not a sine.
+    """Return the sine in a short stretch of the drive, shape (samples,); None if it is not a sine.
 
     The ratio of the two largest lines of a Hann spectrum gives the exact frequency between them
     (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).
@@ -65,8 +65,8 @@ def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
     """Return the times of the maxima of the drive, a cosine or a slow sweep [samples].
 
-    The drive is demodulated with its frequency and low-pass filtered at half of it, which leaves a slow
-    phase. A tenth of the stretch at each end is left out, where the filter is disturbed.
+    The drive is demodulated with its frequency and low-pass filtered at half this frequency; a slow phase
+    remains. A tenth of the stretch at each end is left out, because the filter is inaccurate there.
     """
     half = max(2, int(0.5 * frequency_hz * drive.size / sample_rate_hz))
     if half < _LEAST_LINE:
@@ -87,36 +87,36 @@ def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Rea
 
 
 _BAND_BELOW = 0.3
-"""High-pass for displacement, relative to the drive frequency: half orders pass, drift does not."""
+"""High-pass frequency for displacement relative to the drive; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
-"""Length of the stretch in which the drive frequency is searched: five periods of 10 Hz."""
+"""Length of the stretch in which the drive frequency is searched; five periods of 10 Hz [s]."""
 _STRETCH_PERIODS = 25
-"""Drive periods of motion without the disturbed ends; at least 0.1 s."""
+"""Number of drive periods without the disturbed ends; their duration is at least 0.1 s."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Smallest ratio of the drive's amplitudes at the end and start of a stretch; less means a ramp down."""
+"""Smallest ratio of the drive amplitude at the end of a stretch to that at its start; less is a ramp down."""
 _STEEPEST_POWER = 2
-"""Largest power of the frequency that the voltage of a sweep follows (constant displacement)."""
+"""Largest power of frequency that the voltage of a sweep follows (constant displacement)."""
 
 
 @dataclass(frozen=True)
 class SinePoint:
-    """Result of one stretch."""
+    """Responses and amplitudes from one stretch of samples."""
 
     time_s: float
-    """Middle of the stretch, since the first sample of the run."""
+    """Middle of the stretch [s since the first sample of the run]."""
     frequency_hz: float
     drive_amplitude_m: float
-    """A0, amplitude of the base displacement at the drive frequency."""
+    """Amplitude A0 of the base displacement at the drive frequency."""
     lower: float
     upper: float
     """Smallest and largest response velocity [m/s]."""
     response_i: float
-    """Largest abs(x) over A0."""
+    """Response I: largest abs(x) over A0."""
     response_ii: float
-    """Amplitude of x at the drive frequency over A0."""
+    """Response II: amplitude of x at the drive frequency over A0."""
 
 
 def stretch_samples(frequency_hz: float, sample_rate_hz: float) -> int:
@@ -126,7 +126,7 @@ def stretch_samples(frequency_hz: float, sample_rate_hz: float) -> int:
 
 
 def look_samples(sample_rate_hz: float) -> int:
-    """Return the number of samples to find the drive frequency."""
+    """Return the number of samples needed to find the drive frequency."""
     return fft.next_fast_len(round(_LOOK_S * sample_rate_hz), real=True)
 
 
@@ -136,19 +136,19 @@ def sine_point(
     sample_rate_hz: float,
     quantity: Quantity = Quantity.VELOCITY,
 ) -> SinePoint | None:
-    """Compute a point from the newest samples.
+    """Return a point from the newest samples.
 
-    None without a sine, with too few or lost samples, or while the drive is ramped down, when m0 still
-    rings and the base hardly moves.
+    None without a sine, with too few or lost samples, and while the drive is ramped down (m0 then still rings
+    while the base hardly moves).
 
     Parameters
     ----------
     window
-        Samples in physical units; additional samples are ignored.
+        Samples in physical units; only the newest that are needed are used.
     rows
-        Rows of drive, base acceleration and response.
+        Row numbers of drive, base acceleration and response.
     quantity
-        Quantity of the response's channel.
+        Quantity of the response channel.
     """
     look = look_samples(sample_rate_hz)
     newest = np.asarray(window.values[list(rows), -look:], dtype=np.float64)
@@ -168,7 +168,7 @@ def sine_point(
 
 
 def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
-    """Return whether the drive falls along a stretch by more than in a downward sweep."""
+    """Return whether the drive falls along a stretch more steeply than in a downward sweep."""
     quarter = drive.size // 4
     first, last = (drive_tone(each, sample_rate_hz) for each in (drive[:quarter], drive[-quarter:]))
     if first is None or last is None:
@@ -180,11 +180,11 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
 def _point(
     time_s: float, stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity
 ) -> SinePoint | None:
-    """Return a point with all quantities from one stretch, since they change together in a sweep."""
+    """Return a point; all quantities come from one stretch, because they change together in a sweep."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
     omega = 2 * np.pi * frequency_hz
-    # Complex peak amplitudes of signals, shape (channels, samples), at one frequency.
+    # The complex peak amplitudes of the signals at one frequency.
     values = _hann(stretch.shape[-1])
     turns = np.exp(-2j * np.pi * frequency_hz / sample_rate_hz * np.arange(stretch.shape[-1]))
     found: Complexes = np.asarray(stretch @ (values * turns), dtype=np.complex128)
@@ -207,7 +207,7 @@ def _point(
 def motion_of(
     response: Reals, sample_rate_hz: float, frequency_hz: float, quantity: Quantity
 ) -> tuple[Reals, Reals]:
-    """Return displacement and velocity around a drive frequency, without the disturbed ends."""
+    """Return displacement and velocity for a drive frequency, without the disturbed ends."""
     converted = partial(
         converted_signal,
         response,

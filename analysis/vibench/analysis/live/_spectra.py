@@ -28,18 +28,18 @@ from ..tables import Labelled
 from ._ring import Values
 
 _LEAST_SEGMENTS = 2
-"""Fewest segments: the coherence of a single one is always 1."""
+"""Minimum number of segments; the coherence of a single segment is always 1."""
 _OVERLAP = 0.5
 
 
 @dataclass(frozen=True)
 class SpectrumSettings:
-    """Settings of the averages."""
+    """Length and number of the averaged segments."""
 
     segment_samples: int = 8192
-    """Length of a segment; at 51.2 kS/s, lines are 6.25 Hz apart."""
+    """Length of a segment [samples]; at 51.2 kS/s, lines are 6.25 Hz apart."""
     averages: int = 24
-    """Number of averaged segments; older ones are dropped."""
+    """Number of averaged segments; older segments are dropped."""
 
     def __post_init__(self) -> None:
         if self.segment_samples < 2 or self.averages < _LEAST_SEGMENTS:
@@ -64,7 +64,7 @@ DEFAULT_SETTINGS = SpectrumSettings()
 
 
 class LiveSpectra:
-    """Welch average of the newest segments, each transformed once.
+    """Welch average of the newest segments; each segment is transformed once.
 
     Segments with lost samples are skipped.
     """
@@ -85,20 +85,20 @@ class LiveSpectra:
         self._is_used: Flags = np.zeros(settings.averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
         self.segments = 0
-        """Number of completed segments; a change shows that results are out of date."""
+        """Number of completed segments; when it changes, earlier results are out of date."""
 
     def add(self, values: Values) -> None:
         """Add the next samples, shape (channels, samples)."""
         data = np.concatenate((self._carry, values), axis=1)
         size = self._settings.segment_samples
         whole = max(0, (data.shape[1] - size) // self._hop + 1)
-        # After a long pause only the newest segments are transformed.
+        # After a long pause, only the newest segments are transformed.
         for number in range(max(0, whole - self._settings.averages), whole):
             self._take(data[:, number * self._hop : number * self._hop + size])
         self._carry = data[:, whole * self._hop :].copy()
 
     def leave_out(self, newest_s: float) -> None:
-        """Exclude the segments of the newest seconds."""
+        """Exclude the segments of the newest ``newest_s`` seconds."""
         count = min(self.segments, self._is_used.size, int(np.ceil(newest_s * self._rate_hz / self._hop)))
         self._is_used[(self.segments - 1 - np.arange(count)) % self._is_used.size] = False
 
@@ -111,7 +111,7 @@ class LiveSpectra:
             self._spectra[place], self._power[place] = found, found.real**2 + found.imag**2
 
     def spectrum(self) -> LiveSpectrum | None:
-        """Return the spectral density of every channel; None before the first whole segment."""
+        """Return the spectral density of every channel; None before the first complete segment."""
         used = self._used()
         if not used.any():
             return None
@@ -135,19 +135,19 @@ class LiveSpectra:
         high_hz: float,
         delay_s: float = 0.0,
     ) -> FrequencyResponse | None:
-        """Return transmissibility, coherence and bounds; None before two segments.
+        """Return transmissibility, coherence and bounds; None with fewer than two valid segments.
 
         Parameters
         ----------
         rows
-            Rows of base acceleration and response and, for an estimate without bias by noise, of the drive
-            voltage.
+            Row numbers of base acceleration and response. A third row, the drive voltage, gives an estimate
+            without bias by noise.
         quantity
-            Quantity of the response's channel.
+            Quantity of the response channel.
         low_hz, high_hz
-            Ends of the band.
+            Ends of the frequency band.
         delay_s
-            Lag of the response channel behind the base channel.
+            Lag of the response channel behind the base channel [s].
         """
         used = self._used()
         if int(np.count_nonzero(used)) < _LEAST_SEGMENTS:
@@ -185,7 +185,7 @@ class LiveSpectra:
         )
 
     def _used(self) -> Flags:
-        """Return which places contain a valid segment, oldest first."""
+        """Return which entries of the memory contain a valid segment."""
         known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)
 
@@ -193,17 +193,17 @@ class LiveSpectra:
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
-"""Width of a line under a Hann window, at half power, times the length of the window."""
+"""Half-power width of a line under a Hann window, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
 """Ratio of the visible range to the segment length, within the limits above."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0
-"""Density drawn for silence, because zero has no logarithm."""
+"""Smallest density drawn, because zero has no logarithm [dB]."""
 
 
 class RowSpacing(StrEnum):
-    """Spacing of the rows."""
+    """Spacing of the frequency rows."""
 
     LINEAR = "linear"
     LOGARITHMIC = "logarithmic"
@@ -220,7 +220,7 @@ class SpectrogramRequest:
     highest_hz: float
     spacing: RowSpacing
     resolution_hz: float | None = None
-    """Resolution [Hz]; by default chosen from the length of the stretch, which shows events best."""
+    """Resolution [Hz]; by default chosen from the length of the stretch so that events are visible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,13 +231,13 @@ class DensityPicture:
     unit: str
     """Unit of the channel; densities are in decibels over 1 unit²/Hz."""
     time_s: tuple[float, float]
-    """Left and right edge, since the recording's first sample."""
+    """Left and right edge [s since the first sample of the recording]."""
     frequency_hz: tuple[float, float]
-    """Lower and upper edge."""
+    """Lower and upper edge [Hz]."""
     decibel: NDArray[np.float32]
-    """Shape (rows, columns); NaN where samples were lost."""
+    """Density in decibels, shape (rows, columns); NaN where samples were lost."""
     segment_s: float
-    """Length of one Hann-windowed Fourier transform."""
+    """Length of one Hann-windowed segment [s]."""
     resolution_hz: float
 
 
@@ -277,7 +277,7 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
 
 
 def _rows(found: Spectrogram, spacing: RowSpacing) -> tuple[tuple[float, float], Reals]:
-    """Assign the lines to rows; a row shows its strongest line."""
+    """Return the edges of the frequency axis and the rows; a row contains its strongest line."""
     lines_hz, density = found.frequency_hz, found.density
     step_hz = float(lines_hz[1])
     if spacing is RowSpacing.LINEAR:

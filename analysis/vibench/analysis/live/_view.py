@@ -1,4 +1,4 @@
-"""Live view of one run: samples are added, and each picture is computed when it is drawn."""
+"""Live view of one run; pictures are computed only when they are drawn."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -19,42 +19,41 @@ from ._ring import Ring, Values
 from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples
 from ._spectra import LiveSpectra, LiveSpectrum
 
-# Impacts are counted as kinks in the motion of m0.
-# When m1 and m2 collide, springs and dampers transmit their jump in velocity to m0: its acceleration steps
-# and changes its slope. This kink always has the same shape, and the motion between impacts is far slower.
-# So a sixth difference removes the smooth motion, a matched filter finds the kinks, and the strongest is
-# subtracted first, until only noise is left. Impacts 0.1 ms apart are resolved.
-# In simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to 99 % of 330
-# to 1800 impacts a second are counted, and none without impacts. Only contacts that change m0's motion less
-# than the noise are missed.
+# Impacts are counted as kinks in the motion of m0. When m1 and m2 collide, springs and dampers transmit the
+# jump of their velocities to m0: its acceleration steps and changes its slope. This kink always has the same
+# shape, and the motion between impacts is far slower. A sixth difference removes the smooth motion, and a
+# matched filter finds the kinks. The strongest kink is subtracted first, until only noise is left. Impacts
+# 0.1 ms apart are resolved. In simulated motions with the noise of the virtual rig
+# (benchmarks/impact_counter.py), 88 to 99 % of 330 to 1800 impacts a second are counted, and none without
+# impacts. Only contacts that change m0's motion by less than the noise are missed.
 
 _SPAN_S = 78e-6
-"""Interval of the difference: a longer one passes more of the motion, a shorter one more noise."""
+"""Interval of the difference; a longer interval passes more of the motion, a shorter one more noise [s]."""
 _DAMPING_TIME_S = 2e-5
-"""Damping time of the springs to m0: step of the acceleration over change of its slope."""
+"""Damping time of the springs at m0: ratio of the acceleration step to the change of its slope."""
 _CONTACT_S = 30e-6
-"""Length of a contact: 20 to 40 us."""
+"""Duration of a contact, which is 20 to 40 us."""
 _APART_S = 100e-6
-"""Kinks closer than this are counted as one."""
+"""Kinks that are closer than this are counted as one [s]."""
 _LEAST_FRESH_S = 20e-3
-"""Shortest stretch to estimate the noise [s]."""
+"""Shortest stretch for an estimate of the noise [s]."""
 _MOST_FRESH_S = 0.1
-"""Longer data are processed in pieces of this length."""
+"""Longest piece that is processed at once [s]."""
 _NOISE_FACTOR = 5.2
-"""Threshold in standard deviations of the noise: one false impact by noise in two minutes."""
+"""Threshold in standard deviations of the noise; noise exceeds it once in two minutes."""
 _SMOOTH_FACTOR = 3.0
-"""Threshold relative to what the filter passes of a sine with the motion's mean frequency."""
+"""Threshold relative to the filter output for a sine at the mean frequency of the motion."""
 _REST_SHARE = 0.2
-"""Smallest kink relative to a stronger neighbour; smaller ones are residuals of that neighbour."""
+"""Smallest kink relative to a stronger neighbour; smaller kinks are residuals of the neighbour."""
 _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
-"""Noise gain of the sixth difference, for white noise."""
+"""Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""First quartile of |noise| in standard deviations; impacts may disturb larger values."""
+"""First quartile of |noise| in standard deviations; larger values may be affected by impacts."""
 
 
 class ImpactCounter:
-    """Count impacts in a motion that arrives in blocks."""
+    """Counter of impacts in a motion that arrives in blocks."""
 
     def __init__(self, sample_rate_hz: float, quantity: Quantity = Quantity.VELOCITY) -> None:
         span = max(1, round(_SPAN_S * sample_rate_hz))
@@ -62,7 +61,7 @@ class ImpactCounter:
         self._difference[::span] = _SIXTH_DIFFERENCE
         kink = _kink(self._difference, sample_rate_hz, 3 - quantity.derivatives)
         power = float(kink @ kink)
-        # Difference and matched filter in one: samples in, strength of a kink out.
+        # Difference and matched filter in one: the input are samples, the output is the strength of kinks.
         self._finder = np.convolve(self._difference, kink[::-1]) / power
         self._gain = float(np.sqrt(np.sum(self._finder**2)))
         self._beam = np.correlate(kink, kink, mode="full") / power
@@ -72,16 +71,16 @@ class ImpactCounter:
         self._least_fresh = round(_LEAST_FRESH_S * sample_rate_hz)
         self._carry = np.empty(0)
         self.count = 0
-        """Impacts so far."""
+        """Number of impacts so far."""
 
     def add(self, motion: Values | Reals) -> int:
-        """Add the next samples, shape (samples,), lost ones NaN; return the number of impacts found."""
+        """Add the next samples, shape (samples,), NaN if lost; return the number of new impacts."""
         starts = range(0, max(1, len(motion)), self._most)
         return sum(self._add_piece(motion[first : first + self._most]) for first in starts)
 
     def _add_piece(self, motion: Values | Reals) -> int:
         data = np.concatenate((self._carry, np.asarray(motion, dtype=np.float64)))
-        # To separate a kink from its neighbours, the samples around it are needed.
+        # Samples on both sides of a kink are needed to separate it from its neighbours.
         fresh = data.size - (self._finder.size - 1) - 2 * self._reach
         if fresh < self._least_fresh:
             self._carry = data
@@ -93,7 +92,7 @@ class ImpactCounter:
         return int(inside.size)
 
     def _kinks(self, data: Reals) -> "np.ndarray[tuple[int, ...], np.dtype[np.intp]]":
-        """Find kinks, the strongest first; subtract each before the next."""
+        """Return the places of kinks; the strongest kink is found first and subtracted before the next."""
         strength = np.nan_to_num(np.convolve(data, self._finder[::-1], mode="valid"))
         least = max(_NOISE_FACTOR * self._gain * _noise(data), _SMOOTH_FACTOR * self._smooth(data))
         size, beside = np.abs(strength), np.zeros(strength.size)
@@ -114,7 +113,7 @@ class ImpactCounter:
         return inorder[np.diff(inorder, prepend=-self._apart - 1) > self._apart]
 
     def _smooth(self, data: Reals) -> float:
-        """Return the filter's residual for a sine with the same mean square and mean square slope."""
+        """Return the filter output for a sine with the same mean square and mean square slope."""
         known = data[np.isfinite(data)]
         spread = float(np.std(known)) if known.size > 1 else 0.0
         if spread == 0.0:
@@ -125,18 +124,18 @@ class ImpactCounter:
 
 
 def _noise(data: Reals) -> float:
-    """Estimate the noise of one sample from the quiet samples; infinite without data."""
+    """Return the noise of one sample, estimated from the quiet samples; infinite without data."""
     known = data[np.isfinite(data)]
     if known.size <= _SIXTH_DIFFERENCE.size:
         return np.inf
     rough = np.abs(np.convolve(known, _SIXTH_DIFFERENCE, mode="valid")) / _NOISE_GAIN
     quiet = float(np.quantile(rough, _QUIET_SHARE)) / _QUARTER_OF_NORMAL
-    # Samples have single precision, so the noise is at least one last digit.
+    # Samples have single precision, so the noise is at least one unit in the last digit.
     return max(quiet, float(np.finfo(np.float32).eps * np.max(np.abs(known))))
 
 
 def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
-    """Return the difference of the motion after one impact, which grows as t^power / power!."""
+    """Return the filtered motion after one impact; the motion grows as t^power / power!."""
     around = np.arange(-difference.size, 2 * difference.size) / sample_rate_hz
     moments_s = np.linspace(-0.5 * _CONTACT_S, 0.5 * _CONTACT_S, 7)
     since = np.clip(around[:, np.newaxis] - moments_s, 0.0, None)
@@ -148,13 +147,13 @@ def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
 
 
 MOST_POINTS = 36_000
-"""Most points, one hour at ten points per second; the oldest are dropped."""
+"""Maximum number of points: one hour at ten points per second; older points are dropped."""
 _COLUMNS = tuple(each.name for each in fields(SinePoint))
 
 
 @dataclass(frozen=True, eq=False)
 class SweepHistory:
-    """All points in the order of time; arrays of shape (points,)."""
+    """All points of a run in the order of time; arrays of shape (points,)."""
 
     time_s: Reals
     frequency_hz: Reals
@@ -166,7 +165,7 @@ class SweepHistory:
 
 
 class SweepTrace:
-    """Growing list of points in preallocated memory."""
+    """Growing list of points in memory that is allocated once."""
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
@@ -179,7 +178,7 @@ class SweepTrace:
         return self._end - self._begin
 
     def add(self, point: SinePoint) -> None:
-        """Add a point; the oldest one is dropped when the memory is full."""
+        """Add a point; the oldest point is dropped when the memory is full."""
         if self._end == self._rows.shape[1]:
             self._rows[:, : self.points] = self._rows[:, self._begin : self._end].copy()
             self._begin, self._end = 0, self.points
@@ -194,7 +193,7 @@ class SweepTrace:
 
 HELD_S = 10.0
 _POINT_EVERY_S = 0.1
-"""Update interval of sweep points and portraits; other pictures change with every frame."""
+"""Update interval of sweep points and portraits [s]; other pictures are updated in every frame."""
 _LOWEST_DRIVE_HZ = 10.0
 
 
@@ -210,12 +209,12 @@ class LiveChannel:
 
 @dataclass(frozen=True, eq=False)
 class TimeHistories:
-    """The newest seconds of every channel, for drawing."""
+    """Outline of the newest seconds of every channel, for drawing."""
 
     time_s: Reals
-    """Left edge of each column since the start of the run, shape (columns,)."""
+    """Left edge of each column [s since the start of the run], shape (columns,)."""
     low: Samples
-    """Lower edges, shape (channels, columns), in the channels' units; lost samples are NaN."""
+    """Lower edges, shape (channels, columns), in the unit of each channel; lost samples are NaN."""
     high: Samples
 
 
@@ -225,13 +224,13 @@ class LiveView:
     Parameters
     ----------
     channels
-        Channels in the order of the samples' rows.
+        Channels in the order of the rows of samples.
     band_hz
-        Excited band: transmission is shown in it, and the drive is not searched below it.
+        Excited band [Hz]. Transmission is shown in this band, and the drive is not searched below it.
     delay_s
-        Lag of the response channel behind the base channel.
+        Lag of the response channel behind the base channel [s].
     lead_in_s
-        Start-up time, in which no sweep points and no Poincaré points are taken.
+        Start-up time without sweep points and Poincaré points [s].
     """
 
     def __init__(
@@ -273,7 +272,7 @@ class LiveView:
         return self._ring.next_sample
 
     def add(self, first_sample: int, volts: NDArray[np.float32]) -> None:
-        """Add samples [V], shape (channels, samples); known samples are skipped."""
+        """Add samples [V], shape (channels, samples); samples that were already added are skipped."""
         begun = self._ring.next_sample if self._ring.held else first_sample
         self._ring.add(first_sample, volts * self._units_per_volt)
         fresh = self._ring.since(begun).values
@@ -288,7 +287,7 @@ class LiveView:
             self._add_point()
 
     def time_histories(self, span_s: float, columns: int) -> TimeHistories:
-        """Return the newest seconds reduced to columns."""
+        """Return the outline of the newest ``span_s`` seconds in ``columns`` columns."""
         window = self._ring.newest(round(span_s * self._rate_hz))
         low, high = outline(window.values, columns)
         starts = column_starts(window.values.shape[1], columns)
@@ -320,7 +319,7 @@ class LiveView:
         self._spectrum = self._frequency_response = (-1, None)
 
     def portrait(self) -> Portrait | None:
-        """Return the newest orbit and add its Poincaré points; None without a sine."""
+        """Return the newest orbit, and collect its Poincaré points; None without a sine drive."""
         if not self._has(DRIVE, self._response):
             return None
         if self._ring.next_sample - self._portrait[0] < _POINT_EVERY_S * self._rate_hz:
@@ -341,7 +340,7 @@ class LiveView:
         return found
 
     def history(self) -> SweepHistory:
-        """Return Responses I and II and extremes over the measured drive frequency."""
+        """Return Responses I and II, velocity extremes and A0 over the measured drive frequency."""
         return self._trace.history()
 
     @property

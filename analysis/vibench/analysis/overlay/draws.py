@@ -482,7 +482,7 @@ def _moved(
 
 
 def _with_noise(samples: Samples, role: str, rms: float, rate_hz: float, rng: np.random.Generator) -> Samples:
-    """Add the noise that an analysis reads from a channel, in place."""
+    """Add the noise of a channel in place, converted as in an analysis (for a mass, to a velocity)."""
     first = 0
     for block in noise_as_read(role, rate_hz, samples.size, _BLOCK, rng):
         samples[first : first + block.size] += np.float32(rms) * block
