@@ -1,4 +1,4 @@
-"""Levels of the channels of a recording relative to their ranges, and channels that are unusable."""
+"""Levels of a recording's channels relative to their input ranges, and refusal of unusable channels."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from .channels import BASE, DRIVE, OnRead, ignore_reading
 
 _BLOCK_S = 2.0
 _AT_FULL_SCALE = 0.999
-"""Share of full scale that counts as clipped, as converters clip a few counts beside the nominal range."""
+"""Share of full scale that counts as clipped; converters clip a few counts from the nominal range."""
 
 
 @dataclass(frozen=True)
 class ChannelLevel:
-    """One channel over the whole recording."""
+    """Level of one channel over the whole recording."""
 
     OWN_UNITS: ClassVar = {
         "envelope": "{0.header.unit}",
@@ -39,9 +39,9 @@ class ChannelLevel:
     full_scale: float
     """Full scale of the converter's input [unit of the channel]."""
     share_at_full_scale: float
-    """Share of the samples within a thousandth of the full scale, or beyond."""
+    """Share of the samples from 99.9 % of full scale on."""
     flat_tops: tuple[float, ...] = ()
-    """Values at which its peaks are clipped, above, below or on both sides [unit of the channel]."""
+    """Values at which the peaks are clipped, above, below or on both sides [unit of the channel]."""
 
     @property
     def share_of_range(self) -> float:
@@ -50,12 +50,12 @@ class ChannelLevel:
 
     @property
     def span(self) -> float:
-        """Largest minus smallest value; zero when the channel never moved."""
+        """Largest minus smallest value; zero if the channel never moved."""
         return float(np.nanmax(self.envelope.upper) - np.nanmin(self.envelope.lower))
 
 
 def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tuple[ChannelLevel, ...]:
-    """Return the levels from all samples; raises NotEnoughData when there are none."""
+    """Return the level of each channel from all samples; raises NotEnoughData when there are none."""
     if recording.samples == 0:
         why = f": {recording.reason}" if recording.reason else ""
         raise NotEnoughData(
@@ -102,16 +102,16 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
 
 
 _COUNTED = 2**16 + 1
-"""Bins over the range to find flat tops."""
+"""Number of bins over the input range, used to find flat tops."""
 _TOPS = (0.1, 0.03, 0.01)
-"""Heights of the examined tops relative to the peak."""
+"""Heights of the examined peak tops relative to the peak."""
 _FLAT = 0.88
-"""Share of a top's samples in its upper half: smooth peaks have 0.71, straight ones 0.84, clipped ones 1."""
+"""Share of a top's samples in its upper half: 0.71 for smooth, 0.84 for straight, 1 for clipped peaks."""
 _FLAT_VALUE = 0.4
-"""Share of the samples in a peak's upper half at one value; no smooth peak has as many."""
+"""Share of the samples in the upper half of a peak that have one value; smooth peaks have fewer."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
-"""Fewest converter steps up to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
+"""Minimum converter steps up to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
 _GAP, _GAP_IN_TOP = 0.01, 0.15
 """Largest empty range of values in a well sampled smooth peak, relative to the peak and to a top."""
 _AS_FREQUENT = 0.4
@@ -119,7 +119,7 @@ _AS_FREQUENT = 0.4
 
 
 def _lasting(bins: Reals) -> tuple[int, int]:
-    """Return the highest bin reached by three successive samples, and the same of the mirrored signal."""
+    """Return the highest bin that three successive samples reach, for the signal and the mirrored signal."""
     if bins.size < 3:
         return 0, 0
     three = np.stack((bins[:-2], bins[1:-1], bins[2:]))
@@ -127,11 +127,11 @@ def _lasting(bins: Reals) -> tuple[int, int]:
 
 
 def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
-    """Return the value at which the upper peaks are clipped; None if they are not, or it is not known.
+    """Return the value at which the upper peaks are clipped; None if they are not, or if it is unclear.
 
-    With a sample clock locked to the drive, every period has the same few values. A smooth peak may then have
-    the histogram of a clipped one, but with an empty range above ``lasting``, the highest bin that three
-    successive samples reach.
+    If the sample clock is locked to the drive, every period has the same few values. A smooth peak may then
+    have the histogram of a clipped peak, but with an empty range above ``lasting``, the highest bin that
+    three successive samples reach.
     """
     filled = np.flatnonzero(counts)
     if filled.size < 2:
@@ -165,7 +165,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Smallest height of a peak above the median, relative to the span; less if the channel rests there."""
+"""Smallest height of a peak above the median, relative to the span; lower if the channel rests there."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
@@ -178,13 +178,13 @@ def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
 
 
 _CLIPPED_SHARE = 0.2
-"""Largest share of samples at full scale in a usable channel; a sine that just fills its range has 3 %."""
+"""Largest share of samples at full scale in a usable channel; a sine that just reaches it has 3 %."""
 
 
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:
     """Refuse unusable channels; ``response`` is the analysed channel.
 
-    Raises UnusableData with one sentence that names every such channel and what to check.
+    Raises UnusableData with one sentence that names every unusable channel and what to check.
     """
     used = (DRIVE, BASE, response)
     faults = [each for level in levels if level.header.role in used for each in _faults(level)]

@@ -1,4 +1,4 @@
-"""The three channels that every analysis uses: drive, base and response, from a recording or a simulation."""
+"""The three channels of every analysis: drive, base and response, from a recording or a simulation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -23,26 +23,26 @@ SENSOR_DAMPING_RATIO = 0.02
 
 
 class SensedChannel(Protocol):
-    """A channel of a recording or a bench with its sensor."""
+    """A channel of a recording or a bench, with its sensor."""
 
     @property
     def role(self) -> str:
-        """Role, such as ``"m0_velocity"``."""
+        """Role of the channel, such as ``"m0_velocity"``."""
 
     @property
     def delay_s(self) -> float:
-        """Lag of the sensor [s]."""
+        """Lag of the sensor signal [s]."""
 
     @property
     def coupling(self) -> str:
-        """AC or DC."""
+        """Coupling of the input: AC or DC."""
 
 
 def sensor_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: Reals) -> Complexes:
     """Return the complex gain of a channel relative to its motion, shape (lines,); 1 at low frequency.
 
-    It includes the delay in the header, the sensor's mounted resonance and its bandwidth, but not the
-    converter's coupling. The delay in the header contains the delay of the bandwidth.
+    The gain includes the delay in the header, the sensor's mounted resonance and its bandwidth, but not the
+    converter's coupling. The delay in the header contains the delay due to the bandwidth.
     """
     sensor = described_sensor(bench, channel.role)
     part = frequency_hz / _number(sensor, "resonance_hz")
@@ -59,22 +59,22 @@ def coupled_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz:
 
 
 def described_sensor(bench: Mapping[str, Any], role: str) -> Mapping[str, Any]:
-    """Return a bench configuration's entry on the sensor of a channel; empty without one."""
+    """Return the bench configuration's entry on a channel's sensor; empty if there is none."""
     return bench.get(sensor_table(role)) or (bench.get("sensors") or {}).get(role) or {}
 
 
 def _number(sensor: Mapping[str, Any], key: str) -> float:
-    """Return a stated frequency of a sensor [Hz]; infinite if not stated."""
+    """Return a stated frequency of a sensor [Hz]; infinite if it is not stated."""
     value = sensor.get(key)
     return float(value) if isinstance(value, int | float) and value > 0 else np.inf
 
 
 OnRead = Callable[[int, int], None]
-"""Callback (samples read, total samples) per channel."""
+"""Callback (samples read, total samples) during reading."""
 
 
 def ignore_reading(samples: int, of: int) -> None:
-    """Ignore the progress."""
+    """Do nothing; the default callback."""
 
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", VELOCITY
@@ -88,7 +88,7 @@ class Stretch:
     stop: int
     """One past the last sample."""
     numbers: dict[str, int | float | str]
-    """Numbers of the plan: ``realisation``, ``frequency_hz`` ..."""
+    """Values of this part in the plan, such as ``realisation`` or ``frequency_hz``."""
     is_complete: bool
 
     @property
@@ -98,7 +98,7 @@ class Stretch:
 
 
 class Channels(Protocol):
-    """Channels as an estimator uses them, recorded or simulated."""
+    """The channels that an estimator uses, recorded or simulated."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -106,11 +106,11 @@ class Channels(Protocol):
 
     @property
     def samples(self) -> int:
-        """Valid samples per channel."""
+        """Number of valid samples per channel."""
 
     @property
     def response_delay_s(self) -> float:
-        """Lag of the response channel behind the base channel."""
+        """Lag of the response channel behind the base channel [s]."""
 
     @property
     def is_force(self) -> bool:
@@ -120,26 +120,26 @@ class Channels(Protocol):
         """Ratio of the response sensor's gain to the base sensor's, without their delays; shape (lines,)."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the named parts of the record, in the order of time."""
+        """Return the parts of the record named ``label``, in the order of time."""
 
     def read(self, start: int, stop: int) -> Reals:
         """Return drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Return at which samples one of the channels was near its full scale, shape (samples,)."""
+        """Return the samples at which one of the channels was near full scale, shape (samples,)."""
 
     def bridged(self, start: int, stop: int) -> Flags:
-        """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
+        """Return the samples at which the response was bridged over a drop-out, shape (samples,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedChannels:
-    """The channels of a recording; lost samples read as NaN, and a vibrometer's drop-outs are bridged."""
+    """Channels of a recording; lost samples are NaN, and drop-outs of the vibrometer are bridged."""
 
     recording: Recording
     on_read: OnRead = ignore_reading
     response: str | None = None
-    """Channel to analyse; None for the motion of m0."""
+    """Channel to analyse; by default the channel that measures m0."""
     _response: ResponseChannel = field(init=False)
 
     def __post_init__(self) -> None:
@@ -159,12 +159,12 @@ class RecordedChannels:
 
     @property
     def samples(self) -> int:
-        """Valid samples per channel."""
+        """Number of valid samples per channel."""
         return self.recording.samples
 
     @property
     def response_delay_s(self) -> float:
-        """Lag of the response channel behind the base channel."""
+        """Lag of the response channel behind the base channel [s]."""
         return self.recording.channel(self._response.role).delay_s - self.recording.channel(BASE).delay_s
 
     @property
@@ -182,7 +182,7 @@ class RecordedChannels:
         return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the named parts of the record that have samples, without rejected averages."""
+        """Return the parts of the record named ``label`` that have samples, without rejected averages."""
         found = tuple(
             Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
             for each in self.recording.segments
@@ -202,11 +202,11 @@ class RecordedChannels:
         return read
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Return at which samples one of the channels was near its full scale, shape (samples,)."""
+        """Return the samples at which one of the channels was near full scale, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
             if each.channel in (DRIVE, BASE, self._response.role):
-                # A clipped peak of an acceleration affects the velocity within the reach of the integral.
+                # A clipped acceleration peak affects the velocity as far as the integration kernel reaches.
                 reach = self._response.reach if each.channel == self._response.role else 0
                 first, last = each.first_sample - reach, each.last_sample + reach
                 marks[max(0, first - start) : max(0, last + 1 - start)] = True
@@ -215,7 +215,7 @@ class RecordedChannels:
         return marks
 
     def bridged(self, start: int, stop: int) -> Flags:
-        """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
+        """Return the samples at which the response was bridged over a drop-out, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for dropout in self._response.dropouts(start, stop):
             marks[max(0, dropout.first - start) : dropout.stop - start] = True
@@ -223,7 +223,7 @@ class RecordedChannels:
 
 
 def far_from(marks: Flags, reach: int) -> Flags:
-    """Return which samples lie more than ``reach`` samples from any that is marked, shape (samples,)."""
+    """Return which samples are more than ``reach`` samples away from any marked sample, shape (samples,)."""
     if not marks.any():
         return np.ones(marks.size, dtype=np.bool_)
     total = np.concatenate(([0], np.cumsum(marks)))
@@ -233,7 +233,7 @@ def far_from(marks: Flags, reach: int) -> Flags:
 
 
 def only_stretch(channels: Channels, label: str) -> Stretch:
-    """Return the single stretch of a sweep or dwell; raises NotEnoughData when there is none."""
+    """Return the first stretch with this label; raises NotEnoughData when there is none."""
     found = channels.stretches(label)
     if not found:
         raise NotEnoughData(
@@ -243,7 +243,7 @@ def only_stretch(channels: Channels, label: str) -> Stretch:
 
 
 def read_whole(channels: Channels, stretch: Stretch) -> Reals:
-    """Read a stretch without holes; raises UnusableData when samples were lost inside it."""
+    """Return the samples of a stretch; raises UnusableData when samples were lost inside it."""
     data = channels.read(stretch.start, stretch.stop)
     lost = int(np.count_nonzero(np.isnan(data[0])))
     if lost:

@@ -1,4 +1,4 @@
-"""Checks of a recording, each with a verdict and a remark."""
+"""Checks of a recording, each with a verdict and a text."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ class Verdict(StrEnum):
 
     PASSED = "passed"
     NOTE = "note"
-    """Nothing is wrong, but the remark matters to a reader."""
+    """Nothing is wrong, but the text is important for the reader."""
     WARNING = "warning"
-    """The result may be wrong, or is less than was planned."""
+    """The result may be wrong, or contains less than was planned."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One check."""
+    """Result of one check."""
 
     what: str
     verdict: Verdict
@@ -40,12 +40,12 @@ class Check:
 _LEAST_SHARE_OF_RANGE = 1e-3
 """Smallest used share of a channel's range; below it, the converter resolves the signal poorly."""
 _OFTEN_DARK = 0.01
-"""Share of a recording in drop-outs of the vibrometer above which a warning is given."""
+"""Share of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
-"""Largest overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
+"""Largest overshoot of the drive over its setting that noise and the converter's filter explain."""
 _SHORTFALL = 0.15
-"""Largest shortfall of the drive's peak below its setting, which is also the limit of a bench check."""
+"""Largest shortfall of the drive peak below its setting; also the limit of a bench check."""
 
 
 P = TypeVar("P")
@@ -54,7 +54,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, eq=False)
 class AbstractAnalysis(Labelled, Generic[P, R]):
-    """Result of a recording: plan and response."""
+    """Result of the analysis of one recording: facts, checks, plan and response."""
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
@@ -170,10 +170,10 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
 
 
 def _least_peak_v(facts: RecordingFacts) -> float:
-    """Return the lowest expected peak of the drive; 0 if unknown.
+    """Return the lowest expected peak of the drive; 0 if no peak can be expected.
 
-    Feedback may stay below its setting, the peak of streamed noise is random, and few samples per period
-    may miss the peak of a sine.
+    Feedback control may stay below its setting, and the peak of streamed noise is random. With few samples
+    per period, the peak of a sine may fall between samples.
     """
     excitation = facts.measurement.excitation
     is_open_ended = EXCITATION_KINDS[excitation.kind].is_feedback or isinstance(excitation, StreamedNoise)

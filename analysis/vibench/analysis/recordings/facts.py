@@ -34,17 +34,17 @@ from .response import (
 )
 
 MOST_BYTES = 1e9
-"""Memory up to which a recording need not be checked against the size of its file."""
+"""Memory up to which a recording is not checked against the size of its file [bytes]."""
 BYTES_A_SAMPLE = 80
-"""Bytes per sample of a stretch that is analysed at once: three channels and intermediate results."""
+"""Memory per sample of a stretch analysed at once: three channels and intermediate results [bytes]."""
 LARGEST_PACKING = 16.0
-"""Largest compression ratio: converter noise packs 1.2 to 3 times, a computed sine without noise 6 times."""
+"""Largest compression ratio; converter noise is packed 1.2 to 3 times, a noise-free sine 6 times."""
 
 
 def require_measured_size(recording: Recording) -> None:
-    """Refuse a small file that declares more than fits into memory; raises UnusableData.
+    """Refuse a small file that declares more samples than fit into memory; raises UnusableData.
 
-    Every other recording takes memory in proportion to the size of its file.
+    All other recordings need memory in proportion to the size of their files.
     """
     if recording.samples * BYTES_A_SAMPLE > MOST_BYTES and recording.packing > LARGEST_PACKING:
         raise UnusableData(
@@ -55,7 +55,7 @@ def require_measured_size(recording: Recording) -> None:
 
 
 def require_checked(recording: Recording) -> None:
-    """Check a recording against its seal once per process; raises like `require_intact`."""
+    """Check a recording against its seal if not yet done in this process; raises like `require_intact`."""
     if not recording.is_checked:
         require_intact(recording)
 
@@ -63,7 +63,7 @@ def require_checked(recording: Recording) -> None:
 def require_intact(recording: Recording) -> SealCheck:
     """Check every sample, attribute and table against the seal; return the result.
 
-    Recordings without a seal (old or unfinished) pass. Raises UnusableData when something was changed.
+    Recordings without a seal (old or unfinished) pass. Raises UnusableData when the contents were changed.
     """
     found = recording.check_seal(SealDepth.WHOLE)
     if found.state is SealState.DAMAGED:
@@ -76,7 +76,7 @@ def require_intact(recording: Recording) -> SealCheck:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordingFacts(RecordingDescription):
-    """Facts of a recording without its result."""
+    """Facts of a recording, without the result of an analysis."""
 
     DOCUMENT: ClassVar = (
         "name path state reason origin started_utc bench_check recording_id duration_s sample_rate_hz "
@@ -90,22 +90,22 @@ class RecordingFacts(RecordingDescription):
     measurement: Measurement
     channels: tuple[ChannelLevel, ...]
     overload_s: Mapping[str, float]
-    """Time each channel spent near its full scale, by role; channels that never did are left out."""
+    """Time near full scale [s], keyed by role; channels that never came near it are left out."""
     dropouts: int
-    """Number of drop-outs of the vibrometer, bridged in every analysis."""
+    """Number of vibrometer drop-outs, which every analysis bridges."""
     dropout_s: float
     lost_samples: int
     planned_stretches: int
     whole_stretches: int
     late: tuple[str, ...]
-    """One sentence for each time at which the drive fell behind its plan."""
+    """One sentence for each moment at which the drive was late relative to its plan."""
     check: str
-    """Result of the bench check before the run; empty if left out."""
+    """Result of the bench check before the run; empty if there was none."""
     seal: SealCheck
     response: str = VELOCITY
     """Channel whose motion is analysed."""
     feedback: tuple[FeedbackNote, ...] = ()
-    """Notes of feedback during the run; empty without feedback."""
+    """Notes of feedback control during the run; empty without feedback."""
     feedback_s: tuple[float, ...] = ()
     """Time of each note since the start of the recording [s]."""
 
@@ -116,7 +116,7 @@ class RecordingFacts(RecordingDescription):
 
     @property
     def feedback_noted(self) -> list[dict[str, Any]]:
-        """Kind, time and numbers of each note."""
+        """Kind, time and values of each note."""
         return [
             {"kind": each.kind, "time_s": time_s, **each.numbers}
             for time_s, each in zip(self.feedback_s, self.feedback, strict=True)
@@ -128,16 +128,16 @@ class RecordingFacts(RecordingDescription):
         return self.origin is Origin.SIMULATED
 
     def level(self, role: str) -> ChannelLevel:
-        """Return one channel's level."""
+        """Return the level of one channel."""
         return next(each for each in self.channels if each.header.role == role)
 
 
 def recording_facts(
     recording: Recording, on_read: OnRead = ignore_reading, response: str | None = None
 ) -> RecordingFacts:
-    """Collect the facts in a recording; ``on_read`` receives the number of samples read so far.
+    """Return the facts of a recording; ``on_read`` receives the number of samples read so far.
 
-    ``response`` is the channel whose motion is analysed; None for that of m0.
+    ``response`` is the channel whose motion is analysed; by default the channel that measures m0.
 
     Raises UnusableData when the recording was changed after it was sealed, or this version cannot read its
     plan or bench; NotEnoughData when it has no samples.
@@ -200,7 +200,7 @@ def _dropouts(recording: Recording, response: str) -> tuple[Dropout, ...]:
 
 
 def plan_of(recording: Recording) -> Measurement:
-    """Read the plan of a recording; raises UnusableData when this version cannot read it."""
+    """Return the plan of a recording; raises UnusableData when this version cannot read it."""
     try:
         return Measurement.model_validate(recording.plan)
     except ValidationError as error:
@@ -215,17 +215,17 @@ def plan_of(recording: Recording) -> Measurement:
 
 
 def specimen_of(bench: Mapping[str, Any]) -> Specimen:
-    """Build the specimen of the bench configuration; defaults and errors as for `described_specimen`."""
+    """Return the specimen of the bench configuration; defaults and errors as in `described_specimen`."""
     return described_specimen(bench).specimen()
 
 
 def known_specimen(bench: Mapping[str, Any]) -> Specimen | None:
-    """Return the specimen of the bench configuration; None if not described."""
+    """Return the specimen of the bench configuration; None if the configuration describes none."""
     return specimen_of(bench) if bench.get("specimen") else None
 
 
 def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
-    """Return the specimen of the bench configuration, by default the paper's.
+    """Return the specimen table of the bench configuration; by default the paper's specimen.
 
     Raises UnusableData for an invalid specimen.
     """
@@ -259,7 +259,7 @@ class _BenchCheck(BaseModel):
 
 
 class _Bench(BaseModel):
-    """Part of a bench configuration of any version that analysis reads."""
+    """The entries of a bench configuration that an analysis reads, for all versions."""
 
     model_config = ConfigDict(extra="allow")
 

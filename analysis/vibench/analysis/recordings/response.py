@@ -1,4 +1,4 @@
-"""Velocity of m0 from any sensor: vibrometer, accelerometer or displacement probe."""
+"""Velocity of a mass from any sensor: vibrometer, accelerometer or displacement probe."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -17,29 +17,29 @@ from ..signals.arrays import Reals, Samples
 
 VELOCITY = ROLES[0].value
 RESPONSE_ROLES = tuple(role.value for role in ROLES)
-"""Channels of the motion of m0 in the order of preference."""
+"""Channels that measure the motion of m0, in the order of preference."""
 ACCELERATION, DISPLACEMENT, FORCE = "acceleration", "displacement", "force"
 _MOTIONS = ("velocity", ACCELERATION, DISPLACEMENT)
 _COLLIDING = ("m1", "m2")
 LOWEST_INTEGRATED_HZ = 5.0
-"""Lowest frequency of exact integration [Hz]; below it, the velocity fades to zero."""
+"""Lowest frequency of exact integration [Hz]; below it, the velocity decreases to zero."""
 _HELD_S, _REACH_S = 0.2, 1.0
 _TAPER = 12.0
-"""Kaiser's beta: truncation errors of the integral are below 3e-5 above 5 Hz."""
+"""Parameter beta of the Kaiser window; truncation errors of the integral are below 3e-5 above 5 Hz."""
 _DERIVATIVE_REACH, _EXACT_BAND = 64, 0.45
-"""Samples on each side, and part of the sample rate up to which the fit is exact to 1e-4 (2e-6 below 0.4)."""
+"""Samples on each side, and share of the sample rate up to which the fit errs by 1e-4 (2e-6 below 0.4)."""
 _FIT_POINTS, _REST_WEIGHT = 1500, 1e-4
-"""Frequencies of the fit, and its weight above the band, where it only limits the gain."""
+"""Number of frequencies in the fit, and weight above the exact band, which only limits the gain there."""
 _BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
-"""Smallest block in kernels and in samples; half a kernel more is read on either side."""
+"""Smallest block, in kernel lengths and in samples; half a kernel more is read on either side."""
 
 
 def integral_kernel(rate_hz: float) -> Reals:
-    """Weights that integrate samples with zero phase, shape (2 L + 1,) [s].
+    """Return weights that integrate samples with zero phase, shape (2 L + 1,) [s].
 
-    The integral of a band-limited signal has the weights Si(pi n) / pi (the integral of sinc). They are
-    multiplied by 1 up to 0.2 s, and fade to 0 at 1 s along the integral of a Kaiser window. They are odd and
-    so remove a constant.
+    The integral of a band-limited signal has the weights Si(pi n) / pi (the integral of sinc). They are kept
+    up to 0.2 s, and fade to 0 at 1 s along the integral of a Kaiser window. The weights are odd and so remove
+    a constant.
     """
     reach, held = round(_REACH_S * rate_hz), round(_HELD_S * rate_hz)
     places = np.arange(1, reach + 1)
@@ -50,17 +50,17 @@ def integral_kernel(rate_hz: float) -> Reals:
 
 
 def derivative_kernel(rate_hz: float) -> Reals:
-    """Weights of a band-limited derivative with zero phase, shape (2 L + 1,) [1/s]."""
+    """Return weights of a band-limited derivative with zero phase, shape (2 L + 1,) [1/s]."""
     half = _derivative_weights() * rate_hz
     return np.concatenate((-half[::-1], [0.0], half))
 
 
 @lru_cache(maxsize=1)
 def _derivative_weights() -> Reals:
-    """Fit the half of the kernel that lies behind the sample, for a rate of 1, shape (L,).
+    """Return the second half of the derivative kernel, fitted for a sample rate of 1, shape (L,).
 
-    The fit minimises the squared relative error. Windowed ideal weights would err by 2e-3 at 100 Hz:
-    their step at half the rate leaks to low frequencies, where a derivative is small.
+    The fit minimises the squared relative error. Windowed ideal weights would err by 2e-3 at 100 Hz: their
+    step at half the sample rate leaks to low frequencies, where a derivative is small.
     """
     angle = 2 * np.pi * np.linspace(0.0, 0.5, _FIT_POINTS + 1)[1:]
     inside = angle <= 2 * np.pi * _EXACT_BAND
@@ -71,32 +71,32 @@ def _derivative_weights() -> Reals:
 
 _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = MappingProxyType(
     {
-        # Mirroring with the opposite sign continues the velocity smoothly.
+        # Mirrored samples with the opposite sign continue the velocity smoothly.
         ACCELERATION: (integral_kernel, 0.0),
         DISPLACEMENT: (derivative_kernel, 2.0),
     }
 )
-"""Kernel and ``about``: samples beyond an end are ``about`` times the last sample minus the mirrored ones."""
+"""Kernel, and factor ``about``: beyond an end, samples are about * end sample - mirrored sample."""
 
 
 @dataclass(eq=False)
 class ResponseChannel:
-    """Velocity of a mass, or a force; by default m0's, from the first of `RESPONSE_ROLES` in a recording.
+    """Velocity of a mass, or a force; by default the velocity of m0, from the first of `RESPONSE_ROLES`.
 
-    An acceleration is integrated, which increases its noise at low frequencies; a displacement is
-    differentiated, which increases it at high ones. Both have zero phase.
+    An acceleration is integrated, which increases noise at low frequencies. A displacement is differentiated,
+    which increases noise at high frequencies. Both operations have zero phase.
 
-    Raises UnusableData when the recording has none of them, or is too short to integrate.
+    Raises UnusableData when the recording has no such channel, or is too short to integrate.
     """
 
     recording: Recording
     response: str | None = None
-    """Channel that shows the motion, one of `response_roles`."""
+    """Channel that measures the motion or force; by default the first channel of m0."""
     role: str = field(init=False)
     quantity: str = field(init=False)
     _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
     _block: tuple[int, Reals] | None = field(init=False, default=None)
-    """Number and velocities of the last block, kept because estimators read sequentially."""
+    """Number and velocities of the last block; kept because estimators read blocks in order."""
 
     def __post_init__(self) -> None:
         found = self.response or response_role(self.recording)
@@ -122,12 +122,12 @@ class ResponseChannel:
 
     @property
     def reach(self) -> int:
-        """Number of samples on either side that a velocity depends on."""
+        """Number of samples on either side that influence a velocity."""
         return self._kernel.size // 2
 
     @property
     def noise_gain(self) -> float:
-        """Ratio of the rms noise of the velocity to that of the channel, if the latter is white."""
+        """Ratio of the rms noise of the velocity to that of the channel, for white channel noise."""
         return float(np.linalg.norm(self._kernel)) if self._kernel.size else 1.0
 
     def read(self, start: int, stop: int) -> Reals:
@@ -145,7 +145,7 @@ class ResponseChannel:
         return np.concatenate(parts)
 
     def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
-        """Return the drop-outs in these samples; only vibrometers have them."""
+        """Return the drop-outs in these samples; only vibrometers have drop-outs."""
         if not self._may_drop_out:
             return ()
         return BridgedChannel(self.recording, self.role).between(start, stop)
@@ -179,7 +179,7 @@ class ResponseChannel:
 def noise_as_read(
     role: str, rate_hz: float, count: int, block: int, rng: np.random.Generator
 ) -> Iterator[Samples]:
-    """Yield white sensor noise of unit variance as an analysis reads it; for a mass, as velocity."""
+    """Yield white sensor noise of unit variance, converted as in an analysis; for a mass, to a velocity."""
     conversion = None if role.startswith("base_") else _CONVERSIONS.get(_quantity(role))
     kernel = np.ones(1) if conversion is None else conversion[0](rate_hz)
     before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
@@ -190,13 +190,13 @@ def noise_as_read(
 
 
 def _mirrored(samples: Reals, count: int, about: float) -> Reals:
-    """Return ``count`` samples before the first one, the nearest first."""
+    """Return ``count`` mirrored samples beyond the first sample, the nearest first."""
     return np.asarray(about * samples[:1] - samples[1 : count + 1])
 
 
 def _convolved(samples: Samples, kernel: Reals) -> Reals:
     """Return the part of a convolution that needs no sample beyond the ends."""
-    # numpy, because scipy.signal would delay the start of the window.
+    # numpy.fft is used, because importing scipy.signal would delay the start of the window.
     size = next_fast_len(samples.size + kernel.size - 1, real=True)
     whole = np.fft.irfft(np.fft.rfft(samples, size) * np.fft.rfft(kernel, size), size)
     return whole[kernel.size - 1 : samples.size]
@@ -207,7 +207,7 @@ def _quantity(role: str) -> str:
 
 
 def response_roles(recording: Recording) -> tuple[str, ...]:
-    """Return every channel ``<mass>_<quantity>`` of a mass, m0 first."""
+    """Return every channel that measures the motion of a mass, ``<mass>_<quantity>``, m0 first."""
     first = response_role(recording)
     others = (
         role
@@ -221,7 +221,7 @@ def response_roles(recording: Recording) -> tuple[str, ...]:
 
 
 def force_roles(recording: Recording) -> tuple[str, ...]:
-    """Return every channel ``<place>_force`` of a force."""
+    """Return every channel that measures a force, ``<place>_force``."""
     return tuple(
         role
         for role in recording.roles
@@ -230,12 +230,12 @@ def force_roles(recording: Recording) -> tuple[str, ...]:
 
 
 def response_role(recording: Recording) -> str | None:
-    """Return the channel of the motion of m0; None without one."""
+    """Return the channel that measures the motion of m0; None if there is none."""
     return next((each for each in RESPONSE_ROLES if each in recording.roles), None)
 
 
 def scanned_role(recording: Recording) -> str | None:
-    """Return the channel of the vibrometer at a point of a scan that is not on m0; else None."""
+    """Return the vibrometer channel at a scan point that is not on m0; None for other recordings."""
     point = recording.plan.get("point")
     role = f"{point.get('body')}_velocity" if isinstance(point, dict) else VELOCITY
     return role if role != VELOCITY and role in recording.roles else None
