@@ -1,4 +1,4 @@
-"""Analyse all recordings of a campaign; report those that fail and continue with the others."""
+"""Analyse all recordings of a campaign; report those that fail, and continue with the others."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -37,7 +37,7 @@ Stage = Callable[[str], None]
 
 
 def ignore_stage(stage: str) -> None:
-    """Ignore the step."""
+    """Do nothing; the default callback."""
 
 
 def overlay(
@@ -51,28 +51,28 @@ def overlay(
     draws: int = DRAWS,
     stage: Stage = ignore_stage,
 ) -> AbstractOverlay[Any]:
-    """Simulate the measured test and compare the results.
+    """Return the comparison of a measurement with a simulation of the same test.
 
-    Raises UnusableData when the samples have holes, or the simulation did not reach its end.
+    Raises UnusableData when samples were lost, or the simulation did not finish.
 
     Parameters
     ----------
     recording, analysis
-        The recording, and the result of `analyse` for it.
+        The recording, and its result from `analyse`.
     specimen
-        The model; by default the specimen in the recording's bench configuration.
+        Specimen to simulate; by default the specimen of the recording's bench configuration.
     accuracy
-        Accuracy of contacts when the recorded base motion drives the simulation.
+        Accuracy of simulated contacts if the recorded base motion drives the specimen.
     simulation
-        Input of the model: the recorded voltage drives rig and specimen, or the recorded base motion drives
-        the specimen alone. An unknown shaker is fitted to weak noise; if that fails, the base motion is
-        used. ``run.driven`` and ``run.why`` of the result name the choice.
+        Drive of the simulation: the recorded voltage (rig and specimen) or the recorded base motion (specimen
+        alone). An unknown shaker is fitted to weak noise; if that fails, the base motion is used.
+        ``run.driven`` and ``run.why`` of the result name the choice and its reason.
     shaker
         Result of `fit_shaker` for another recording; used if the bench configuration describes no shaker.
     draws
-        Number of simulated runs of a colliding motion, from slightly different starts, under the voltage.
+        Number of runs of a colliding motion under the voltage, from slightly different starts.
     stage
-        Receives a description of the current step.
+        Receives a description of each step.
     """
     model = specimen_of(analysis.facts.bench) if specimen is None else specimen
     stage(f"simulating {simulation.value}")
@@ -125,13 +125,13 @@ class AnalysisFailure:
 
     @property
     def with_recording(self) -> str:
-        """The sentence, with the recording's name if it is missing."""
+        """The sentence, preceded by the recording's name if the sentence does not contain it."""
         return self.sentence if self.name in self.sentence else f"{self.name}: {self.sentence}"
 
 
 @dataclass(frozen=True, eq=False)
 class CampaignResults:
-    """Results of a campaign, the content of a report."""
+    """Results of a campaign; they are the content of a report."""
 
     name: str
     results: tuple[AnyResult, ...]
@@ -157,17 +157,17 @@ class CampaignResults:
 
     @property
     def noise(self) -> tuple[NoiseResult, ...]:
-        """Noise measurements, weak to strong."""
+        """Results of noise measurements, weak to strong."""
         return self._with(NoiseAnalysis)
 
     @property
     def sweeps(self) -> tuple[SweepResult, ...]:
-        """Sweeps, in the order given."""
+        """Results of sweeps, in the order given."""
         return self._with(SweepAnalysis)
 
     @property
     def dwells(self) -> tuple[DwellResult, ...]:
-        """Dwells by frequency, weak to strong."""
+        """Results of dwells, sorted by frequency, then weak to strong."""
         return self._with(DwellAnalysis)
 
     def _with(self, analysis: type[AbstractAnalysis[Any, Any]]) -> tuple[AnyResult, ...]:
@@ -184,30 +184,30 @@ def analyse_files(
     draws: int = DRAWS,
     response: str | None = None,
 ) -> CampaignResults:
-    """Analyse recordings one after the other with `analyse`, and overlay the model on each.
+    """Analyse recordings one after the other with `analyse`, and overlay a simulation on each.
 
-    A copy of a recording is counted once. By default the model comes from each recording's bench
+    Copies of a recording are counted once. By default, the simulation uses each recording's bench
     configuration. If that describes no shaker, a shaker is fitted to the weakest noise among the recordings.
     Raises NotEnoughData when no path is given.
 
     Parameters
     ----------
     paths
-        Recordings.
+        Paths of the recordings.
     name
         Name of the results and the report.
     simulation
-        Simulation to overlay on each, if any.
+        Simulation to overlay on each recording, if any.
     request
         Estimator, resolution and quantities for noise.
     observer
         Receives the progress.
     specimen
-        Specimen to use instead of the one in the bench configuration.
+        Specimen to simulate instead of that in the bench configuration.
     draws
         Number of simulated runs of each test.
     response
-        Channel to analyse; by default as in `analyse`. Only m0 is simulated.
+        Channel to analyse; by default as in `analyse`. Only the motion of m0 is simulated.
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
@@ -236,7 +236,7 @@ def analyse_files(
 
 
 def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
-    """Leave out copies of a recording; a warning in the result that is kept names them."""
+    """Return the results without copies of a recording; a warning in the kept result names the copies."""
     firsts = first_copies([each.analysis.facts for each in results])
     kept = {first: results[first] for first in firsts}
     for place, (first, each) in enumerate(zip(firsts, results, strict=True)):
@@ -250,14 +250,14 @@ def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
 
 
 def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
-    """Return the channels that measure other motions than m0's, with the recordings that have each.
+    """Return the channels other than m0's, each with the recordings that contain it.
 
-    A force counts in noise only, where it gives the apparent mass. Unreadable recordings are left out: their
-    analysis reports the reason.
+    A force channel counts only in noise, where it gives the apparent mass. Unreadable recordings are left
+    out; their analysis reports the reason.
     """
     found: dict[str, tuple[Path, ...]] = {}
     for path in paths:
-        # A plan of wrong types also counts as unreadable.
+        # A plan with values of wrong types also counts as unreadable.
         with suppress(RecordingError, AttributeError, TypeError), open_recording(path) as recording:
             first = response_role(recording)
             kind = present_word((recording.plan.get("excitation") or {}).get("kind", ""))
@@ -269,7 +269,7 @@ def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
 
 
 def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
-    """Fit a shaker to the weakest noise that allows it, if any recording needs one; else None."""
+    """Fit a shaker to the weakest suitable noise if any recording needs one; else return None."""
     unknown: list[tuple[float, Path]] = []
     needed = False
     for path in paths:
@@ -294,7 +294,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
 
 
 def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
-    """Merge results of separate recordings into one campaign called ``name``."""
+    """Merge the results of separate recordings into one campaign called ``name``."""
     return CampaignResults(
         name,
         tuple(result for part in parts for result in part.results),
@@ -313,9 +313,9 @@ def result_of(
     draws: int = DRAWS,
     response: str | None = None,
 ) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
-    """Analyse one recording; keep the measured result if the simulation fails.
+    """Analyse one recording; if only the simulation fails, return the measured result and the failure.
 
-    Raises AnalysisError when nothing in the recording is usable.
+    Raises AnalysisError when nothing in the recording can be analysed.
     """
     name, response = recording.path.name, response or scanned_role(recording)
     analysis = analyse(recording, request, observer, response)
@@ -337,9 +337,9 @@ def result_of(
 
 
 def recordings_in(folder: Path) -> tuple[Path, ...]:
-    """List the recordings in a folder, finished or interrupted, in the order they were started.
+    """Return the recordings in a folder, finished or interrupted, in the order of their start.
 
-    Raises NotEnoughData when there are none.
+    Raises NotEnoughData when the folder contains none.
     """
     found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
     if not found:
@@ -348,7 +348,7 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
 
 
 def _start_time(path: Path) -> str:
-    """Return the start time of a recording; unreadable ones sort last and are reported later."""
+    """Return the start time of a recording; unreadable files sort last and are reported later."""
     last = "~"
     try:
         with open_recording(path) as recording:
@@ -375,9 +375,9 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
     Returns
     -------
-    Budgets (JCGM 100:2008). A dwell has them for A0 and Responses I and II, a sweep or steps for the largest
-    Responses, noise for frequency, damping and transmissibility at each resonance. If the recording lasted
-    until a bound was met, budgets are widened: see `Budget.widened`.
+    Budgets (JCGM 100:2008). A dwell has budgets for A0 and Responses I and II, a sweep or stepped sine for
+    its largest responses, noise for frequency, damping and transmissibility at each resonance. If the
+    recording lasted until a bound was met, budgets are widened: see `Budget.widened`.
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.overlay)
     has_chosen_end = result.analysis.facts.measurement.until is not None
@@ -385,7 +385,7 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
 
 def budget_sentences(results: CampaignResults) -> Iterator[str]:
-    """Return one sentence for each number, with its uncertainty and the contributions to it."""
+    """Yield one sentence for each main number, with its uncertainty and the contributions to it."""
     for each in results.in_order:
         for budget in budgets_of(each):
             yield f"{each.analysis.facts.name}: {budget.sentence}."

@@ -1,4 +1,4 @@
-"""Measured and simulated curves of one recording, for a comparison."""
+"""Measured and simulated curves of one recording, computed for a comparison."""
 
 import pickle
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from .campaign_results import AnalysisFailure, result_of
 
 @dataclass(frozen=True, eq=False)
 class ComparedRecording(Labelled):
-    """Curves and findings of a recording, small enough to pass between processes."""
+    """Curves and findings of a recording, small enough to be passed between processes."""
 
     path: Path
     name: str
@@ -35,19 +35,19 @@ class ComparedRecording(Labelled):
     samples_id: str
     curves: tuple[Curve, ...]
     failures: tuple[str, ...]
-    """Sentences on what could not be analysed or simulated."""
+    """Sentences on simulations that failed."""
     warnings: tuple[str, ...]
-    """Findings of the checks of the recording."""
+    """Warnings from the checks of the recording."""
     kept: bytes
-    """The whole result, pickled for reports; `kept_result` opens it."""
+    """The whole result, pickled for reports; `kept_result` restores it."""
 
 
 def compare_recording(
     path: Path, request: FrequencyResponseRequest, simulation: Simulation
 ) -> ComparedRecording:
-    """Analyse a recording for a comparison.
+    """Analyse a recording for a comparison, and return its curves.
 
-    Raises AnalysisError or RecordingError when nothing in it is usable.
+    Raises AnalysisError or RecordingError when nothing in the recording can be analysed.
 
     Parameters
     ----------
@@ -76,15 +76,15 @@ def compare_recording(
 
 
 def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
-    """Return the whole result; unpickling is safe, as the bytes never come from a file."""
+    """Return the whole result and its failures; unpickling is safe, as the bytes never come from a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
 
 
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
-    """Return base amplitudes [m] over frequencies [Hz] of a stepped sine or a sweep, in ascending order.
+    """Return pairs (frequency [Hz], base amplitude [m]) of a stepped sine or a sweep, rising in frequency.
 
-    Raises NotEnoughData when the recording is of another kind, or of one frequency.
+    Raises NotEnoughData when the recording is of another kind, or has a single frequency.
     """
     result, _ = kept_result(compared)
     found = drive_level(result)
@@ -96,10 +96,10 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 
 
 def recorded_response(path: Path) -> RecordedLevel:
-    """Return the drive level of a stepped sine or a sweep and its measured Response I, as a line on a map.
+    """Return drive level and measured Response I of a stepped sine or a sweep, to draw on a map.
 
-    Raises NotEnoughData when the recording is of another kind, or of one frequency; RecordingError when the
-    file is not a recording.
+    Raises NotEnoughData when the recording is of another kind, or has a single frequency; RecordingError when
+    the file is not a recording.
     """
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [
@@ -111,7 +111,7 @@ def recorded_response(path: Path) -> RecordedLevel:
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
-    """Return base amplitudes over frequencies of a result; empty for other kinds or a single frequency."""
+    """Return the level over frequency of a result; empty for other kinds or a single frequency."""
     match result.analysis.response:
         case (SweepResponse() | SteppedResponse()) as found:
             try:
@@ -123,7 +123,7 @@ def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
 
 
 def _of_draws(curve: Curve, overlay: AbstractOverlay[Any]) -> Curve:
-    """Replace the values of the first draw by the median and the scatter of all draws."""
+    """Return the curve with the median and the scatter of all draws instead of the first draw."""
     note = f"{curve.note}; under the {overlay.run.driven.value}"
     found = overlay.quantity(curve.response.value)
     if found is None or overlay.run.draws == 1:

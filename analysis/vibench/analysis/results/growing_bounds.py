@@ -1,8 +1,8 @@
-"""``python -m vibench.analysis.results.growing_bounds``: bounds of a recording during its run.
+"""Process that computes bounds of a recording during its run.
 
-The first line of standard output says that the process is ready. Then each line of standard input requests
-the bounds, and a line of standard output answers. All lines are JSON objects. A run that lasts until a
-bound is met starts this process (`vibench.acquisition.run.until`).
+It runs as ``python -m vibench.analysis.results.growing_bounds``. Its first output line says that it is ready.
+Then each input line requests bounds, and one output line answers. All lines are JSON objects. A run that
+lasts until a bound is met starts this process (`vibench.acquisition.run.until`).
 """
 
 import json
@@ -29,17 +29,17 @@ from .campaign_results import budgets_of
 from .measurement_analysis import CONTRADICTIONS
 
 PATIENCE_S = 20.0
-"""Maximum delay until the file contains the requested samples [s]."""
+"""Maximum waiting time until the file contains the requested samples [s]."""
 _PAUSE_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class _ChannelsSoFar(RecordedChannels):
-    """A recording up to a time: its complete realisations, or one stretch cut at that time."""
+    """Channels of a recording up to a time: complete realisations, or one stretch cut at that time."""
 
     stretch: int = 1
     samples_so_far: int = 0
-    """Number of samples of that stretch, or of all realisations."""
+    """Number of samples up to that time: of the stretch, or of all realisations."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Return the stretches up to that time."""
@@ -57,9 +57,9 @@ class _ChannelsSoFar(RecordedChannels):
 
 
 def bounds_of(result: AnyResult) -> dict[str, float | None]:
-    """Return the largest relative 95 % random bound of each result that a plan may wait for.
+    """Return the largest relative 95 % random bound of each result that a plan can wait for.
 
-    None if it is undetermined; results that were not found are left out.
+    An undetermined bound is None; results that were not found are left out.
     """
     found: dict[str, float | None] = {}
     for name, pattern in RESULT_PATTERNS.items():
@@ -71,17 +71,17 @@ def bounds_of(result: AnyResult) -> dict[str, float | None]:
 
 
 def bound_of(budget: Budget) -> float | None:
-    """Return the relative 95 % random bound of one quantity; None if it is not stated."""
+    """Return the relative 95 % random bound of one quantity; None if its budget does not state it."""
     parts = [budget.share(cause) for cause in (Cause.NOISE, Cause.CHANCE)]
     stated = [each for each in parts if each is not None]
     return COVERAGE * hypot(*stated) if len(stated) == len(parts) else None
 
 
 def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
-    """Analyse a recording up to a time [s] within a stretch.
+    """Return the result of a recording up to a time [s] within a stretch.
 
-    ``stretch`` is the number of the step, or 1. Only complete realisations of noise are analysed. Raises
-    AnalysisError when nothing is usable.
+    ``stretch`` is the number of the step, or 1. Of noise, only complete realisations are analysed. Raises
+    AnalysisError when nothing can be analysed.
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)
@@ -92,7 +92,7 @@ def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, rec
 
 
 def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
-    """Open a recording as soon as it contains the requested samples; raises RecordingError."""
+    """Open a recording as soon as it contains the requested samples; raises RecordingError after 20 s."""
     give_up_s = time.monotonic() + PATIENCE_S
     while True:
         recording = open_recording(path.with_name(f"{path.name}.part"))

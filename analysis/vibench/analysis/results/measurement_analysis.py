@@ -1,4 +1,4 @@
-"""Analysis of one recording by its kind of excitation."""
+"""Analysis of one recording, chosen by its kind of excitation."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ from ..recordings.response import scanned_role
 from ..uncertainty.expected import until_checks
 
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
-"""Errors of calculations on a well-formed recording with inconsistent parts."""
+"""Errors of calculations for a well-formed recording whose parts contradict each other."""
 
 
 def analyse(
@@ -29,22 +29,22 @@ def analyse(
     observer: Observer = ignore_progress,
     response: str | None = None,
 ) -> AbstractAnalysis[Any, Any]:
-    """Analyse a recording, complete or not, by the excitation that its plan names.
+    """Analyse a recording, complete or not, by the kind of excitation in its plan.
 
-    Raises AnalysisError when nothing in it is usable; one sentence that names the file.
+    Raises AnalysisError, with one sentence that names the file, when nothing in it can be analysed.
 
     Parameters
     ----------
     recording
-        An open recording, or its path. An interrupted or growing one is analysed up to the moment of
-        opening.
+        An open recording, or its path. An interrupted or growing recording is analysed up to the samples that
+        it contains when it is opened.
     request
         Estimator and resolution for noise; other excitations ignore it.
     observer
         Receives the progress.
     response
-        Channel to analyse, such as ``"m2_velocity"``; by default the motion of m0, or of the mass that the
-        vibrometer was on in a scan.
+        Channel to analyse, such as ``"m2_velocity"``; by default the channel that measures m0, or in a scan
+        the mass that the vibrometer measured.
     """
     if isinstance(recording, Path | str):
         with open_recording(Path(recording)) as opened:

@@ -1,4 +1,4 @@
-"""Frequency response, coherence and spectral densities of a recording, for export as functions."""
+"""Frequency response, coherence and spectral densities of a recording, to export as functions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -25,23 +25,23 @@ from ..spectra.spectra import DensitySums
 from .measurement_analysis import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Inverse of the longest segment of a density; Hann window, 50 % overlap."""
+"""Line spacing of a density from the longest segments; Hann window, 50 % overlap [Hz]."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})
-"""Labels of parts that are left out; pauses and settling have no label."""
+"""Labels of parts that are left out; pauses and settling times have no label."""
 _UNITS = {Quantity.DISPLACEMENT: "m", Quantity.VELOCITY: "m/s", Quantity.ACCELERATION: "m/s2"}
 
 
 def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> tuple[UniversalFunction, ...]:
-    """Estimate spectral functions of an excerpt.
+    """Return the spectral functions of an excerpt.
 
-    Returns the density of each channel during the excitation, from segments of at most one second.
-    Noise also has the frequency response from base to m0 and its coherence, of the whole recording as in
-    `analyse`.
+    These are the densities of all channels during the excitation, from segments of at most one second. For
+    noise, the frequency response from base to m0 and its coherence are added; as in `analyse`, they are
+    estimated from the whole recording.
 
-    Raises NotEnoughData when the excerpt contains no segment of excitation, or its analysis finds nothing;
-    UnusableData when the recording was changed after it was sealed.
+    Raises NotEnoughData when the excerpt contains no excitation, or its analysis finds nothing; UnusableData
+    when the recording was changed after it was sealed.
 
     Parameters
     ----------
@@ -61,13 +61,13 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
 
 
 def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: Path) -> Iterator[Path]:
-    """Write the frequency responses of the scans among recordings as universal files; yield their paths.
+    """Write the frequency responses of the scans among recordings to universal files; yield their paths.
 
-    A file has the nodes as dataset 15, and a dataset 58 for each. With several scans, the name of each file
-    ends with that of its measurement.
+    A file contains the nodes as dataset 15, and one dataset 58 per node. With several scans, each file name
+    ends with the name of the scan.
 
-    Raises NotEnoughData when no recording is noise at a point of a scan, AnalysisError when one cannot be
-    analysed, and InvalidRequest when a name is taken.
+    Raises NotEnoughData when no recording is noise at a point of a scan, AnalysisError when a recording
+    cannot be analysed, and InvalidRequest when a file exists.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
     request
         Estimator and quantities of the frequency responses.
     path
-        The new file.
+        The new file, or the pattern for the names of several files.
     """
     found = [analyse(each, request) for each in paths]
     scans = list(scans_of([each for each in found if isinstance(each, NoiseAnalysis)]))
@@ -101,7 +101,7 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
 
 
 def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
-    """Return a function on the lines of the first point, from which a drift of the clocks moves its own."""
+    """Return a function on the lines of the first point; clock drift shifts the lines of later points."""
     values = np.asarray(np.interp(lines_hz, function.frequency_hz, function.values), dtype=np.complex128)
     return replace(function, frequency_hz=lines_hz, values=values)
 
@@ -118,7 +118,7 @@ def _responses(analysis: NoiseAnalysis, node: int | None = None) -> tuple[Univer
         reference = replace(reference, node=0, direction=axis)
     averages = f"{found.n_eff:.4g} averages over {response.used_s:.6g} s of the whole recording"
     note = f"estimator {found.settings.estimator.value}, {averages}"
-    # No unit, so that a program that converts metres to millimetres leaves the coherence unchanged.
+    # Coherence has no unit, so programs that convert metres to millimetres leave it unchanged.
     bare, bare_reference = (replace(axis, quantity="", unit="NONE") for axis in (moved, reference))
     hz, kinds = found.frequency_hz, FunctionType
     return (
@@ -133,24 +133,24 @@ def _axis(role: Role, body: str, quantity: Quantity) -> FunctionAxis:
 
 @dataclass(frozen=True, eq=False)
 class _Played:
-    """The parts of an excerpt that are averaged."""
+    """The parts of an excerpt over which densities are averaged."""
 
     stretches: tuple[Excerpt, ...]
-    """Each is at least one segment long."""
+    """Parts with excitation, each at least one segment long."""
     labels: tuple[str, ...]
     segment: int
-    """Samples per segment."""
+    """Number of samples per segment."""
 
     @property
     def note(self) -> str:
-        """Description of the averaged parts."""
+        """Description of the averaged parts, for the exported function."""
         first, *_ = self.stretches
         seconds = sum(each.samples for each in self.stretches) / first.recording.sample_rate_hz
         return f"over {seconds:.6g} s of {' and '.join(self.labels)}"
 
 
 def _played_parts(excerpt: Excerpt) -> _Played:
-    """Return the parts with excitation; a recording without named parts counts as one part."""
+    """Return the parts with excitation; a recording without labelled parts counts as one part."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz
     parts = [(each.label, each.start, each.stop) for each in recording.segments if each.label not in _AROUND]
@@ -178,7 +178,7 @@ def _density(played: _Played, channel: ChannelHeader) -> UniversalFunction:
         for values in each.channel_blocks(channel.role):
             valid = np.isfinite(values)
             sums.add(np.where(valid, values, 0.0), valid)
-        # Segments do not cross from one stretch into the next.
+        # Segments do not extend from one stretch into the next.
         between = hop - each.samples % hop
         sums.add(np.zeros(between), np.zeros(between, dtype=np.bool_))
     found = sums.density()
