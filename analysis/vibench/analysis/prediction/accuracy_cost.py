@@ -1,4 +1,4 @@
-"""Cost and error of each accuracy, as measured in docs/accuracy.md."""
+"""Cost and error of each accuracy level, as measured in docs/accuracy.md."""
 
 from dataclasses import dataclass
 
@@ -12,20 +12,20 @@ MACHINE = "one core of a 2-core AMD EPYC"
 
 @dataclass(frozen=True)
 class MeasuredLevel:
-    """Speed and error of one level on the paper's specimen; speeds in simulated seconds per core second."""
+    """Speed (simulated seconds per core second) and error of one accuracy level, for the paper's specimen."""
 
     free: float
-    """Hertz's contact, 260 Hz and 1 um: no impact."""
+    """Speed without impacts: Hertz's contact, 260 Hz and 1 um."""
     periodic: float
-    """130 Hz and 20 um: impacts that repeat."""
+    """Speed with periodic impacts: 130 Hz and 20 um."""
     chaos: float
-    """260 Hz and 5 um."""
+    """Speed in chaos: 260 Hz and 5 um."""
     power: float
-    """Contact power:3, which has a force at every p, at 150 Hz and 10 um."""
+    """Speed with the contact law power:3, whose force acts at every p: 150 Hz and 10 um."""
     state_error: float
-    """State error of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
+    """Error of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
     response_i_error: float
-    """Relative error of Response I of a periodic motion, against `reference`."""
+    """Relative error of Response I of a periodic motion, compared with the level `reference`."""
 
 
 MEASURED = {
@@ -34,11 +34,11 @@ MEASURED = {
     Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
 }
 CHAOS_SCATTER = 0.03
-"""Relative scatter of Response I in chaos between different starts, at every level."""
+"""Relative scatter of Response I in chaos between different starts, equal for all levels."""
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
-    """Return sentences on cost, error and duration of a request on this many idle cores."""
+    """Return sentences on cost, error and duration of a request on ``cores`` idle cores."""
     if request.has_target:
         wish = "" if request.error is None else f" to an error of {100.0 * request.error:g} %"
         limit = "a minute" if request.time_s is None else f"{request.time_s:g} s"

@@ -1,4 +1,4 @@
-"""Requests for simulations and maps, their pieces, and the results so far."""
+"""Requests for simulations and maps, the pieces of their results, and the results so far."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -51,13 +51,13 @@ from ..signals.arrays import Reals
 
 BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256
-"""Number of drive periods shown of a motion, and samples in each."""
+"""Number of drive periods shown of a motion, and samples per period."""
 MOST_CELLS = 200_000
-"""Most cells of a map in a window; compute larger ones with `vibench map` and open them."""
+"""Maximum number of map cells in a window; compute larger maps with `vibench map` and open them."""
 
 
 class MapRequest(SpecimenChoice):
-    """Motions over drive frequency and base amplitude."""
+    """Request for a map of motions over drive frequency and base amplitude."""
 
     start_hz: PositiveFloat = 60.0
     """Lowest drive frequency."""
@@ -66,15 +66,15 @@ class MapRequest(SpecimenChoice):
     lowest_m: PositiveFloat = 1e-6
     """Smallest amplitude of the base displacement."""
     highest_m: PositiveFloat = 50e-6
-    """Largest amplitude; values between are spaced logarithmically."""
+    """Largest amplitude of the base displacement; amplitudes are spaced logarithmically."""
     columns: Annotated[int, Field(ge=3, le=1000)] = 121
-    """Frequencies."""
+    """Number of frequencies."""
     rows: Annotated[int, Field(ge=3, le=1000)] = 81
-    """Amplitudes."""
+    """Number of amplitudes."""
     random_starts: Annotated[int, Field(ge=0, le=100)] = 0
-    """Random starts at every point in addition to rest, to find coexisting motions."""
+    """Number of random starts at every point, in addition to rest, to find coexisting motions."""
     periods: Annotated[int, Field(ge=300, le=30_000)] = 3000
-    """Longest run in drive periods of a motion that does not repeat."""
+    """Maximum length of a run in drive periods, for a motion that does not repeat."""
 
     @model_validator(mode="after")
     def _is_a_map(self) -> Self:
@@ -88,7 +88,7 @@ class MapRequest(SpecimenChoice):
 
     @property
     def plan(self) -> Map:
-        """Return the request as a plan."""
+        """The request as a plan of a map."""
         return Map(
             specimen=self.described,
             model=self.law,
@@ -105,7 +105,7 @@ class MapRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class MapPicture:
-    """A map so far; unknown cells show the nearest known one."""
+    """A map as far as it is computed; unknown cells show the nearest known cell."""
 
     frequency_hz: tuple[float, float]
     """Outer edges of the picture."""
@@ -119,7 +119,7 @@ class MapPicture:
 
 
 class MotionRequest(SpecimenChoice):
-    """Request for the motion from rest at one drive."""
+    """Request for the motion from rest at one drive frequency and amplitude."""
 
     frequency_hz: PositiveFloat
     amplitude_m: PositiveFloat
@@ -128,24 +128,24 @@ class MotionRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class SettledMotion:
-    """Samples of the end of a motion, with its kind."""
+    """Samples of a settled motion, with its kind as text."""
 
     frequency_hz: float
     amplitude_m: float
     text: str
     time_s: Reals
     displacement_m: Reals
-    """x, of m0, shape (samples,)."""
+    """Displacement x of m0, shape (samples,)."""
     relative_m: Reals
-    """p = y - z."""
+    """Relative displacement p = y - z, shape (samples,)."""
     gaps_m: tuple[float, float]
     line_hz: Reals
     line_m: Reals
-    """Amplitude spectrum of x from whole drive periods."""
+    """Amplitude spectrum of x, from whole drive periods."""
 
 
 class PicturingStore(MemoryStore):
-    """Store of a map in memory that sends pictures several times a second."""
+    """Store of a map in memory that sends a picture at most every 0.5 s."""
 
     def __init__(self, plan: Map, tell: Callable[[MapPicture], None]) -> None:
         super().__init__(plan)
@@ -153,13 +153,13 @@ class PicturingStore(MemoryStore):
         self._picture_s = -BETWEEN_PICTURES_S
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results, and send a picture if the last one is old."""
+        """Store results, and send a picture if the last picture is older than 0.5 s."""
         super().keep(answers)
         if time.monotonic() - self._picture_s >= BETWEEN_PICTURES_S:
             self.show()
 
     def show(self) -> None:
-        """Send a picture of the results."""
+        """Send a picture of the results so far."""
         self._tell(picture_of(MapResults(self._plan, self.arrays)))
         self._picture_s = time.monotonic()
 
@@ -167,7 +167,7 @@ class PicturingStore(MemoryStore):
 def map_pictures(
     request: MapRequest, tell: Callable[[MapPicture], None], cancelled: Callable[[], bool]
 ) -> None:
-    """Compute a map and send pictures while it grows; the last is complete unless cancelled."""
+    """Compute a map and send pictures while it grows; the last picture is complete unless cancelled."""
     plan = request.plan
     store = PicturingStore(plan, tell)
     with executor_of(None, None, map_solver(plan)) as executor:
@@ -176,7 +176,7 @@ def map_pictures(
 
 
 def picture_of(results: MapResults) -> MapPicture:
-    """Make the picture of a map over frequency and amplitude."""
+    """Return the picture of a map over frequency and amplitude."""
     frequency, amplitude = (results.plan.range_of(each).edges for each in results.plan.varied)
     classes = motion_classes(results)
     is_known = np.isfinite(classes)
@@ -197,7 +197,7 @@ def picture_of(results: MapResults) -> MapPicture:
 
 
 def settled_motion(request: MotionRequest) -> SettledMotion:
-    """Simulate a specimen from rest until its motion has settled, and sample that motion.
+    """Simulate a specimen from rest until its motion has settled, and return samples of that motion.
 
     Raises ValueError when the motion cannot be simulated.
     """
@@ -240,7 +240,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
 
 @dataclass(frozen=True)
 class SimulatedPoint:
-    """Result of one model at one frequency; None if not requested or not found."""
+    """Result of one model at one frequency; values are None if not requested or not found."""
 
     model: str
     frequency_hz: float
@@ -252,27 +252,27 @@ class SimulatedPoint:
     error_estimate: float | None
     memory: StartMemory = StartMemory.UNKNOWN
     ensemble: Ensemble | None = None
-    """Motions from other starts, in case of sensitive dependence on the start."""
+    """Motions from other starts; computed if the motion depends sensitively on its start."""
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSignal:
-    """The end of a run, sampled; arrays of shape (samples,)."""
+    """Samples of the end of a run; arrays of shape (samples,)."""
 
     model: str
     frequency_hz: float
     time_s: Reals
     displacement_m: Reals
-    """x, of m0."""
+    """Displacement x of m0."""
     relative_m: Reals
-    """p = y - z, between the stops."""
+    """Relative displacement p = y - z, between the stops."""
     gaps_m: tuple[float, float]
     """Gaps of the stops at negative and at positive p."""
 
 
 @dataclass(frozen=True)
 class Trouble:
-    """A scene that could not be computed, in one sentence."""
+    """Error message for a scene that could not be computed."""
 
     sentence: str
 
@@ -288,7 +288,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Most points of both models together: more is neither visible nor computed in an afternoon."""
+"""Maximum number of points of both models together; more can neither be seen nor computed in hours."""
 
 
 class Exponent(StrEnum):
@@ -299,10 +299,10 @@ class Exponent(StrEnum):
 
 
 class SimulationRequest(SpecimenChoice):
-    """A scene at every frequency of a range."""
+    """Request for simulations at every frequency of a range."""
 
     compared_with: ContactWord = "linear"
-    """A second model, for similarity with the first; empty for none."""
+    """Second model, for its similarity with the first; empty for none."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement."""
     start_hz: PositiveFloat = 50.0
@@ -312,25 +312,25 @@ class SimulationRequest(SpecimenChoice):
     step_hz: PositiveFloat = 5.0
     """Frequency step."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Accuracy of contacts; flight is exact at every level. Costs and errors are shown below."""
+    """Accuracy of contacts; free flight is exact at every level. Costs and errors are shown below."""
     duration_s: PositiveFloat = 8.0
     """Length of each run, from rest."""
     window_s: PositiveFloat = 5.0
-    """Observed length at its end."""
+    """Observed time at the end of each run."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Most processor time per point for other starts in case of sensitive dependence; 0 for none."""
+    """Maximum processor time per point for other starts if the motion depends on the start; 0 for none."""
     error: TargetError | None = None
     """Requested relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
     """Time limit per point, with or without a requested error."""
     exponent: Exponent = Exponent.LEFT_OUT
-    """Largest Lyapunov exponent; it about doubles the work."""
+    """Whether to compute the largest Lyapunov exponent; this about doubles the work."""
     signal_hz: PositiveFloat | None = 260.0
     """Frequency whose time signal is shown; empty for none."""
 
     @model_validator(mode="after")
     def _is_a_study(self) -> Self:
-        """Refuse invalid studies with their own error, and requests that would take too long."""
+        """Refuse invalid studies with the error of the study, and requests that would take too long."""
         points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
         if points > MOST_POINTS:
             raise ValueError(
@@ -342,13 +342,13 @@ class SimulationRequest(SpecimenChoice):
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Models; the first is the reference of the similarity."""
+        """Names of the models; the first is the reference of the similarity."""
         second = self.compared_with.strip()
         return (self.law,) if second in ("", self.law) else (self.law, second)
 
     @property
     def study(self) -> Study:
-        """Return the request as a study."""
+        """The request as a study."""
         exponents = (Observable.LYAPUNOV,) if self.exponent is Exponent.COMPUTED else ()
         varied = {"damping_times_s": self.damping_time_s, "gaps_m": self.gap_m}
         return Study(
@@ -366,7 +366,7 @@ class SimulationRequest(SpecimenChoice):
 
     @property
     def has_target(self) -> bool:
-        """Whether an error or a time was requested."""
+        """Whether an error or a time limit was requested."""
         return self.error is not None or self.time_s is not None
 
     @property
@@ -375,12 +375,12 @@ class SimulationRequest(SpecimenChoice):
 
     @property
     def points(self) -> int:
-        """Number of scenes."""
+        """Number of simulated points, for all models together."""
         return self.study.grid.size
 
     @property
     def simulated_s(self) -> float:
-        """Simulated time of all scenes."""
+        """Simulated time of all points [s]."""
         return self.points * self.duration_s
 
 
@@ -388,7 +388,7 @@ MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Shar
 
 
 def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
-    """Return the values of a motion, its share and its kind as texts."""
+    """Return responses, error, share and kind of a motion as texts."""
     share, period = motion.share, "" if motion.period is None else f", {motion.period} drive periods"
     return (
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",
@@ -400,7 +400,7 @@ def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
 
 
 class SimulationProgress:
-    """Results of a request so far, from pieces in any order."""
+    """Results of a request so far; their pieces may arrive in any order."""
 
     def __init__(self, amplitude_m: float, points: int, note: str) -> None:
         self._amplitude_m = amplitude_m
@@ -412,7 +412,7 @@ class SimulationProgress:
         self._troubles: list[str] = []
 
     def add(self, parts: tuple[PartialResult, ...]) -> None:
-        """Add pieces."""
+        """Add pieces of the result."""
         for part in parts:
             match part:
                 case SimulatedPoint():
@@ -424,12 +424,12 @@ class SimulationProgress:
 
     @property
     def done(self) -> int:
-        """Number of finished points, with or without errors."""
+        """Number of finished points, including points that could not be computed."""
         return sum(len(each) for each in self._found.values()) + len(self._troubles)
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Models with results."""
+        """Models that have results."""
         return tuple(dict.fromkeys((*self._signals, *self._found)))
 
     @property
@@ -439,31 +439,31 @@ class SimulationProgress:
 
     @property
     def largest_signal_m(self) -> float:
-        """Largest displacement of the time signals."""
+        """Largest displacement in all time signals [m]."""
         reached = [np.max(np.abs((each.displacement_m, each.relative_m))) for each in self.signals]
         return float(max(reached, default=0.0))
 
     @property
     def smallest_and_largest_response(self) -> tuple[float, float]:
-        """Range of all responses so far; zeros before the first."""
+        """Smallest and largest of all responses so far; zeros before the first response."""
         points = [point for found in self._found.values() for point in found.values()]
         known = [v for p in points for v in (p.response_i, p.response_ii) if v is not None and v > 0]
         return (min(known), max(known)) if known else (0.0, 0.0)
 
     @property
     def troubles(self) -> tuple[str, ...]:
-        """Points that could not be computed."""
+        """Error messages of points that could not be computed."""
         return tuple(self._troubles)
 
     def column(self, model: str, name: str) -> tuple[Reals, Reals]:
-        """Return frequencies and one quantity of a model, NaN if unknown."""
+        """Return the frequencies and one quantity of a model; NaN if unknown."""
         points = [self._found[model][key] for key in sorted(self._found.get(model, {}))]
         values = [getattr(point, name) for point in points]
         frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)
         return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
     def other_motions(self, model: str) -> tuple[Reals, Reals]:
-        """Return frequencies and Response I of each motion from other starts."""
+        """Return frequency and Response I of each additional motion found from other starts."""
         found = [
             (point.frequency_hz, motion.response_i)
             for point in self._found.get(model, {}).values()
@@ -476,7 +476,7 @@ class SimulationProgress:
 
     @property
     def motion_rows(self) -> tuple[tuple[str, ...], ...]:
-        """Return table rows (`MOTION_COLUMNS`) for points with several motions."""
+        """Table rows (`MOTION_COLUMNS`) for points with several motions."""
         return tuple(
             (model, f"{point.frequency_hz:g}", *_motion_words(motion))
             for model, points in self._found.items()
@@ -487,19 +487,19 @@ class SimulationProgress:
 
     @property
     def forgotten(self) -> int:
-        """Number of points with sensitive dependence on the start."""
+        """Number of points whose motion depends sensitively on the start."""
         points = (point for found in self._found.values() for point in found.values())
         return sum(point.memory is StartMemory.LOST for point in points)
 
     def collision_bands_hz(self, model: str) -> tuple[tuple[float, float], ...]:
-        """Return stretches of neighbouring points with collisions."""
+        """Return the frequency ranges of neighbouring points with collisions."""
         frequency_hz, impacts = self.column(model, "impacts")
         striking = np.flatnonzero(impacts > 0)
         groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
         return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return Responses I and II of every model, to overlay on recordings."""
+        """Return Responses I and II of every model as curves, to overlay on recordings."""
         return tuple(
             Curve(
                 f"model {model}, {1e6 * self._amplitude_m:.4g} µm",
@@ -519,7 +519,7 @@ class SimulationProgress:
         )
 
     def similarity(self) -> Similarity | None:
-        """Return the similarity of Response I of both models, where known; None without results of both."""
+        """Return the similarity of Response I of both models; None without common results."""
         if len(self._found) < 2:
             return None
         first, second = (model for model in self.models if model in self._found)

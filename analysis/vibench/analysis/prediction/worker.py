@@ -1,4 +1,4 @@
-"""Simulations for the window, which send results in pieces and can be cancelled."""
+"""Simulations for the window; they send results in pieces and can be cancelled."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -38,7 +38,7 @@ SAMPLES_PER_PERIOD = 400
 
 
 class _TellingStore(MemoryStore):
-    """Store of results in memory that sends each one once."""
+    """Store of results in memory that sends each result once."""
 
     def __init__(self, study: Study, tell: Tell) -> None:
         super().__init__(study)
@@ -46,7 +46,7 @@ class _TellingStore(MemoryStore):
         self._tell = tell
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results and send them."""
+        """Store results, and send them."""
         super().keep(answers)
         self._tell(tuple(self._pieces(answers)))
 
@@ -71,7 +71,7 @@ def simulate(
 ) -> None:
     """Compute a request, the time signals first; return early when cancelled.
 
-    ``cancelled`` is called several times a second; running scenes, shorter than a second, are finished.
+    ``cancelled`` is called several times a second; scenes that are running (below one second) are finished.
     """
     for model in request.models if request.signal_hz is not None else ():
         if cancelled():
@@ -88,7 +88,7 @@ def simulate(
 def simulated_signal(
     request: SimulationRequest, model: str, frequency_hz: float
 ) -> SimulatedSignal | Trouble:
-    """Simulate the specimen from rest and return the last periods."""
+    """Simulate the specimen from rest, and return the last drive periods."""
     specimen = request.specimen_under(model)
     drive = Harmonic(frequency_hz, request.amplitude_m)
     shown_s = min(SIGNAL_PERIODS / frequency_hz, 0.5 * request.duration_s)
@@ -117,7 +117,7 @@ def simulated_signal(
 
 
 def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
-    """Convert a prediction for the picture."""
+    """Return a prediction in the form that is sent to the window."""
     return SimulatedPoint(
         model=model,
         frequency_hz=found.frequency_hz,
@@ -133,11 +133,11 @@ def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
 
 
 Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest | MapRequest | MotionRequest
-"""Requests that the process accepts."""
+"""Requests that the process can compute."""
 
 
 def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
-    """Compute a request and send it in pieces; return early when cancelled."""
+    """Compute a request and send the result in pieces; return early when cancelled."""
     try:
         match request:
             case SimulationRequest():
