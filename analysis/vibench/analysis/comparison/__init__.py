@@ -1,6 +1,6 @@
-"""Compare measurements and predictions as curves over frequency.
+"""Comparison of measurements and predictions as curves over frequency.
 
 A curve is the ratio of m0's displacement to the base displacement over frequency [Hz], with its relative
-standard deviation: a transmission, Response I or Response II, measured, simulated or predicted. Peaks,
-values at markers and differences of curves.
+standard deviation. It is a transmission, Response I or Response II, measured, simulated or predicted. The
+package also finds peaks, values at markers, and differences of curves.
 """

@@ -1,7 +1,7 @@
-"""Curve for comparisons: motion of m0 over motion of the base, against frequency.
+"""Curve for comparisons: ratio of m0's motion to the base motion, over frequency.
 
-All measured and predicted responses are ratios of displacements and share one axis. Names distinguish
-them, because the transmission of a specimen with impacts is not its Response I.
+All measured and predicted responses are ratios of displacements and share one axis. Names distinguish them,
+because the transmission of a specimen with impacts is not equal to its Response I.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ class CurveOrigin(StrEnum):
     PREDICTED = "predicted"
     """Prediction for the specimen under sines."""
     STABLE = "stable branches"
-    """Stable periodic motions; possibly several at one frequency."""
+    """Stable periodic motions; there may be several at one frequency."""
     UNSTABLE = "unstable branches"
-    """Unstable periodic motions; possibly several at one frequency."""
+    """Unstable periodic motions; there may be several at one frequency."""
 
 
 class CurveKind(StrEnum):
@@ -50,36 +50,36 @@ class Curve(Labelled):
     response: CurveKind
     frequency_hz: Reals
     magnitude: Reals
-    """Displacement of m0 over displacement of the base; NaN where there is none."""
+    """Displacement of m0 over displacement of the base; NaN where missing."""
     relative_sd: Reals
     """Relative standard deviation of the magnitude; NaN if unknown."""
     note: str = ""
-    """Remarks, such as averages, window, accuracy."""
+    """Remarks, such as averages, window and accuracy."""
     level_m: float | None = None
     """Base amplitude of a simulated curve [m]; None if none was requested."""
 
     @property
     def name(self) -> str:
-        """Name with quantity and origin: ``"sweep_weak, Response II, measured"``."""
+        """Name with quantity and origin, such as ``"sweep_weak, Response II, measured"``."""
         return f"{self.source}, {self.response.value}, {self.origin.value}"
 
     @property
     def is_single_valued(self) -> bool:
-        """Whether each frequency has one value; branches fold."""
+        """Whether each frequency has one value; branches may have several."""
         return self.origin not in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE)
 
     @property
     def lower(self) -> Reals:
-        """Magnitude minus two standard deviations on a logarithmic scale, at least a tenth of it."""
+        """Magnitude minus two standard deviations of its logarithm, at least a tenth of the magnitude."""
         return np.asarray(self.magnitude * np.exp(-self._reach))
 
     @property
     def upper(self) -> Reals:
-        """Magnitude plus two standard deviations on a logarithmic scale, at most ten times it."""
+        """Magnitude plus two standard deviations of its logarithm, at most ten times the magnitude."""
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Return frequencies and bounds at ``columns`` points at most, because areas are slow to draw."""
+        """Return frequencies and bounds at up to ``columns`` points, because areas are slow to draw."""
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)
@@ -87,11 +87,11 @@ class Curve(Labelled):
 
     @property
     def _reach(self) -> Reals:
-        """Half width of the bounds of ln(magnitude), at most ln 10 so that they do not fill the figure."""
+        """Half width of the bounds of ln(magnitude), limited to ln 10 so that they do not fill the figure."""
         return np.minimum(2 * self.relative_sd, np.log(10.0))
 
     def at(self, frequency_hz: Reals) -> "Curve":
-        """Interpolate the curve on logarithmic axes; NaN outside and on branches."""
+        """Return the curve interpolated on logarithmic axes; NaN outside its range, and for branches."""
         known = np.isfinite(self.magnitude) & (self.magnitude > 0)
         if not known.any() or not self.is_single_valued:
             return replace(
@@ -107,7 +107,7 @@ class Curve(Labelled):
 
 
 def sorted_curve(curve: Curve) -> Curve:
-    """Sort the points by frequency and remove duplicates, for example of downward sweeps."""
+    """Return the curve sorted by frequency, each frequency once (downward sweeps, repeated points)."""
     frequency_hz, first = np.unique(curve.frequency_hz, return_index=True)
     return replace(
         curve,
@@ -118,9 +118,9 @@ def sorted_curve(curve: Curve) -> Curve:
 
 
 def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
-    """Return the difference of two curves at the frequencies of the first, within both.
+    """Return the ratio of two curves at the frequencies of the first, within their common range.
 
-    Raises NotEnoughData when the two have no frequency in common.
+    Raises NotEnoughData when the curves have no frequency in common, or one of them is a branch.
     """
     for each in (curve, reference):
         if not each.is_single_valued:
@@ -152,11 +152,11 @@ class Reading:
     magnitudes: tuple[float, ...]
     """One value for each marker; NaN outside the curve."""
     decibel: float
-    """Last value over first [dB]; NaN if either is missing."""
+    """Ratio of the last value to the first [dB]; NaN if either is missing."""
 
 
 def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
-    """Return the values of every curve at every frequency."""
+    """Return the values of every curve at all frequencies."""
     return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in curves)
 
 
@@ -167,15 +167,15 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 
 
 _LEAST_RISE_DB = 3.0
-"""Least height of a peak above the valley beside it [dB]."""
+"""Minimum height of a peak above the neighbouring valley [dB]."""
 _LEAST_RISE_SD = 8.0
-"""Least height in standard deviations: the range of a thousand points of noise is 6.5."""
+"""Minimum height of a peak in standard deviations; a thousand points of noise have a range of 6.5."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (peaks, half widths): within this distance, a mode has at most this many peaks, itself included."""
+"""Pairs (peaks, half widths): a mode has at most this many peaks, itself included, in this distance."""
 _CROWD_RISE = 0.3
-"""Least height of counted peaks, as a share of the required height."""
+"""Minimum height of peaks that are counted here, relative to the required height of a peak."""
 _USUAL_HALF_WIDTH = 0.01
-"""Assumed relative half width of a peak that does not fall by 3 dB on both sides."""
+"""Relative half width assumed for a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
 _PER_NEPER_DB = 20 / np.log(10)
 
@@ -185,29 +185,29 @@ class CurvePeak:
     """One peak of a curve."""
 
     frequency_hz: float
-    """Frequency of the vertex of a parabola through the highest point and its neighbours, in logarithms."""
+    """Vertex of a parabola through the highest point and its neighbours, on logarithmic axes."""
     magnitude: float
     relative_sd: float
     """Relative standard deviation of the magnitude; NaN if unknown."""
     half_power_width_hz: float | None
-    """Width between the half-power frequencies; None if a neighbouring peak or the end is nearer."""
+    """Width between the half-power frequencies; None if a higher point or the end of the curve is nearer."""
 
     @property
     def damping_ratio(self) -> float | None:
-        """Half the width over the frequency: the damping ratio of a single linear mode."""
+        """Half the width over the frequency, which is the damping ratio of a single linear mode."""
         width_hz = self.half_power_width_hz
         return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
 
 
 def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
-    """Find the highest resonance peaks, sorted by frequency.
+    """Return the highest resonance peaks, sorted by frequency.
 
-    Branches and chaotic stretches have none.
+    Branches and chaotic stretches have no peaks.
 
     Parameters
     ----------
     curve
-        Measured or predicted.
+        Measured or predicted curve.
     most
         Maximum number of peaks.
     """
@@ -234,9 +234,9 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
 
 
 def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tuple[CurvePeak, float]:
-    """Measure a peak; return it and the larger of its two half widths [Hz]."""
+    """Return a peak, and the larger of its two half widths [Hz]."""
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
-    # Divided differences are fast: a chaotic curve has thousands of peaks.
+    # Divided differences are used for speed: a chaotic curve has thousands of peaks.
     (left, right), (before, after) = np.diff(y) / np.diff(x), np.diff(x)
     bend, slope, top = (
         (right - left) / (before + after),

@@ -1,4 +1,4 @@
-"""Measured and simulated curves of one recording, for a comparison."""
+"""Curves of one recording, measured and simulated, and the options of their analysis."""
 
 from collections.abc import Iterator
 from enum import StrEnum
@@ -23,11 +23,11 @@ from ..sine.sweep import SweptMotion
 from .curve import Curve, CurveKind, CurveOrigin
 
 SAME_HZ = 0.01
-"""Frequencies closer than this count as equal [Hz]."""
+"""Largest difference of frequencies that count as equal [Hz]."""
 
 
 def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
-    """Yield predicted Responses I and II."""
+    """Yield the curves of predicted Responses I and II."""
     low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
     level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
     note = f"sines of A0 = {level}, {found.accuracy.value}"
@@ -37,7 +37,7 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
 
 
 def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Iterator[Curve]:
-    """Yield the curve of an estimated transmission with its standard deviation."""
+    """Yield the curve of an estimated transmission, with its standard deviation."""
     found = response.frequency_response
     how = found.settings
     note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
@@ -53,7 +53,7 @@ def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Ite
 
 
 def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator[Curve]:
-    """Yield a curve for each response of a sweep."""
+    """Yield the curves of Responses I and II of a sweep."""
     note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
     yield from _responses(
         name, origin, found.frequency_hz, (found.response_i, found.response_ii, found.sd_response_ii), note
@@ -61,9 +61,9 @@ def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator
 
 
 def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
-    """Yield curves of the steps up and of the steps down, since they differ between jumps."""
+    """Yield separate curves of the steps up and the steps down, because they differ between jumps."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
-        return  # several levels at one frequency do not form a curve over frequency
+        return  # several levels at one frequency are not a curve over frequency
     directions = np.array(found.direction)
     for direction in dict.fromkeys(found.direction):
         at = directions == direction
@@ -74,7 +74,7 @@ def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> It
 
 
 def dwell_traces(name: str, origin: CurveOrigin, found: DwellResponse) -> Iterator[Curve]:
-    """Yield a point for each response of a dwell."""
+    """Yield Responses I and II of a dwell as curves of one point."""
     values = (
         np.array([found.response_i]),
         np.array([found.response_ii]),
@@ -98,7 +98,7 @@ class Model(StrEnum):
 
     LEFT_OUT = "left out"
     UNDER_VOLTAGE = "under the recorded voltage"
-    """Ensemble of rig and specimen; valid for chaotic motion too."""
+    """Several runs of rig and specimen; also valid for chaotic motion."""
     UNDER_BASE = "under the recorded base motion"
     """One run of the specimen alone; for linear and coherent motion."""
 
@@ -111,38 +111,38 @@ _SIMULATIONS = {
 
 
 class AnalysisOptions(FrozenModel):
-    """Options of an analysis; those from estimator to confidence apply to noise only."""
+    """Options of an analysis; the options from estimator to confidence apply to noise only."""
 
     model: Model = Model.LEFT_OUT
-    """Overlay the simulation: rig and specimen under the recorded voltage (the twin) or the specimen alone
-    under the recorded base motion. Takes seconds to minutes per recording."""
+    """Simulation to overlay: rig and specimen under the recorded voltage (the twin), or the specimen alone
+    under the recorded base motion. It takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
     """Noise on the base biases h1, noise on the response biases h2, and neither biases drive."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
-    """For hv alone: noise density of m0's velocity over that of the base's acceleration, in s²."""
+    """For hv only: ratio of the noise densities of m0's velocity and the base acceleration, in s²."""
     window: Window = Window.HANN
-    """Taper of the segments of streamed noise."""
+    """Window of the segments of streamed noise."""
     resolution_hz: PositiveFloat | None = None
-    """Resolution for streamed noise; automatic by default. Give resolution or averages, not both."""
+    """Resolution for streamed noise; automatic by default. Give either resolution or averages."""
     averages: Annotated[float, Field(gt=1.0)] | None = None
-    """Independent averages of streamed noise; automatic by default."""
+    """Number of independent averages of streamed noise; automatic by default."""
     overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
     """Overlap of neighbouring segments, as a fraction."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
-    """Probability that the bounds of a line contain the true value."""
+    """Probability that the bounds at a line contain the true value."""
 
     @model_validator(mode="after")
     def _is_allowed(self) -> Self:
-        """Refuse invalid combinations by building the request, which raises the error."""
+        """Refuse invalid combinations: building the request raises their error."""
         self.request  # noqa: B018 - making it is the check
         return self
 
     @property
     def request(self) -> FrequencyResponseRequest:
-        """These options as a request for the analysis."""
+        """These options as the request of an analysis."""
         return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation to compute, by its input: none, recorded voltage or recorded base motion."""
+        """Simulation to compute: none, under the recorded voltage, or under the recorded base motion."""
         return _SIMULATIONS[self.model]
