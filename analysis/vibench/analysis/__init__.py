@@ -1,12 +1,12 @@
-"""Recordings and predictions become frequency responses, spectra, responses, figures and reports.
+"""Analysis: frequency responses, spectra, responses, figures and reports from recordings and predictions.
 
-Functions are pure and results are immutable; values have an uncertainty where one can be computed. SI
-units; names end with the unit where needed. Errors state what was given, what is allowed and what to do.
-The packages cover signals, recordings, frequency responses and sines, the model beside the measurement,
-figures, results and reports. They use recordings and plans of a bench, but no instruments and no windows.
-The names below are imported on first use.
+Functions are pure and results are immutable; values have an uncertainty where it can be computed. Units are
+SI; names end with the unit where needed. Errors state what was given, what is allowed and what to do. The
+packages cover signals, recordings, frequency responses and sines, simulation beside the measurement, figures,
+results and reports. They use recordings and plans of a bench, but no instruments and no windows. The names
+below are imported on first use.
 
-A mass on a base that shakes as noise, resonant at 95 Hz with a damping ratio of 0.01:
+Example: a mass on a base that moves as noise, resonant at 95 Hz with a damping ratio of 0.01.
 
 >>> import numpy as np
 >>> from vibench.analysis import resonances, transmissibility

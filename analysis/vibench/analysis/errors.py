@@ -1,17 +1,17 @@
-"""The errors of an analysis: each says what was given, what is allowed, and what to do next."""
+"""Errors of an analysis; each message states what was given, what is allowed, and what to do next."""
 
 
 class AnalysisError(Exception):
-    """Base of everything that can stop an analysis; the text is one sentence for the analyst."""
+    """Base class of all errors that stop an analysis; the message is one sentence for the analyst."""
 
 
 class InvalidRequest(AnalysisError, ValueError):
-    """A setting, or a combination of settings, that has no meaning for this analysis."""
+    """A setting, or a combination of settings, that is invalid for this analysis."""
 
 
 class NotEnoughData(AnalysisError, ValueError):
-    """The recording is too short, or too much of it is invalid, for the result that was requested."""
+    """The recording is too short for the requested result, or too much of it is invalid."""
 
 
 class UnusableData(AnalysisError, ValueError):
-    """The samples do not hold what the analysis needs: a dead drive channel, values that are not finite."""
+    """The samples lack what the analysis needs: a dead drive channel, values that are not finite."""

@@ -1,10 +1,10 @@
-"""Choices for figures, kept apart so that commands can list them without matplotlib installed."""
+"""Choices for figures; a separate module, so that commands list them without matplotlib."""
 
 from enum import StrEnum
 
 
 class ImageKind(StrEnum):
-    """Formats that a figure is written in; the value is the files' suffix."""
+    """Image formats of figures; the value is the file suffix."""
 
     PNG = "png"
     SVG = "svg"
@@ -22,4 +22,4 @@ SHOWN = {
     "duration": "followed for [s]",
     "motions": "motions that the starts came to",
 }
-"""Quantities that a map may show beside the kinds of motion."""
+"""Quantities that a map can show beside the kinds of motion."""

@@ -28,19 +28,19 @@ _PLAIN = (1e-5, 1e7)
 
 
 def plus_minus(value: float, half_width: float) -> str:
-    """Write a value and its uncertainty, rounded to two digits of the uncertainty: ``"94.613 ± 0.012"``.
+    """Return a value and its uncertainty as text, with two digits of the uncertainty: ``"94.613 ± 0.012"``.
 
-    If the uncertainty is not finite and positive, write four digits of the value only.
+    If the uncertainty is not finite and positive, only four digits of the value are returned.
     """
     if not 0.0 < half_width < np.inf or not np.isfinite(value):
         return f"{value:.4g}"
     largest = max(abs(value), half_width)
     if not _PLAIN[0] <= largest < _PLAIN[1]:
         power = int(np.floor(np.log10(largest)))
-        # Decimal, because the power of ten itself may exceed the range of floats.
+        # Decimal is used, because the power of ten itself may exceed the range of floats.
         scaled = (float(Decimal(float(each)).scaleb(-power)) for each in (value, half_width))
         return f"({plus_minus(*scaled)})e{power}"
-    # Use the exponent after rounding: 0.0996 is written as 0.10.
+    # The exponent is taken after rounding: 0.0996 is written as 0.10.
     place = 1 - int(f"{half_width:.1e}".partition("e")[2])
     shown = max(place, 0)
     return f"{round(value, place) + 0.0:.{shown}f} ± {round(half_width, place):.{shown}f}"
@@ -48,25 +48,25 @@ def plus_minus(value: float, half_width: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Named columns; a heading carries its unit, as in ``"frequency [Hz]"``. Columns may differ in length."""
+    """Named columns, which may differ in length; headings contain the unit, as in ``"frequency [Hz]"``."""
 
     name: str
     columns: tuple[tuple[str, tuple[float | str, ...]], ...]
 
     def column(self, heading: str) -> tuple[float | str, ...]:
-        """Return one column by its heading."""
+        """Return the column with this heading."""
         return dict(self.columns)[heading]
 
 
 def table(name: str, **columns: ArrayLike) -> Table:
-    """Build the table ``name`` of ``columns``; their names carry the unit as in the code."""
+    """Return a table of ``columns``; their names end with the unit, as in the code."""
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
 
 
 def columns(source: object, keys: str) -> dict[str, Any]:
-    """Return values of a result by the keys of a document, or the headings of a table.
+    """Return values of a result, keyed as in a JSON document or in the headings of a table.
 
-    Example: ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"`` takes a field or property, an attribute
+    The keys ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"`` take a field or property, an attribute
     of a part (None if the part is None), an item of an array, and all keys of a part's document.
     """
     found: dict[str, Any] = {}
@@ -84,7 +84,7 @@ def columns(source: object, keys: str) -> dict[str, Any]:
 
 
 def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
-    """Return concatenated values of several parts, by keys as in `columns`; NaN for missing values."""
+    """Return the values of several parts, concatenated per key as in `columns`; NaN for missing values."""
     found = [columns(each, keys) for each in parts]
     names = [each.partition("=")[0] for each in keys.split()]
     return {
@@ -96,9 +96,9 @@ def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Convert a value for JSON; numbers that are not finite become None.
+    """Return a value in a form for JSON; numbers that are not finite become None.
 
-    A dataclass becomes the keys in its ``DOCUMENT`` (see `columns`), or all its fields if it has none.
+    A dataclass is converted to the keys in its ``DOCUMENT`` (see `columns`), or to all fields if it has none.
     """
     match value:
         case np.ndarray() | np.generic():
@@ -134,7 +134,7 @@ def _cells(values: ArrayLike) -> tuple[float | str, ...]:
 
 
 def write_csv(content: Table, path: Path) -> Path:
-    """Write a table: headings in the first row, decimal points, empty cells below shorter columns."""
+    """Write a table with headings in the first row, decimal points, and empty cells below short columns."""
     headings = [heading for heading, _ in content.columns]
     rows = zip_longest(*(values for _, values in content.columns), fillvalue="")
     with replace_file(path) as coming, coming.open("w", newline="", encoding="utf-8") as file:
@@ -173,36 +173,36 @@ UNITS = {
     "_ns_per_m": "N s m-1",
     "_s_per_m": "s m-1",
 }
-"""Unit of a value by the suffix of its name; the longest matching suffix counts."""
+"""Unit of a value, keyed by the suffix of its name; the longest matching suffix counts."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
 """Names of independent variables; a result uses the first one that it has."""
 
 
 class Labelled:
-    """Base class of results that can be converted to JSON and to a labelled xarray Dataset with units."""
+    """Base class of results that can be converted to JSON, and to an xarray Dataset with units."""
 
     OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """Units of values without a suffix. For a part: the unit that replaces ``{unit}`` in its own texts.
+    """Units of values whose names have no unit suffix; ``{0.name}`` inserts a field.
 
-    ``{0.name}`` inserts a field. Classes of parts may define this and ``DOCUMENT`` too.
+    In a part of a result, ``{unit}`` inserts the part's unit in its parent. Parts may define ``DOCUMENT``
+    too.
     """
     DOCUMENT: ClassVar[str] = ""
-    """Keys of the JSON document in the syntax of `columns`; all fields when empty."""
+    """Keys of the JSON document in the syntax of `columns`; empty for all fields."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON document; numbers that are not finite are None."""
+        """Return the JSON document as a dictionary; numbers that are not finite become None."""
         return dict(plain(self))
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return all numbers of the result as an `xarray.Dataset`.
 
-        Arrays as long as the result's frequencies or times share that dimension. Bounds
-        (``magnitude_lower``) and deviations (``sd_...``) are separate variables. Names of values in a part
-        begin with the part's name (``response_frequency_hz``). A list of parts of single numbers, such as
-        resonances, becomes one array per field (``resonances_frequency_hz``); other parts are numbered.
-        Each variable has the attribute ``units`` unless it is a pure number or its unit depends on the
-        input; rows of different units have a variable of units (``values_value_units``). Texts are
-        attributes.
+        Arrays as long as the result's frequencies or times share that dimension. Bounds (``magnitude_lower``)
+        and standard deviations (``sd_...``) are separate variables. Names of values in a part begin with the
+        name of the part (``response_frequency_hz``). A list of parts that contain single numbers, such as
+        resonances, becomes one array per field (``resonances_frequency_hz``); other parts are numbered. A
+        variable has the attribute ``units`` unless it is a pure number or its unit depends on the input. Rows
+        with different units have a variable of units (``values_value_units``). Texts are attributes.
 
         Raises InvalidRequest when xarray is not installed.
         """
@@ -218,7 +218,7 @@ class Labelled:
 
 
 def unit_of(name: str) -> str:
-    """Return the unit by the suffix of a name, as UDUNITS text; empty without such a suffix.
+    """Return the unit for the suffix of a name, in UDUNITS notation; empty for names without such a suffix.
 
     >>> unit_of("damping_ns_per_m"), unit_of("frequency_hz"), unit_of("response_i")
     ('N s m-1', 'Hz', '')
@@ -228,7 +228,7 @@ def unit_of(name: str) -> str:
 
 
 def _unit(part: Any, key: str, unit: str) -> str:
-    """Return the unit of a value of a part; ``unit`` is the part's unit in its parent."""
+    """Return the unit of a value in a part; ``unit`` is the unit of the part in its parent."""
     pattern = getattr(part, "OWN_UNITS", {}).get(key)
     if pattern is None:
         return unit_of(key)
@@ -240,7 +240,7 @@ def _attributes(unit: str) -> dict[str, str]:
 
 
 def holds_array(annotation: object) -> bool:
-    """Return whether a type is an array: an alias in numpy 2.5, the class itself in older versions."""
+    """Return whether an annotation is an array: an alias in numpy 2.5, the class in older versions."""
     return "ndarray" in str(annotation).lower()
 
 
@@ -279,7 +279,7 @@ def _collect(
 
 
 def _is_table(parts: tuple[Any, ...]) -> bool:
-    """Return whether all parts have one type and only numbers, words and equally long lists of numbers."""
+    """Return whether all parts have one type and contain only numbers, words and lists of equal lengths."""
     if not all(is_dataclass(each) for each in parts):
         return False
     shapes = {_row_shape(each) for each in parts}
@@ -287,7 +287,7 @@ def _is_table(parts: tuple[Any, ...]) -> bool:
 
 
 def _row_shape(part: Any) -> tuple[Any, ...] | None:
-    """Return the type of a part and the lengths of its lists; None if it has fields that do not fit a row."""
+    """Return the type of a part and the lengths of its lists; None if a field does not fit into a row."""
     lengths = []
     for _, value in _numbers_of(part):
         match value:
@@ -301,7 +301,7 @@ def _row_shape(part: Any) -> tuple[Any, ...] | None:
 
 
 def _collect_rows(rows: tuple[Any, ...], name: str, unit: str, variables: dict[str, Any]) -> None:
-    """Combine parts of single numbers into one variable per field, with NaN for missing numbers."""
+    """Collect parts of single numbers into one variable per field; missing numbers become NaN."""
     for key, _ in _numbers_of(rows[0]):
         values = [getattr(row, key) for row in rows]
         is_word = any(isinstance(each, str) for each in values)
@@ -320,7 +320,7 @@ def _collect_rows(rows: tuple[Any, ...], name: str, unit: str, variables: dict[s
 
 
 def _numbers_of(part: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the fields of a result, then the arrays computed from them."""
+    """Yield the fields of a result, then its properties that are arrays."""
     for each in fields(part):
         yield each.name, getattr(part, each.name)
     for name, found in inspect.getmembers(type(part), lambda member: isinstance(member, property)):
