@@ -1,4 +1,4 @@
-"""Analysis of a branch held by a fast loop: the analysis of stepped sines, without a simulation."""
+"""Analysis of a branch held by a fast loop: that of stepped sines, without a simulation."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +19,7 @@ def _undrawn(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[Stepp
     )
 
 
-# A branch folds, so it is not a curve over frequency.
+# A branch may have several motions at one frequency, so it is not a curve over frequency.
 BRANCH_CONTINUATION = replace(
     stepped_analysis(lambda *_: nan, SegmentLabel.BRANCH), draws=_undrawn, curves=lambda *_: iter(())
 )

@@ -1,4 +1,4 @@
-"""Player of a fast loop's settings, which measures base and m0 until their standard errors are small."""
+"""Player of a fast loop's settings; it measures base and m0 until their standard errors are small."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ _GLIDE_S = 0.1
 _HIGHEST = 9
 _MOST_LOOKS = 20
 _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
-"""Largest standard errors at the end of a measurement: of the base's fundamental and harmonics, as parts of
+"""Largest standard errors at the end of a measurement: of the base's fundamental and harmonics relative to
 the tolerance, and of m0 relative to itself."""
 _ROUGHLY = 0.15
-"""Far from the level, the largest standard error of the base as a part of its distance from the level."""
+"""Largest standard error of the base far from the level, relative to its distance from the level."""
 _DRIFT = 3.0
-"""The first half has not settled if it differs from the second by more than this many standard errors."""
+"""Largest difference of the settled first half from the second, in standard errors."""
 _REMEMBERED = 0.8
-"""Weight of the scatter of earlier measurements; the few blocks of one alone may agree by chance."""
+"""Weight of the scatter in earlier measurements; the few blocks of one measurement may agree by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class LoopLook:
     base_m: Coefficients
     m0_m: Coefficients
     base_u: Vector
-    """Standard error of the real and imaginary part of each coefficient [m]."""
+    """Standard error of real and imaginary part of each coefficient [m]."""
     m0_u: Vector
 
     @property
@@ -57,7 +57,7 @@ class LoopLook:
 
 
 class BranchPlayer:
-    """Player of settings, which measures the response of base and m0."""
+    """Player of settings; it measures the response of base and m0 to each."""
 
     def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
         self.plan = plan
@@ -66,12 +66,12 @@ class BranchPlayer:
         self._most_vpp = loop.most_vpp
         self._feedback = fast.feedback
         self._blocks: list[LoopBlock] = []
-        """Blocks of the current setting since it settled."""
+        """Blocks of the current setting since the motion settled."""
         self._squares, self._degrees = np.zeros(1), 0.0
-        """Sum of squares of block deviations in earlier measurements, and their degrees of freedom."""
+        """Squared deviations of blocks in earlier measurements, summed, and their degrees of freedom."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
-        """Return the controller's program for a setting."""
+        """Return a setting as a program of the controller."""
         program = LoopProgram(
             frequency_hz=setting.frequency_hz,
             reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
@@ -86,7 +86,7 @@ class BranchPlayer:
     def measure(
         self, setting: LoopSetting, level_m: float
     ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
-        """Play a setting and average until the noise is low enough."""
+        """Play a setting, and average until the standard errors are small enough; return the response."""
         tone, frequency_hz = self.tone(setting), setting.frequency_hz
         look_s = self.plan.look_periods / frequency_hz
         samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
@@ -107,7 +107,7 @@ class BranchPlayer:
     def record(
         self, setting: LoopSetting, segment: Segment
     ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
-        """Record the current setting, and average over the recording and the preceding measurement."""
+        """Record the current setting; return the average over the recording and the measurement before it."""
         tone = self.tone(setting)
         samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
         self._blocks += samples.coefficients
@@ -126,10 +126,10 @@ class BranchPlayer:
 
 
 def _settled_part(seen: Coefficients) -> Coefficients:
-    """Omit the first half of the blocks as long as it differs from the second."""
+    """Return the blocks without the first half, repeated while it differs from the second half."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
-        # Use differences between neighbours, which a drift hardly changes.
+        # Differences of neighbours are used, because a drift hardly changes them.
         scatter = np.sqrt(0.5 * np.mean(np.abs(np.diff(seen, axis=0)) ** 2, axis=0))
         moved = np.abs(first.mean(axis=0) - second.mean(axis=0))
         error = scatter * np.sqrt(1 / len(first) + 1 / len(second))
@@ -141,7 +141,7 @@ def _settled_part(seen: Coefficients) -> Coefficients:
 
 
 def _is_known(look: LoopLook, level_m: float, plan: BranchContinuation) -> bool:
-    """Return whether the standard errors are small enough for the distance from the level."""
+    """Return whether the standard errors are small enough for the present distance from the level."""
     share = look.base_u[: plan.harmonics] / level_m
     wrong = abs(abs(look.base_m[0]) / level_m - 1)
     return bool(

@@ -1,4 +1,4 @@
-"""The equations of a branch: drive settings as unknowns, deviations of the base as residuals."""
+"""Equations of a branch: the unknowns are drive settings, the residuals are deviations of the base."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,53 +10,53 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""Smallest change of the unknowns after which the derivative is updated."""
+"""Smallest change of the unknowns for which the derivative is updated."""
 _DOUBTED = 0.05
-"""Assumed standard error of the derivative, against which the measurement noise is weighted."""
+"""Assumed standard error of the derivative, against which measurement noise is weighted."""
 _REFERENCE_STEP = 0.15
 """Relative change of the first coefficient that counts as one step."""
 _RATIO_STEP = 1.0
-"""Change of the ratio of m0 to base that counts as one step."""
+"""Change of the ratio m0 / base that counts as one step."""
 _RATIO = 2
-"""Number of rows for the ratio of m0 to base, which follow the base's residual."""
+"""Number of rows for the ratio m0 / base (real and imaginary part), after those of the residual."""
 _NEW = 0.3
-"""Part of a step by which a point must advance to count as new."""
+"""Share of a step by which a point must advance to count as new."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
-"""Smallest distance of two points that define a direction: in steps (the effect of the tolerance is less) and
-in standard errors."""
+"""Smallest distance of two points that define a direction, in steps (the tolerance moves points by less),
+and in standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopSetting:
-    """Setting of a controller: the unknowns of the equations."""
+    """Setting of a controller, which contains the unknowns of the equations."""
 
     frequency_hz: float
     reference_v: Coefficients
-    """Coefficients from the first harmonic on, shape (harmonics,); the first is real, which fixes the phase
-    [V]."""
+    """Coefficients from the first harmonic on [V], shape (harmonics,). The first is real, which fixes the
+    phase."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoint:
-    """A setting as unknowns of the equations, and its measured response as residual and ratio."""
+    """A setting as unknowns of the equations; its measured response as residual and ratio."""
 
     unknowns: Vector
     residual: Vector
-    """Deviation of the base, over its level."""
+    """Deviation of the base from the required sine, relative to the level."""
     ratio: complex
-    """Fundamental of m0 over that of the base."""
+    """Fundamental of m0 over fundamental of the base."""
     noise: Vector
-    """Standard errors of the residual, and of both parts of the ratio."""
+    """Standard errors of the residual, and of real and imaginary part of the ratio."""
 
     @property
     def place(self) -> Vector:
-        """Coordinates in which the arc length is measured: frequency and ratio, in steps."""
+        """Coordinates for the arc length: frequency and both parts of the ratio, in steps."""
         return np.array([self.unknowns[0], self.ratio.real / _RATIO_STEP, self.ratio.imag / _RATIO_STEP])
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedPoint:
-    """Prediction of the next point."""
+    """Prediction of the next point on the branch."""
 
     unknowns: Vector
     place: Vector
@@ -65,25 +65,25 @@ class PredictedPoint:
 
 
 class BranchSolver:
-    """Newton's method with a derivative updated from measurements (Broyden, Math. Comp. 19 (1965) 577).
+    """Newton's method with a derivative that is updated by measurements (Broyden, Math. Comp. 19 (1965) 577).
 
-    The equations require the given amplitude of the base's fundamental and zero for each harmonic. Unknowns
-    are frequency and coefficients, one more than equations. The arc length uses frequency and ratio of m0 to
-    base, because at a fold with low damping the coefficients hardly change while the phase of m0 turns by 180
-    degrees.
+    The equations require the given amplitude of the base's fundamental, and zero for each harmonic. The
+    unknowns are the frequency and the coefficients, one more than equations. The arc length uses frequency
+    and ratio m0 / base: at a fold with low damping, the coefficients hardly change while the phase of m0
+    turns by 180 degrees.
 
     Parameters
     ----------
     start
         First setting of the branch.
     gains
-        Base displacement per volt for each harmonic, from the model [m/V], shape (harmonics,).
+        Base displacement per volt at each harmonic, from the model [m/V], shape (harmonics,).
     bend
-        Relative change of the first gain's magnitude with frequency, from the model [1/Hz].
+        Relative change of the magnitude of the first gain with frequency, from the model [1/Hz].
     level_m
-        Amplitude of the base's displacement, at the start.
+        Amplitude of the base displacement at the start [m].
     step_hz
-        Length of one step.
+        Length of one step in frequency [Hz].
     """
 
     def __init__(
@@ -102,12 +102,12 @@ class BranchSolver:
         self._begin = self._unknowns(start)
 
     def first(self) -> PredictedPoint:
-        """Return the first prediction, whose frequency is fixed."""
+        """Return the first prediction, at the fixed frequency of the start."""
         along = np.array([1.0, 0.0, 0.0])
         return PredictedPoint(self._begin, along * self._begin[0], along, 0.0)
 
     def next(self, points: Sequence[MeasuredPoint], length: float, way: float) -> PredictedPoint:
-        """Return a prediction at a distance ``length``; ``way`` is the initial direction in frequency."""
+        """Return a prediction at distance ``length``; ``way`` (1 or -1) is the direction at the start."""
         here = points[-1]
         if len(points) == 1:
             along = np.array([way, 0.0, 0.0])
@@ -121,7 +121,7 @@ class BranchSolver:
         return PredictedPoint(here.unknowns + length * moved, here.place + length * along, along, length)
 
     def setting(self, unknowns: Vector) -> LoopSetting:
-        """Return the setting of these unknowns."""
+        """Return the setting for these unknowns."""
         volts = np.exp(_REFERENCE_STEP * unknowns[1]) * self._volts[0]
         rest = (unknowns[2::2] + 1j * unknowns[3::2]) * self._volts[1:]
         return LoopSetting(
@@ -129,7 +129,7 @@ class BranchSolver:
         )
 
     def learn(self, point: MeasuredPoint) -> None:
-        """Update the derivative with a measurement."""
+        """Update the derivative by the change from the last measurement to this one."""
         if self._last is not None:
             moved = point.unknowns - self._last.unknowns
             changed = _outputs(point) - _outputs(self._last)
@@ -140,7 +140,7 @@ class BranchSolver:
         self._last = point
 
     def probe(self, column: int, here: MeasuredPoint, beside: MeasuredPoint) -> None:
-        """Update the column of one unknown from two measurements."""
+        """Update the derivative with respect to one unknown, from two measurements."""
         moved = beside.unknowns[column] - here.unknowns[column]
         found = (_outputs(beside) - _outputs(here)) / moved
         noise = np.hypot(beside.noise, here.noise) / moved
@@ -150,7 +150,7 @@ class BranchSolver:
         self._last = beside
 
     def correct(self, point: MeasuredPoint, predicted: PredictedPoint) -> Vector:
-        """Return the next iterate, in the plane through the prediction perpendicular to the arc."""
+        """Return the next iterate, in the plane through the prediction that is perpendicular to the arc."""
         along = predicted.along
         row = along[1:] @ self._slope[-_RATIO:]
         row[0] += along[0]
@@ -168,32 +168,32 @@ class BranchSolver:
 
 
 def is_new(point: MeasuredPoint, predicted: PredictedPoint) -> bool:
-    """Return whether a point is far enough from the last one, in forward direction."""
+    """Return whether a point is far enough from the last point, in the forward direction."""
     short = float(predicted.along @ (predicted.place - point.place))
     return predicted.length == 0.0 or short <= (1 - _NEW) * predicted.length
 
 
 def residual_of(base_m: Coefficients, level_m: float) -> Vector:
-    """Return the residual of the base over its level: amplitude of the fundamental, then each harmonic.
+    """Return the residual relative to the level: amplitude of the fundamental, then each harmonic.
 
     Parameters
     ----------
     base_m
-        Displacement of the base from the first harmonic on, phases relative to the first coefficient [m].
+        Base displacement from the first harmonic on, with phases relative to the first coefficient [m].
     level_m
-        Required amplitude [m].
+        Required amplitude of the base displacement [m].
     """
     rest = base_m[1:] / level_m
     return np.concatenate([[abs(base_m[0]) / level_m - 1.0], np.column_stack([rest.real, rest.imag]).ravel()])
 
 
 def noise_of(base_u: Vector, ratio_u: float) -> Vector:
-    """Return the standard errors of residual and ratio, from those of the base's harmonics over its level."""
+    """Return the standard errors of residual and ratio; ``base_u`` has those of the harmonics over level."""
     return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
 
 
 def _behind(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
-    """Return the latest point far enough from the last one to define a direction, else the first."""
+    """Return the latest point that is far enough from the last to define a direction, else the first."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

@@ -1,4 +1,4 @@
-"""Controller that follows a branch: it predicts along the arc, and corrects until the base is a sine.
+"""Controller that follows a branch: it predicts along the arc, and corrects until the base moves as a sine.
 
 Small perturbations of the drive show whether the motion would be stable without feedback.
 """
@@ -46,35 +46,35 @@ from .open_loop_multiplier import (
 
 _MOST_TRIES = 8
 _FIRST_TRIES = 30
-"""Tries for the first point, where the model without stops may be inaccurate."""
+"""Number of tries for the first point, where the model without stops may be inaccurate."""
 _NEAR = 0.3
 """Largest relative error of the level at which the unknowns of the first motion are varied one by one."""
 _SHORTEST_STEP = 1 / 64
-"""Shortest step, as a part of the plan's step."""
+"""Shortest step relative to the step of the plan."""
 _GROWTH, _EASY = 1.5, 3
-"""Growth factor of a step, if the last point took at most this many tries."""
+"""Factor by which steps grow, and maximum tries of the last point for this growth."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
-"""Variations of the unknowns: the first two in steps, harmonics over the level."""
+"""Variations of the unknowns: frequency and first coefficient in steps, harmonics relative to the level."""
 _BELOW = 5.0
-"""Distance of the first coefficient's start below the model's value, in steps."""
+"""Start value of the first coefficient below the model's value, in steps."""
 _ABOVE = 8.0
-"""Distance of its start above the model's value, in steps: a factor of three."""
+"""Start value of the first coefficient above the model's value, in steps; it is a factor of three."""
 _LOWERED, _CALM = 0.3, 0.03
-"""Largest decrease of the first coefficient per try [steps], and largest base harmonics over the level for a
-decrease. Both are small because a motion with impacts is easily lost."""
+"""Largest decrease of the first coefficient per try [steps]; largest base harmonics relative to the level
+for a decrease. Both are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
-"""Bounds on the change of the base level per step of the first coefficient during the increase."""
+"""Limits of the change of base level per step of the first coefficient, on the way to the level."""
 _LEAST_CHANGE = 0.01
-"""Smallest change in steps from which the slope is computed."""
+"""Smallest change of the first coefficient from which this slope is computed [steps]."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Parts of the tolerance for fundamental and harmonics of a point; small, as folds move with the level."""
+"""Shares of the tolerance for fundamental and harmonics of a point; small, because folds move with level."""
 _BEND_HZ = 0.05
 
 
 def follow_branch(loop: SineLoop, plan: BranchContinuation) -> Controller[None]:
-    """Start from rest, follow the branch until it ends or leaves its range, and ramp down.
+    """Ramp up from rest, follow the branch until it ends or leaves its range, and ramp down.
 
-    Raises LimitExceeded before anything is yielded if the loop would not hold the branch.
+    Raises LimitExceeded before anything is played if, by the model, the loop would not hold the branch.
     """
     fast = fast_loop(loop.rig)
     require_held(fast, plan)
@@ -129,7 +129,7 @@ def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Contr
 
 
 def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[MeasuredPoint, int] | None]:
-    """Increase the drive until the base has its level; return the first motion reached from rest."""
+    """Change the drive until the base has its level; return the first motion and the number of tries."""
     predicted = solver.first()
     unknowns = predicted.unknowns.copy()
     above = player.plan.begin_from == "above"
@@ -144,22 +144,22 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
         harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
         before, unknowns = seen, solver.correct(harmonics, predicted)
-        # Use a secant here: nonzero harmonics change the level too, so that no bracket stays valid.
+        # A secant is used: nonzero harmonics change the level too, so that no bracket stays valid.
         unknowns[1] = seen.unknowns[1]
         if not above or np.abs(seen.residual[1:]).max() <= _CALM:
             unknowns[1] -= min(max(wrong / slope, -most), most)
     if abs(wrong) > _NEAR:
         return None
-    # Level and harmonics interact. They converge slowly if all unknowns were always changed together.
+    # Level and harmonics interact; changing all unknowns together would converge slowly.
     yield from _probe(player, solver, seen, len(seen.unknowns))
     return (yield from _correct(player, solver, replace(predicted, unknowns=seen.unknowns)))
 
 
 def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, columns: int) -> Controller[None]:
-    """Return to the last point, and update the derivative by varying the first unknowns one by one.
+    """Return to the last point, and update the derivative by varying its first unknowns one by one.
 
-    The derivatives by frequency and first coefficient change most. Those by the harmonics are learnt from
-    joint changes, and can make the equations unsolvable near a fold.
+    The derivatives with respect to frequency and first coefficient change most. Those with respect to
+    harmonics are learnt from joint changes, and can make the equations unsolvable near a fold.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
@@ -172,7 +172,7 @@ def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, colu
 def _correct(
     player: BranchPlayer, solver: BranchSolver, predicted: PredictedPoint
 ) -> Controller[tuple[MeasuredPoint, int] | None]:
-    """Find the point of the branch near a prediction; return it and the number of tries."""
+    """Return the point of the branch near a prediction, and the number of tries; None if not found."""
     unknowns = predicted.unknowns
     for tries in range(1, _MOST_TRIES + 1):
         seen = yield from _look_at(player, solver, unknowns)
@@ -220,30 +220,30 @@ def _record(
 
 
 def _is_sine(residual: Vector, tolerance: float) -> bool:
-    """Return whether fundamental and harmonics of the base are within the tolerance."""
+    """Return whether fundamental and harmonics of the base are within their shares of the tolerance."""
     harmonics = np.hypot(residual[1::2], residual[2::2])
     return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
 
 
 _EACH = 5
-"""Periods per change: short compared with the growth, long compared with the upper modes."""
+"""Periods per change; short compared with the growth of deviations, long compared with the upper modes."""
 _LEAD, _TRIAL = 3, 8
-"""Number of changes before the evaluated ones, and in the trial that finds their size."""
+"""Number of changes before the evaluated ones, and in the trial that finds the size of changes."""
 _CHANGED = (0, 2)
-"""Perturbed coefficients: the first, and the third, at which the specimen also drives the table."""
+"""Coefficients that are perturbed: the first, and the third, where the specimen also drives the table."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
-"""Size of the trial's change, and largest size, over the first coefficient."""
+"""Size of changes in the trial, and largest size, relative to the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0
-"""A motion has changed if it differs by more than this share and this number of standard errors."""
+"""A motion counts as changed if it differs by more than this share and this many standard errors."""
 _NEVER = 1e-9
 
 
 def perturbed_stability(
     player: BranchPlayer, channels: FeedbackChannels, setting: LoopSetting, number: int, before: LoopLook
 ) -> Controller[BranchStabilityNote]:
-    """Play small changes of the drive, then the same with opposite sign; measure the motion before and after.
+    """Play small changes of the drive, then the same with opposite sign; return the note on stability.
 
-    A trial finds the size for which base and m0 change by the plan's limit.
+    A trial finds the size at which base or m0 changes by the limit of the plan.
     """
     plan, frequency_hz = player.plan, setting.frequency_hz
     period = channels.sample_rate_hz / frequency_hz
@@ -261,7 +261,7 @@ def perturbed_stability(
 
 
 def _changes(count: int, seed: int) -> Coefficients:
-    """Return random signs, shape (count, coefficients)."""
+    """Return random changes with parts of either sign, magnitude 1, shape (count, coefficients)."""
     corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
     return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 
@@ -269,7 +269,7 @@ def _changes(count: int, seed: int) -> Coefficients:
 def _play_changes(
     player: BranchPlayer, setting: LoopSetting, course: Coefficients, segment: Segment | None
 ) -> Controller[list[PhaseSamples]]:
-    """Play the changes one after another, connected by half cosines."""
+    """Play changes one after another, connected along half cosines; return the samples of each."""
     phases = []
     state = RunState.SETTLING if segment is None else RunState.RECORDING
     length_s = _EACH / setting.frequency_hz
@@ -289,7 +289,7 @@ def _join(phases: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Sampl
 def _fit(
     phases: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
-    """Fit the recorded motion; undetermined if samples between phases are missing (a held run)."""
+    """Return the fitted multiplier; undetermined if samples between phases are missing (a held run)."""
     if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(phases)):
         return OpenLoopMultiplier(nan, nan)
     base, m0 = _join(phases, channels)
@@ -301,13 +301,13 @@ def _fit(
 def stability_note(
     found: OpenLoopMultiplier, number: int, perturbation: float, before: LoopLook, after: LoopLook
 ) -> BranchStabilityNote:
-    """Return the note on a fit; undetermined if the held motion has changed meanwhile."""
+    """Return the note on a fit; undetermined if the held motion has changed during the perturbation."""
     error = float(np.hypot(before.m0_u[0], after.m0_u[0]) / abs(before.m0_m[0]))
     moved = float(abs(abs(after.m0_m[0] / before.m0_m[0]) - 1))
     low, high = found.bounds
     stability = Stability.OPEN
     if moved <= max(_SAME, _ERRORS * error):
-        # Comparisons with NaN are false, which means not determined.
+        # Comparisons with NaN are false; the stability is then not determined.
         stability = Stability.STABLE if high < 1 else Stability.UNSTABLE if low > 1 else Stability.OPEN
     known = isfinite(found.size) and isfinite(found.error)
     return BranchStabilityNote(

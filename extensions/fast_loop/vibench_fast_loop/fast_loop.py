@@ -35,12 +35,12 @@ from .protocol import LoopBlock, LoopFeedback
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
-"""Largest loop multiplier allowed along a branch: deviations fall to a third within a hundred periods."""
+"""Largest multiplier allowed along a branch; deviations then fall to a third within a hundred periods."""
 
 
 @dataclass(frozen=True, eq=False)
 class FastLoop:
-    """The plant of a rig according to its configuration, and its law."""
+    """The law of a rig, and the plant described by the rig's configuration."""
 
     rig: Rig
     plant: SampledPlant
@@ -48,7 +48,7 @@ class FastLoop:
 
     @property
     def feedback(self) -> LoopFeedback:
-        """The law with sensor voltages as input, as a controller uses it."""
+        """The law for a controller, with sensor voltages as input."""
         units = np.array(_units_per_volt(self.rig))
         return LoopFeedback(
             step=_rows(self.law.step),
@@ -58,16 +58,15 @@ class FastLoop:
         )
 
     def gains(self, frequency_hz: float, harmonics: int) -> Coefficients:
-        """Return base displacement per volt for each harmonic, from the model [m/V], shape (harmonics,)."""
+        """Return base displacement per volt at each harmonic, from the model [m/V], shape (harmonics,)."""
         orders = range(1, harmonics + 1)
         return np.array([loop_transfer(self.plant, self.law, k * frequency_hz) for k in orders])
 
     def motions(self, blocks: Sequence[LoopBlock], frequency_hz: float) -> tuple[Coefficients, Coefficients]:
-        """Return displacements of base and m0 per block, from the first harmonic on [m], shape (blocks,
-        orders).
+        """Return displacements of base and m0 from the first harmonic on [m], shapes (blocks, orders).
 
-        A sample is the mean since the previous one, which causes half a step of delay and a slight
-        attenuation.
+        A sample is the mean since the previous sample. This delays it by half a step and attenuates it
+        slightly; both effects are corrected.
         """
         orders, rate_hz = np.arange(1, len(blocks[0].base)), self.plant.timing.rate_hz
         turning = 2j * pi * frequency_hz * orders
@@ -80,7 +79,7 @@ class FastLoop:
 
 
 def fast_loop(rig: Rig) -> FastLoop:
-    """Return the law of the rig's controller; raises ConfigurationError without a controller."""
+    """Return the law of the rig's controller; raises ConfigurationError if the rig has no controller."""
     controller = rig.controller
     if controller is None:
         raise ConfigurationError(
@@ -94,10 +93,10 @@ def fast_loop(rig: Rig) -> FastLoop:
 
 
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
-    """Refuse a branch that the loop does not hold according to the model.
+    """Refuse a branch that the loop would not hold according to the model.
 
-    Raises LimitExceeded with the largest multiplier and the range that would be held, or why they are
-    unknown. Nothing was played.
+    Raises LimitExceeded with the largest multiplier and the range that would be held, or with the reason why
+    they are unknown. Nothing has been played then.
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
     unknown = "whether the fast loop holds the branch is not known: "
@@ -140,7 +139,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
 
 
 def level_at(plan: BranchContinuation, frequency_hz: float) -> float:
-    """Return the controlled amplitude of the base's displacement [m]."""
+    """Return the required amplitude of the base displacement [m]."""
     return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2
 
 
@@ -162,26 +161,26 @@ def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 Points = NDArray[np.int64]
 Begin = Literal["rest", "above"]
 _POINTS = 25
-"""Number of motions to check along a branch; also stable ones, which a delayed law may destabilise."""
+"""Number of motions checked along a branch; stable ones too, because a delayed law may destabilise them."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Numbers of periods to try, and tolerance: the smallest with a whole number of samples is used."""
+"""Numbers of periods to try, and tolerance; the smallest number with whole samples is used."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Samples per period for the slope of the spring; more with stops."""
+"""Samples per period for the slope of the spring force, without and with stops."""
 _PART_S = 1e-6
-"""Longest part of a sample with one value for the stops' slope [s]; a contact lasts a hundred parts."""
+"""Longest part of a sample for which the slope of the stops is constant [s]; a contact has a hundred."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
-"""Decreasing levels, over the required one, that lead to a motion with impacts."""
+"""Decreasing levels, relative to the required level, that lead to a motion with impacts."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """How far, and how well, a law holds the motions of a branch from its start on."""
+    """How far along a branch, and how well, a law holds the motions from the start on."""
 
     multiplier: float
-    """Largest multiplier over a period with the law."""
+    """Largest multiplier over a period under the law, among the checked motions."""
     at_hz: float
     held_hz: float | None
-    """End of the range in which every motion is held [Hz]; None if the first is not."""
+    """End of the range in which every motion is held [Hz]; None if the first motion is not held."""
     folds: int
     end: ArcEnd | None
 
@@ -196,27 +195,27 @@ def branch_hold(
     way: Literal["up", "down"] = "up",
     allowed: float = 1.0,
 ) -> BranchHold | None:
-    """Follow the model's branch at one base level, and evaluate its stability under a law.
+    """Return the stability under a law of the model's branch at one base level.
 
     Parameters
     ----------
     plant, law
-        Plant and law as known to the host; the specimen has no rigid stops.
+        Plant and law as known to the host computer; the specimen has no rigid stops.
     level_m
-        Amplitude of the base's displacement [m].
+        Amplitude of the base displacement [m].
     start_hz, range_hz
         Start and range of the branch [Hz].
     begin
-        Approach to the level: from rest, or from three times the level, where motions with impacts are found;
+        Approach to the level: from rest, or from three times the level, which finds motions with impacts;
         always from rest without stops.
     way
-        Initial direction of frequency.
+        Direction in which the frequency changes first.
     allowed
-        Largest multiplier of a held motion.
+        Largest multiplier with which a motion counts as held.
 
     Returns
     -------
-    None if the model has no motion at the start.
+    Multiplier and held range; None if the model has no motion at the start.
     """
     spring = spring_of(plant.specimen)
     if spring.kinks:
@@ -252,7 +251,7 @@ def impact_branch(
     range_hz: tuple[float, float],
     begin: Begin,
 ) -> Branch | None:
-    """Return the branch with impacts that a loop would follow; None if no motion repeats at its start."""
+    """Return the branch with impacts that a loop would follow; None if no periodic motion is found."""
     state = None
     for factor in (1.0,) if begin == "rest" else _FROM_ABOVE:
         orbit = periodic_orbit(specimen, Harmonic(start_hz, factor * level_m), start=state)
@@ -265,7 +264,7 @@ def impact_branch(
 def _last_held(
     plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
 ) -> int | None:
-    """Return the last motion up to which a law holds all; None if it does not hold the first."""
+    """Return the last motion before the first that is not held; None if the first motion is not held."""
     first = int(np.argmax(held > allowed))
     if held[first] <= allowed:
         return int(points[-1])
@@ -287,15 +286,15 @@ def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, poin
     Parameters
     ----------
     plant, law
-        See `loop_multiplier`.
+        As in `loop_multiplier`.
     branch
         Branch of the plant's specimen.
     points
-        Indices of its motions.
+        Indices of the motions.
 
     Returns
     -------
-    Magnitudes, shape (points,).
+    Magnitudes of the largest multipliers, shape (points,).
     """
     rate_hz = plant.timing.rate_hz
     courses = [motion_slopes(plant.specimen, branch, point, rate_hz) for point in points]
@@ -305,20 +304,20 @@ def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, poin
 def motion_slopes(
     specimen: Specimen, branch: Branch, point: int, rate_hz: float
 ) -> tuple[Floats, Floats, int, int]:
-    """Return the slopes of the spring force along one motion of a branch, with all harmonics.
+    """Return the slopes of the spring force along one motion of a branch, including all harmonics.
 
     Parameters
     ----------
     specimen, branch
-        The branch of the specimen.
+        Specimen, and a branch of its motions.
     point
         Index of the motion.
     rate_hz
-        Sample rate.
+        Sample rate of the controller [Hz].
 
     Returns
     -------
-    Stiffness, damping, periods and parts for `loop_multiplier`.
+    Stiffness, damping, number of periods, and parts per sample, for `loop_multiplier`.
     """
     spring = spring_of(specimen)
     drive = Harmonic(float(branch.frequencies_hz[point]), float(branch.amplitudes_m[point]))

@@ -1,4 +1,4 @@
-"""A branch held by a fast loop: its points in recorded order, and their figure with the model's branch."""
+"""A branch held by a fast loop: its points in recorded order, and a figure with the model's branch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -35,7 +35,7 @@ from vibench.sim import Branch, Specimen
 from .fast_loop import impact_branch
 
 _LEAST = 3
-"""Fewest points in which a turn of the frequency can be found."""
+"""Minimum number of points for a turn of the frequency."""
 
 
 @dataclass(frozen=True)
@@ -46,19 +46,19 @@ class HeldBranch(Labelled):
     base_m: Reals
     m0_m: Reals
     phase_deg: Reals
-    """Phase of m0 relative to the base, for displacements."""
+    """Phase of m0 relative to the base, both as displacements."""
     residue: Reals
-    """Rms of the base's displacement harmonics from the second on, over its fundamental."""
+    """Rms of the second and higher harmonics of the base displacement, relative to its fundamental."""
     residue_acceleration: Reals
     stability: tuple[str, ...]
-    """Stability without feedback under a sinusoidal base: a value of `Stability`; empty if not measured."""
+    """Stability without feedback under a sinusoidal base: values of `Stability`; empty if not measured."""
     multiplier: Reals
     """Largest multiplier over a period, from small perturbations; NaN if undetermined."""
     multiplier_u: Reals
 
     @property
     def folds(self) -> tuple[int, ...]:
-        """Points at which the frequency turned; the branch runs backwards between two of them."""
+        """Indices of points at which the frequency turned; the branch runs backwards between two of them."""
         if self.frequency_hz.size < _LEAST:
             return ()
         ways = np.sign(np.diff(self.frequency_hz))
@@ -66,7 +66,7 @@ class HeldBranch(Labelled):
 
 
 def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
-    """Return the points in a fast loop's notes; empty if there are none."""
+    """Return the points in the notes of a fast loop; empty arrays if there are none."""
     points = [each for each in notes if isinstance(each, BranchPointNote)]
     by_point = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
     stabilities = [by_point.get(each.point) for each in points]
@@ -82,7 +82,7 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
 
 
 def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
-    """Return the extent of a branch and its turning points, in sentences."""
+    """Return sentences on the extent of a branch, its turning points and its end."""
     found, ends = held_branch(notes), [each for each in notes if isinstance(each, BranchEndNote)]
     if not found.frequency_hz.size:
         return ("No motion of the branch was held.",)
@@ -107,11 +107,11 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
 
 _HEIGHT_IN = 4.4
 _ROOM_HZ = 1.0
-"""Range of the model's branch beyond the held points."""
+"""Margin of the model's branch beyond the held points [Hz]."""
 
 
 def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
-    """Draw amplitude and phase of m0 over frequency, in recorded order, with the model's branch."""
+    """Draw the amplitude of m0 over frequency at the held points, with the model's branch."""
     found = held_branch(analysis.facts.feedback)
     scale, unit = prefixed(float(np.max(found.m0_m, initial=1e-9)), "m")
     with styled():
@@ -138,7 +138,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
 
 
 def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
-    """Group the points by stability if measured, else by direction of frequency, with plot styles."""
+    """Return label, points and plot style by measured stability, else by direction of the branch."""
     filled: dict[str, Any] = {"marker": "o"}
     empty = filled | {"markerfacecolor": "white"}
     if any(found.stability):
@@ -156,7 +156,7 @@ def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, 
 
 
 def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:
-    """Return the model's branch through the range of the held points; None without a motion at its start."""
+    """Return the model's branch through the range of the held points; None if it has no motion there."""
     if not found.frequency_hz.size:
         return None
     amplitude_m, first_hz = float(np.median(found.base_m)), float(found.frequency_hz[0])

@@ -1,7 +1,7 @@
-"""The linear law of a controller: a Kalman filter of the sampled plant, and feedback of its estimate.
+"""Linear law of a controller: a Kalman filter of the sampled plant, and feedback of its estimate.
 
-A controller that cannot run it uses a law of two gains. Multipliers of plant and law together show whether a
-motion is stable.
+For a controller that cannot run this law there is a law of two gains. Multipliers of plant and law together
+show whether a motion is stable.
 """
 
 from dataclasses import dataclass
@@ -17,41 +17,41 @@ from vibench.sim.specimen.state import Table, Vector
 
 from .plant import SampledPlant
 
-# Weights of the design: sizes of motion, voltage and noise.
+# Weights of the design: expected sizes of motion, voltage and noise.
 RELATIVE_M = 3e-5
-"""Motion of p that costs as much as a tenth of a volt of control [m]."""
+"""Motion of p with the same cost as a control voltage of 0.1 V [m]."""
 PUSH_N = 3e-3
-"""Unknown force between m1 and m2 assumed by the filter, rms over a step [N]."""
+"""Unknown force between m1 and m2 that the filter assumes, rms over a step [N]."""
 VOLT = 1e-2
-"""Unknown voltage assumed by the filter [V]."""
+"""Unknown voltage that the filter assumes, rms [V]."""
 NOISE = 0.2, 1e-4
-"""Noise of a sample: of the base acceleration [m/s2] and of the m0 velocity [m/s]."""
+"""Noise per sample of the base acceleration [m/s2] and of the m0 velocity [m/s], rms."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearLaw:
-    """Voltage u from samples s: u = output @ memory + direct @ s, then memory = step @ memory + inlet @ s."""
+    """Voltage u from samples s: u = output @ memory + direct @ s; then memory = step @ memory + inlet @ s."""
 
     step: Table
-    """Shape (n, n)."""
+    """Matrix of shape (n, n)."""
     inlet: Table
-    """Shape (n, 2), per m/s2 of the base and per m/s of m0."""
+    """Matrix of shape (n, 2), per m/s2 of the base and per m/s of m0."""
     output: Table
-    """Shape (1, n) [V]."""
+    """Matrix of shape (1, n) [V]."""
     direct: Table
-    """Shape (1, 2)."""
+    """Matrix of shape (1, 2), volts per m/s2 of the base and per m/s of m0."""
 
 
 def design_law(plant: SampledPlant) -> LinearLaw:
     """Return the law that damps the spring between m1 and m2.
 
     Linear-quadratic Gaussian control (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch.
-    9), with the estimate at the time of the sample.
+    9). The estimate includes the present sample.
 
     Parameters
     ----------
     plant
-        The known plant; the law includes its latency.
+        Plant model for the design; the law accounts for its latency.
     """
     step, volt, shown, cost, unknown, noise = _weigh(plant)
     value = solve_discrete_are(step, volt[:, None], cost, np.eye(1))
@@ -64,18 +64,18 @@ def design_law(plant: SampledPlant) -> LinearLaw:
 
 
 def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
-    """Return the law of two gains with the lowest cost of `design_law`, for controllers that allow no other.
+    """Return the law of two gains with the lowest cost in `design_law`, for controllers limited to such laws.
 
-    ``u = -(kp s + kd d)`` of one sample s and its rate of change behind a low-pass ``d += a ((s - before) /
-    step - d)``, ``a = step / (tau + step)``. The gains and tau minimise the expected cost (W. S. Levine and
-    M. Athans, IEEE Trans. Autom. Control 15 (1970) 44).
+    ``u = -(kp s + kd d)`` for one sample s and its low-pass filtered rate ``d += a ((s - before) / step -
+    d)``, where ``a = step / (tau + step)``. Gains and tau minimise the expected cost (W. S. Levine and M.
+    Athans, IEEE Trans. Autom. Control 15 (1970) 44).
 
     Parameters
     ----------
     plant
-        The known plant; the law includes its latency.
+        Plant model for the design; the law accounts for its latency.
     sample
-        Sample that is fed back: 0 the base's acceleration, 1 m0's velocity.
+        Index of the sample that is fed back: 0 for base acceleration, 1 for m0 velocity.
     """
     problem, step_s = _weigh(plant), plant.timing.step_s
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
@@ -98,7 +98,7 @@ def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
 
 
 class _WeightedPlant(NamedTuple):
-    """A plant scaled to the sizes of its motions, with the cost matrices."""
+    """A plant scaled by the sizes of its motions, with matrices of cost and noise."""
 
     step: Table
     volt: Vector
@@ -125,7 +125,7 @@ def _weigh(plant: SampledPlant) -> _WeightedPlant:
 
 
 def _expected_cost(problem: _WeightedPlant, law: LinearLaw) -> float:
-    """Return the mean cost per sample under noise; infinite for an unstable loop."""
+    """Return the mean cost per sample under noise; infinite if the loop is unstable."""
     answer = np.hstack([law.direct @ problem.shown, law.output])[0]
     own = len(problem.step)
     closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])
@@ -149,21 +149,21 @@ def loop_multiplier(
     periods: int = 1,
     parts: int = 1,
 ) -> float:
-    """Return the largest multiplier of a motion over a period under a law; below 1 the motion is held.
+    """Return the largest multiplier of a motion over a period under a law; below 1, the motion is held.
 
     Parameters
     ----------
     plant
-        The driven plant, which may differ from that of the design.
+        The plant that is driven; it may differ from the plant for which the law was designed.
     law
-        A law designed for this or another latency.
+        A law, designed for this or another latency.
     stiffness, damping
-        Slopes dF/dp [N/m] and dF/d(dp/dt) [N s/m] of the stops' force along the motion, in the middle of each
+        Slopes dF/dp [N/m] and dF/d(dp/dt) [N s/m] of the stops' force along the motion, at the middle of each
         part of each sample, shape (samples * parts,).
     periods
-        Periods covered by the slopes; the number of samples must be whole, or nearly so.
+        Number of periods covered by the slopes; their number of samples must be (nearly) whole.
     parts
-        Parts per sample, because contacts are shorter than a sample.
+        Number of parts per sample; contacts are shorter than a sample.
     """
     stretches = _tables_of_step(plant, law, parts)
     into, relative = (np.pad(each, (0, len(stretches[0]) - plant.size)) for each in plant.spring)
@@ -184,9 +184,9 @@ def loop_multiplier(
 
 
 def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> complex:
-    """Return the base's displacement per volt of the program, with the law active [m/V].
+    """Return the base displacement per volt of the program, with the law active [m/V].
 
-    Phases refer to the sample times; the motion is the one without stops.
+    Phases refer to the sample times; the motion is that without stops.
     """
     before, after = _tables_of_step(plant, law, 1)
     played = np.concatenate([plant.stretches()[0][1], np.zeros(len(law.step)), [1.0]])
@@ -195,7 +195,7 @@ def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> c
 
 
 def _tables_of_step(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
-    """Return the matrices of a step's sections; the state is plant, memory of the law, and voltage."""
+    """Return the matrices of the sections of a step; the state is plant, law memory, and voltage."""
     own, memory = plant.size, len(law.step)
     answer = np.hstack([law.direct @ plant.shown, law.output])
     (first, of_first), *others = plant.stretches(parts)

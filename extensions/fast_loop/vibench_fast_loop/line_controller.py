@@ -17,12 +17,12 @@ _PART = 0.01
 """Largest relative deviation of rate, limit and watchdog time from the configuration."""
 _LEAVING_S = 0.1
 _LONGEST_LINE = 1_000_000
-"""Longest answer that is read [bytes], because a faulty controller may never end its line."""
+"""Longest answer that is read [bytes]; a faulty controller may never end its line."""
 Answer = TypeVar("Answer", bound=BaseModel)
 
 
 class LineController:
-    """The host's side of a connection to a real-time controller."""
+    """The host's end of a connection to a real-time controller."""
 
     def __init__(self, link: Link, config: ControllerConfig) -> None:
         self._link = link
@@ -32,7 +32,7 @@ class LineController:
 
     @classmethod
     def open(cls, config: ControllerConfig) -> Self:
-        """Connect, silence the output, and compare the controller with its configuration."""
+        """Connect, silence the output, and check the controller against its configuration."""
         if not config.resource:
             raise ConfigurationError(
                 "controller.resource is empty, and only a virtual rig knows where its controller is; give "
@@ -62,19 +62,19 @@ class LineController:
         return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Change to a program."""
+        """Change to a program; return the report."""
         return self._request(LoopRequest(ask="play", program=program), LoopReport)
 
     def report(self) -> LoopReport:
-        """Return the blocks measured since the last report."""
+        """Return the state and the blocks measured since the last report."""
         return self._request(LoopRequest(ask="report"), LoopReport)
 
     def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp down to silence."""
+        """Ramp the output down to silence; return the report."""
         return self._request(LoopRequest(ask="silence", ramp_s=ramp_s), LoopReport)
 
     def close(self) -> None:
-        """Silence the output and close the connection; if it is lost, the watchdog silences the output."""
+        """Silence the output and close the connection; if this fails, the watchdog silences the output."""
         if self._is_open:
             try:
                 self.silence(_LEAVING_S)

@@ -1,4 +1,4 @@
-"""A real-time controller as a drive: sends programs, and requests reports while it plays."""
+"""A real-time controller as a drive: it receives programs, and sends reports while it plays."""
 
 from collections.abc import Callable, Iterable, Iterator
 
@@ -11,20 +11,20 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import ControllerDriver, LoopBlock, LoopController, LoopProgram, LoopState, ProgramTone
 
 TALK = 0.25
-"""Longest interval between requests, as a part of the watchdog's time."""
+"""Longest interval between requests, relative to the time of the watchdog."""
 QUICK_S = 0.1
-"""Ramp duration when no samples are counted [s]."""
+"""Ramp duration for silence outside ramp phases [s]."""
 _ROUNDING_S = 1e-9
 
 
 class LoopDrive:
-    """A `Drive` that ramps, glides and falls silent by itself."""
+    """A `Drive` whose controller ramps, glides and falls silent by itself."""
 
     drive_source = DriveSource.CONTROLLER
     is_commanded = False
     pause_s = 0.0
     can_hold = False
-    """It cannot hold unattended, because the watchdog needs requests."""
+    """Whether it can hold its output unattended: no, because the watchdog needs requests."""
 
     def __init__(self, controller: LoopController, measurement: Measurement) -> None:
         self._controller = controller
@@ -40,7 +40,7 @@ class LoopDrive:
 
     @property
     def setting_vpp(self) -> float:
-        """Twice the fundamental of its program [V]; 0 in silence."""
+        """Twice the fundamental of the program [V]; 0 in silence."""
         return 0.0 if self._program is None else 2 * abs(complex(*self._program.reference_v[0]))
 
     @property
@@ -54,13 +54,13 @@ class LoopDrive:
         return tuple(self._blocks)
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Do nothing; the controller is silent already."""
+        """Do nothing; the controller is already silent."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
         """Do nothing."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Play a phase with regular requests; yields the reading time until the next one [s]."""
+        """Play a phase with regular requests; yield the reading time before each request [s]."""
         self._blocks = []
         if phase.state is RunState.RAMPING_DOWN:
             self._silence(phase.duration_s)
@@ -71,16 +71,16 @@ class LoopDrive:
         yield from self._talking(phase.duration_s)
 
     def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
-        """Ramp down by the controller's clock."""
+        """Ramp down, timed by the clock of the controller."""
         self._silence(ramp_s)
         yield from self._talking(ramp_s)
 
     def cut(self) -> None:
-        """Silence the output at once."""
+        """Silence the output without a ramp."""
         self._silence(0.0)
 
     def silence(self) -> None:
-        """Silence the output, whatever the state."""
+        """Silence the output in any state."""
         self._silence(QUICK_S)
 
     def _play(self, play: Play, ramp_s: float | None) -> None:
@@ -98,7 +98,7 @@ class LoopDrive:
         if ramp_s is not None:
             next_program = next_program.model_copy(update={"glide_s": ramp_s})
         if next_program != self._program:
-            # Set before the command, so that a failed command counts as playing.
+            # Set the program before the command, so that a failed command counts as playing.
             self._program = next_program
             self._controller.play(next_program)  # discards the blocks of the previous program
 

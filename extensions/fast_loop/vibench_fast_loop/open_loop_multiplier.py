@@ -1,21 +1,21 @@
 """Stability of a held motion without feedback, estimated from small perturbations of the drive.
 
-Near a motion of period T the specimen obeys a linear equation with T-periodic coefficients, driven by the
+Near a motion of period T, the specimen obeys a linear equation with T-periodic coefficients, driven by the
 deviations of the base from its sine. Controller, amplifier, shaker and the reaction of the specimen on the
-table act on the specimen through the base alone. The base is measured and used as the input, so the fit
-describes the open loop: its multipliers are those under a prescribed base motion, for any law, known or not.
-D. A. W. Barton, Mech. Syst. Signal Process. 84 (2017) 54, fits a periodic autoregression with inputs for the
-same purpose.
+table act on the specimen through the base alone. The measured base is the input, so the fit describes the
+open loop: its multipliers are those under a prescribed base motion, for any law, known or not. D. A. W.
+Barton, Mech. Syst. Signal Process. 84 (2017) 54, fits a periodic autoregression with inputs for the same
+purpose.
 
-Where a multiplier is near 1, small deviations are slow compared with the drive, and complex envelopes
-describe them: z of m0 at the drive frequency, b1 and b3 of the base at one and three times that. Fast parts
-(the upper modes, the third harmonic of m0) follow them, and are expanded in derivatives of the input:
+If a multiplier is near 1, small deviations are slow compared with the drive, and complex envelopes describe
+them: z of m0 at the drive frequency, b1 and b3 of the base at one and three times this frequency. Fast parts
+(upper modes, third harmonic of m0) follow them, and are expanded in derivatives of the input:
 
 dz/dt = A z + B0 b1 + B1 db1/dt + B2 d2b1/dt2 + C0 b3 + C1 db3/dt,
 
-each letter a real 2 x 2 matrix on real and imaginary part, since springs that change twice a period couple a
-deviation to its conjugate. Multipliers: exp(T eig A). Both harmonics must be perturbed independently, because
-the specimen also drives the table at three times the frequency, and b3 would otherwise follow from z.
+where each letter is a real 2 x 2 matrix for real and imaginary part, as springs that change twice a period
+couple a deviation to its conjugate. Multipliers are exp(T eig A). Both harmonics must be perturbed
+independently: the specimen also drives the table at three times the frequency, so b3 would follow from z.
 
 Sensor noise in z and b biases least squares towards stability. Therefore the changes are played twice, the
 second time with opposite sign, and each half is the instrumental variable of the other (T. Soderstrom,
@@ -35,58 +35,58 @@ from vibench.sim.specimen.state import Table, Vector
 
 Complexes = NDArray[np.complex128]
 _HALF = 4
-"""Half length of an envelope's window [periods]."""
+"""Half length of the window of an envelope [periods]."""
 _EACH = 4
 _INPUTS = {1: 2, 3: 1}
-"""Harmonics of the base, and the highest derivative used of each."""
+"""Harmonics of the base used as inputs, with the highest derivative used of each."""
 _BLOCK = 8
-"""Periods per block; residuals of different blocks count as independent."""
+"""Number of periods in a block; residuals of different blocks count as independent."""
 _MODEL = 0.01
-"""Standard error from the truncated expansion: bias of noiseless motions (docs/decisions/0069)."""
+"""Standard error due to the truncated expansion: bias for noise-free motions (docs/decisions/0069)."""
 _QUANTILE = 2.1
-"""95 % quantile of Student's distribution for about twenty blocks."""
+"""97.5 % quantile of Student's distribution for about twenty blocks, for a 95 % interval."""
 
 
 @dataclass(frozen=True, eq=False)
 class PerturbedMotion:
-    """Base and m0 during small changes of the drive."""
+    """Samples of base and m0 during small changes of the drive."""
 
     base: Vector
-    """Acceleration, in any unit, shape (samples,)."""
+    """Base acceleration in any unit, shape (samples,)."""
     m0: Vector
-    """Velocity, in any unit, shape (samples,)."""
+    """Velocity of m0 in any unit, shape (samples,)."""
     period: float
     """Period of the drive [samples]."""
     first: int
-    """First sample of the changes; the last changes of the second half are also played before it."""
+    """Index of the first sample of the changes; before it, the last changes of the second half are played."""
     periods: int
-    """Periods of the changes; the same number follows with opposite sign."""
+    """Number of periods with changes; the same number follows with opposite sign."""
 
 
 @dataclass(frozen=True)
 class OpenLoopMultiplier:
-    """Largest multiplier over a period of a motion under a prescribed base motion."""
+    """Largest multiplier over a period, for a motion under a prescribed base motion."""
 
     size: float
     error: float
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """95 % interval."""
+        """95 % interval of the multiplier."""
         return self.size - _QUANTILE * self.error, self.size + _QUANTILE * self.error
 
 
 def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
-    """Return the largest multiplier, by a fit of the equation of slow deviations to a perturbed motion.
+    """Return the largest multiplier, from a fit of the equation of slow deviations to a perturbed motion.
 
     Parameters
     ----------
     motion
-        At least about thirty periods of changes, each several periods long.
+        Motion with at least about thirty periods of changes, each change several periods long.
 
     Returns
     -------
-    A result with a non-finite error if the changes are insufficient.
+    The multiplier; its error is not finite if the changes are insufficient.
     """
     rows = 2 * motion.periods * _EACH
     steps = motion.period / _EACH
@@ -114,7 +114,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
     Parameters
     ----------
     signal
-        At least about twenty periods, shape (samples,).
+        At least about twenty periods of the signal, shape (samples,).
     period
         Period of the drive [samples].
     """
@@ -126,7 +126,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
 
 
 def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vector) -> OpenLoopMultiplier:
-    """Return the largest multiplier and its error from residuals in blocks of periods (delta method)."""
+    """Return the largest multiplier; its error is from residuals in blocks of periods (delta method)."""
     values, vectors = np.linalg.eig(found[:2].T / scale[:2])
     most = int(np.argmax(values.real))
     mirror = np.linalg.pinv(vectors)[most]
@@ -141,7 +141,7 @@ def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vecto
 
 
 def _turn(motion: PerturbedMotion) -> Complexes:
-    """Return the carrier at the drive frequency, estimated from the base because clocks differ."""
+    """Return the carrier at the drive frequency, which is estimated from the base because clocks differ."""
     turn = np.exp(-2j * np.pi * np.arange(len(motion.base)) / motion.period)
     inside = slice(motion.first, motion.first + round(2 * motion.periods * motion.period))
     phase = np.unwrap(np.angle(_envelope(motion.base, turn, motion.period, 0)[inside]))
@@ -150,7 +150,7 @@ def _turn(motion: PerturbedMotion) -> Complexes:
 
 
 def _envelope(signal: Vector, turn: Complexes, period: float, order: int) -> Complexes:
-    """Return a derivative of an envelope, per period, with a cos^4 window of several periods."""
+    """Return a derivative of an envelope, per period, under a cos^4 window of several periods."""
     half = round(_HALF * period)
     place = np.arange(-half, half + 1) / half * np.pi / 2
     per_period = np.pi / 2 * period / half

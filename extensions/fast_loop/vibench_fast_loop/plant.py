@@ -1,4 +1,4 @@
-"""Linear equations of amplifier, shaker and specimen between two controller samples. SI units."""
+"""Linear equations of amplifier, shaker and specimen between two samples of a controller. SI units."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from vibench.sim.specimen.specimen import Specimen
 from vibench.sim.specimen.state import Table, Vector
 
 TABLE_V, M0_X = 1, 3
-"""Rows of the table velocity and the m0 displacement in the state of table and specimen."""
+"""Row numbers of table velocity and m0 displacement in the state of table and specimen."""
 SHOWN = 2
 """Number of measured quantities: base acceleration and m0 velocity."""
 
@@ -23,9 +23,9 @@ class LoopTiming:
     """Sample rate and latency of a controller."""
 
     rate_hz: float
-    """Samples per second; each is the mean since the previous one."""
+    """Samples per second; each sample is the mean since the previous sample."""
     latency_s: float
-    """Time from a sample to the voltage that depends on it [s]."""
+    """Time from a sample to the voltage that it determines [s]."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.rate_hz < np.inf and 0.0 <= self.latency_s < np.inf):
@@ -41,21 +41,21 @@ class LoopTiming:
 
 @dataclass(frozen=True, eq=False)
 class SampledPlant:
-    """Discrete-time model of the plant for one control step.
+    """Discrete-time model of the plant over one control step.
 
-    State: table (displacement, velocity, current), specimen (x, y, z and velocities), the last samples (table
-    velocity, m0 displacement), and the delayed voltages, newest first.
+    The state contains the table (displacement, velocity, current), the specimen (x, y, z and velocities), the
+    last samples (table velocity, m0 displacement), and the delayed voltages, newest first.
     """
 
     amplifier: Amplifier
-    """Its lower band edge is neglected, because it lies far below the drive."""
+    """Amplifier; its lower band edge is neglected, because it is far below the drive frequency."""
     shaker: Shaker
     specimen: Specimen
     timing: LoopTiming
 
     @cached_property
     def equations(self) -> tuple[Table, Vector]:
-        """System matrix of table and specimen, (9, 9), and the effect of a volt at the amplifier, (9,)."""
+        """System matrix of table and specimen, (9, 9), and effect of one volt at the amplifier, (9,)."""
         table = self.shaker.equations()
         specimen, mass = self.specimen, np.asarray(self.specimen.masses)
         k0, c0 = specimen.stiffnesses[0], specimen.dampings[0]
@@ -82,7 +82,7 @@ class SampledPlant:
 
     @property
     def waiting(self) -> int:
-        """Number of delayed voltages."""
+        """Number of delayed voltages in the state."""
         return ceil(self.timing.latency_s * self.timing.rate_hz * (1.0 - 1e-9))
 
     @property
@@ -92,15 +92,15 @@ class SampledPlant:
 
     @cached_property
     def scales(self) -> Vector:
-        """Sizes of the state's entries in motions of micrometres, shape (n,)."""
+        """Typical sizes of the state's entries for motions of micrometres, shape (n,)."""
         specimen = [1e-6] * 3 + [1e-3] * 3
         return np.array([1e-6, 1e-3, 1e-2, *specimen, 1e-3, 1e-6, *[1e-2] * self.waiting])
 
     def stretches(self, parts: int = 1) -> tuple[tuple[Table, Vector], ...]:
-        """Return the transitions from a step's start to its end, divided at the middle of each part.
+        """Return the transitions over a step, which is divided at the middle of each part.
 
-        Each is a state transition, (n, n), and the effect of the new voltage, (n,). The stops' force acts at
-        the divisions (Strang splitting).
+        Each transition is a pair: the state transition, (n, n), and the effect of the new voltage, (n,). The
+        force of the stops acts at the divisions (Strang splitting).
         """
         step, size = self.timing.step_s, self.size
         sampled = np.eye(size)
@@ -118,24 +118,24 @@ class SampledPlant:
 
     @cached_property
     def step(self) -> tuple[Table, Vector]:
-        """Transition of a whole step: matrices of state and new voltage, shapes (n, n) and (n,)."""
+        """Transition over a whole step: matrix of the state (n, n), and effect of the new voltage (n,)."""
         (first, volt), (second, more) = self.stretches()
         return second @ first, second @ volt + more
 
     @cached_property
     def shown(self) -> Table:
-        """Matrix of base acceleration and m0 velocity, as means since the last sample, shape (2, n)."""
+        """Matrix for base acceleration and m0 velocity, as means since the last sample, shape (2, n)."""
         rows = np.zeros((SHOWN, self.size))
         rows[0, [TABLE_V, 9]] = self.timing.rate_hz, -self.timing.rate_hz
         rows[1, [M0_X, 10]] = self.timing.rate_hz, -self.timing.rate_hz
         return rows
 
     def _stretch(self, start_s: float, stop_s: float) -> tuple[Table, Vector]:
-        """Return the transition of a part of a step, with the oldest delayed voltage and then the next."""
+        """Return the transition over a part of a step, under the oldest delayed voltage and then the next."""
         late_s = self.timing.latency_s - max(self.waiting - 1, 0) * self.timing.step_s
         change_s = min(max(late_s, start_s), stop_s)
         matrix, newest = np.eye(self.size), np.zeros(self.size)
-        # The list of delayed voltages ends with the oldest; the new voltage precedes them.
+        # The list of delayed voltages ends with the oldest voltage; the new voltage precedes the list.
         columns = [*range(11, self.size)][::-1]
         for place, (begin_s, end_s) in enumerate(((start_s, change_s), (change_s, stop_s))):
             moved, gain = _driven(*self.equations, end_s - begin_s)

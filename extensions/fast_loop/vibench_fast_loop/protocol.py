@@ -1,7 +1,7 @@
 """Messages between a host, which sends programs, and a controller, which returns Fourier coefficients.
 
 Version 1 of the protocol. Each message is one line of JSON, answered by one line; the host always begins.
-``{"vibench_loop": 1, "ask": "hello" | "play" | "report" | "silence", ...}``; docs/feedback.md has the rest.
+``{"vibench_loop": 1, "ask": "hello" | "play" | "report" | "silence", ...}``; the rest is in docs/feedback.md.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from vibench.sim import FrozenModel
 LOOP_PROTOCOL: Final = 1
 MOST_HARMONICS = 20
 MOST_MEMORY = 64
-"""Largest size of a feedback's memory."""
+"""Largest number of state variables of a feedback law."""
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = tuple[Finite, ...]
 Pair = tuple[Finite, Finite]
@@ -26,16 +26,16 @@ Pair = tuple[Finite, Finite]
 
 
 class LoopFeedback(FrozenModel):
-    """A linear law: u = output m + direct s, then m = step m + inlet s; s the input volts, m the memory."""
+    """A linear law: u = output m + direct s; then m = step m + inlet s, for input volts s and memory m."""
 
     step: tuple[Row, ...] = Field(max_length=MOST_MEMORY)
-    """Shape (n, n)."""
+    """Matrix of shape (n, n), as rows."""
     inlet: tuple[Row, ...]
-    """Shape (n, 2) [per V]."""
+    """Matrix of shape (n, 2), as rows [per V]."""
     output: Row
-    """Shape (n,) [V]."""
+    """Row of shape (n,) [V]."""
     direct: Row
-    """Shape (2,) [V/V]."""
+    """Row of shape (2,) [V/V]."""
 
     @model_validator(mode="after")
     def _shapes_agree(self) -> Self:
@@ -50,23 +50,23 @@ class LoopFeedback(FrozenModel):
 
 
 class LoopProgram(FrozenModel):
-    """What a controller plays: a Fourier series plus the output of a law.
+    """What a controller plays: a Fourier series plus the output of a feedback law.
 
-    ``v(t) = sum Re(reference_k exp(i k theta)) + u``; theta is the controller's phase, which is continuous
-    from program to program.
+    ``v(t) = sum Re(reference_k exp(i k theta)) + u``, where theta is the phase of the controller; it is
+    continuous from program to program.
     """
 
     frequency_hz: PositiveFloat
     reference_v: tuple[Pair, ...] = Field(min_length=1, max_length=MOST_HARMONICS)
-    """Coefficients from the first harmonic on, as pairs [V]."""
+    """Coefficients from the first harmonic on, as real and imaginary part [V]."""
     feedback: LoopFeedback | None = None
-    """None for no feedback; an unchanged law keeps its memory."""
+    """Feedback law; None for no feedback. An unchanged law keeps its memory."""
     glide_s: NonNegativeFloat = 0.1
     """Duration of the change to this program's frequency and coefficients, along a half cosine [s]."""
     block_periods: int = Field(default=10, ge=2, le=1000)
-    """Periods of a block of measured coefficients, with a Hann window."""
+    """Number of periods in a block of measured coefficients, under a Hann window."""
     harmonics: int = Field(default=9, ge=1, le=MOST_HARMONICS)
-    """Highest measured harmonic."""
+    """Highest harmonic that is measured."""
 
 
 class LoopState(StrEnum):
@@ -75,29 +75,29 @@ class LoopState(StrEnum):
     SILENT = "silent"
     PLAYING = "playing"
     ENDING = "ending"
-    """It ramps down by itself."""
+    """The controller ramps down by itself."""
 
 
 class LoopBlock(FrozenModel):
-    """Fourier coefficients of one block of periods, from the mean on, as pairs in volts."""
+    """Fourier coefficients of one block of periods, as real and imaginary part [V], from the mean on."""
 
     end_s: float
-    """End of the block by the controller's clock [s]."""
+    """End of the block on the clock of the controller [s]."""
     steady: bool
     """Whether nothing changed during the block."""
     output: tuple[Pair, ...]
-    """Output of the program."""
+    """Output voltage, program and law together."""
     base: tuple[Pair, ...]
     m0: tuple[Pair, ...]
 
 
 class LoopReport(FrozenModel):
-    """Report of a controller; each block is reported once."""
+    """Report of a controller; each block is contained in one report only."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     state: LoopState
     reason: str = ""
-    """Why it is ending or silent without a command."""
+    """Reason why it ends or is silent without a command; otherwise empty."""
     time_s: float
     blocks: tuple[LoopBlock, ...] = ()
 
@@ -113,51 +113,51 @@ class LoopFacts(FrozenModel):
     limit_v: PositiveFloat
     """Largest output, peak [V]."""
     watchdog_s: PositiveFloat
-    """Time without a request after which it ramps down [s]."""
+    """Time without a request after which the controller ramps down [s]."""
     pd_of: LoopInput | None = None
-    """The only input on which it takes a proportional-derivative law; None: any linear law."""
+    """Only input on which it accepts a proportional-derivative law; None if it accepts any linear law."""
 
 
 class LoopRequest(FrozenModel):
-    """A request of the host."""
+    """A request from the host."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     ask: Literal["hello", "play", "report", "silence"]
     program: LoopProgram | None = None
-    """Program of "play"."""
+    """Program for the request "play"."""
     ramp_s: NonNegativeFloat = 0.1
-    """Ramp duration of "silence" [s]."""
+    """Ramp duration for the request "silence" [s]."""
 
 
 @dataclass(frozen=True)
 class ProgramTone(LoopTone):
-    """A sine with the controller's program that plays it."""
+    """A sine, with the program by which the controller plays it."""
 
     program: LoopProgram | None = None
 
 
 class LoopController(RealTimeController, Protocol):
-    """A control loop from two sensors to the amplifier, with programs from a host."""
+    """A control loop from two sensors to the amplifier, which plays programs from a host."""
 
     @property
     def facts(self) -> LoopFacts:
-        """Rate, latency, limit and watchdog."""
+        """Identity and capabilities of the controller."""
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Change to a program, along its glide."""
+        """Change to a program over its glide time; return the report."""
 
     def report(self) -> LoopReport:
-        """Return the blocks measured since the last report, and restart the watchdog.
+        """Return the state and the blocks measured since the last report, and restart the watchdog.
 
         Raises InstrumentLost when the controller does not answer.
         """
 
     def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp down to silence; allowed at any time."""
+        """Ramp down to silence; allowed at any time. Return the report."""
 
 
 class ControllerDriver(Protocol):
-    """Type of an entry point of ``vibench.controllers``."""
+    """Type of an entry point in ``vibench.controllers``."""
 
     def open(self, config: ControllerConfig) -> LoopController:
-        """Connect to a controller and silence it; raises InstrumentError if none or another one answers."""
+        """Connect to a controller and silence it; raises InstrumentError if it does not answer as one."""

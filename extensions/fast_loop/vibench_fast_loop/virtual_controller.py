@@ -1,7 +1,7 @@
-"""Simulated real-time controller: plays a Fourier series and a law, and answers lines of JSON.
+"""Simulated real-time controller: it plays a Fourier series and a law, and answers JSON lines.
 
-It implements version 1 of `vibench_fast_loop.protocol`. Its watchdog counts its own samples and ramps down by
-itself when no host has sent a request for too long. Samples are means over a control step, and voltages are
+It implements version 1 of `vibench_fast_loop.protocol`. Its watchdog counts samples, and ramps the output
+down if no host has sent a request for too long. Samples are means over a control step, and voltages are
 delayed.
 """
 
@@ -36,11 +36,11 @@ from .protocol import (
 
 FloatArray = NDArray[np.float64]
 RAMP_S = 0.05
-"""Ramp duration when it ends by itself [s]."""
+"""Duration of a ramp that the controller starts by itself [s]."""
 LONGEST_AT_LIMIT_S = 0.05
 """Time at the output limit after which the law counts as failed and the output ramps down [s]."""
 MOST_BLOCKS = 2000
-"""Most blocks kept for a host that does not fetch them."""
+"""Maximum number of blocks kept for a host that does not request them."""
 
 
 class VirtualController:
@@ -49,11 +49,11 @@ class VirtualController:
     Parameters
     ----------
     facts
-        Identity and capabilities.
+        Identity and capabilities of the controller.
     clock
-        Rig time [s].
+        Function that returns the rig time [s].
     grid_rate_hz
-        Steps per second of the simulated world; a whole number per sample.
+        Time steps per second of the simulated world; a sample contains a whole number of them.
     """
 
     def __init__(self, facts: LoopFacts, clock: Callable[[], float], grid_rate_hz: float) -> None:
@@ -68,24 +68,24 @@ class VirtualController:
         self._program: LoopProgram | None = None
         self._now = self._new()
         self.cables = LoopCables(self)
-        """Connects it to the simulated world."""
+        """Connection of the controller to the simulated world."""
 
     @property
     def is_on(self) -> bool:
-        """Whether a program is playing."""
+        """Whether the controller plays or ramps down."""
         return self._state is not LoopState.SILENT
 
     @contextmanager
     def answering(self) -> Iterator[Structure]:
-        """Yield the state used to process samples, locked against changes by the host.
+        """Yield the state with which samples are processed; the host cannot change it meanwhile.
 
-        A `Controller` of native/structures.hpp.
+        The state is a `Controller` of native/structures.hpp.
         """
         with self._turn:
             yield self._now
 
     def attend(self, time_s: float) -> None:
-        """Store a block, ramp down or fall silent, as required by the samples up to a rig time."""
+        """Store a finished block, start a ramp or fall silent, after the samples up to a rig time [s]."""
         with self._turn:
             if self._now["done"]:
                 self._keep_block(time_s)
@@ -99,7 +99,7 @@ class VirtualController:
                 now["is_on"] = now["unheard"] = now["at_limit"] = 0
 
     def execute(self, message: bytes) -> Reply:
-        """Execute one line of the protocol and return the line that answers it."""
+        """Execute one line of the protocol, and return the line that answers it."""
         try:
             request = LoopRequest.model_validate_json(message)
         except ValidationError as error:
@@ -175,7 +175,7 @@ class VirtualController:
 
 
 class _LoopEnd(IntEnum):
-    """How a native call ends; `LoopEnd` in native/world.hpp."""
+    """Result of a native call; `LoopEnd` in native/world.hpp."""
 
     COMPLETE = 0
     NEEDS_ATTENTION = 1
@@ -183,7 +183,7 @@ class _LoopEnd(IntEnum):
 
 
 class LoopCables:
-    """Passes samples to a controller and plays its voltages, on a fixed time grid.
+    """Connection that passes samples to a controller and plays its voltages, on a fixed time grid.
 
     The simulated world continues while the controller is silent.
     """
@@ -196,7 +196,7 @@ class LoopCables:
 
     @property
     def is_on(self) -> bool:
-        """Whether the controller plays or delayed voltages remain."""
+        """Whether the controller plays, or delayed voltages remain."""
         return self._loop.is_on or bool(self._late.any())
 
     def move(
@@ -209,7 +209,7 @@ class LoopCables:
         motion: ShakenMotion,
         signals: FloatArray,
     ) -> int:
-        """Advance the shaker as defined in `ClosedLoop`."""
+        """Advance the shaker as defined in `ClosedLoop`; return the number of completed time steps."""
         cables, drive = self._cables, signals[Signal.DRIVE]
         cables["first"], cables["begin"] = first, 0
         base = sensors[0].showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
@@ -230,7 +230,7 @@ class LoopCables:
 def controller_of(
     config: ControllerConfig, grid_rate_hz: float, clock: Callable[[], float]
 ) -> VirtualController:
-    """Return the controller described by a hardware configuration."""
+    """Return the controller that a hardware configuration describes."""
     values = {name: getattr(config, name) for name in LoopFacts.model_fields if hasattr(config, name)}
     facts = LoopFacts(name="simulated controller", serial="virtual", **values)
     return VirtualController(facts, clock, grid_rate_hz)

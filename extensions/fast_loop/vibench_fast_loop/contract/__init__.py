@@ -1,1 +1,1 @@
-"""Contract tests of real-time controllers: does a driver fulfil `LoopController`?"""
+"""Contract tests of real-time controllers; they check that a driver fulfils `LoopController`."""

@@ -1,4 +1,4 @@
-"""Fixtures and options of vibench's contract tests, which the tests of this folder use too."""
+"""Fixtures and options of vibench's contract tests, for the tests of this folder."""
 
 from vibench.acquisition.contract.conftest import bench, pytest_collection_modifyitems, rig
 

@@ -18,7 +18,7 @@ TONE_HZ = 160.0
 TALK_S = 0.1
 """Interval between reports, shorter than any watchdog."""
 LAW = 0.05
-"""Contribution of the law, relative to the program."""
+"""Contribution of the law relative to the program."""
 
 
 def controller_of(bench: Bench) -> LoopController:
@@ -38,7 +38,7 @@ def series(bench: Bench, feedback: LoopFeedback | None = None) -> LoopProgram:
 
 
 def listened(bench: Bench, duration_s: float) -> tuple[Samples, list[LoopBlock]]:
-    """Read samples for a time, and send requests to the controller meanwhile."""
+    """Return the samples read over a duration, and the blocks; the controller gets requests meanwhile."""
     stretch = int(TALK_S * bench.digitizer.sample_rate_hz)
     parts, blocks = [], list[LoopBlock]()
     for _ in range(round(duration_s / TALK_S)):
@@ -100,7 +100,7 @@ def test_a_law_responds_to_its_samples_beside_the_series(bench: Bench) -> None:
     _, blocks = listened(bench, 0.8)
     of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
     gain = LAW * level_v(bench) / abs(answered(blocks[-1], of_base))
-    # The law averages this sample and the previous one, its memory: a proportional-derivative law.
+    # The law averages this sample and the previous sample, its memory: a proportional-derivative law.
     into = (1.0, 0.0) if of_base else (0.0, 1.0)
     direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
     law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
