@@ -22,4 +22,4 @@ SHOWN = {
     "duration": "followed for [s]",
     "motions": "motions that the starts came to",
 }
-"""Quantities that a map can show beside the kinds of motion."""
+"""Quantities that a map can show in addition to the kinds of motion."""

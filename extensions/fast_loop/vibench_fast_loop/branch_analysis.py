@@ -1,4 +1,4 @@
-"""Analysis of a branch held by a fast loop: that of stepped sines, without a simulation."""
+"""Analysis of a branch held by a fast loop, as for stepped sines but without a simulation."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -29,7 +29,7 @@ the tolerance, and of m0 relative to itself."""
 _ROUGHLY = 0.15
 """Largest standard error of the base far from the level, relative to its distance from the level."""
 _DRIFT = 3.0
-"""Largest difference of the settled first half from the second, in standard errors."""
+"""Largest difference between the two halves of settled blocks, in standard errors."""
 _REMEMBERED = 0.8
 """Weight of the scatter in earlier measurements; the few blocks of one measurement may agree by chance."""
 
@@ -46,7 +46,7 @@ class LoopLook:
 
     @property
     def ratio(self) -> complex:
-        """Fundamental of m0 over that of the base."""
+        """Ratio of the fundamentals of m0 and base."""
         return complex(self.m0_m[0] / self.base_m[0])
 
     @property

@@ -188,7 +188,7 @@ def residual_of(base_m: Coefficients, level_m: float) -> Vector:
 
 
 def noise_of(base_u: Vector, ratio_u: float) -> Vector:
-    """Return the standard errors of residual and ratio; ``base_u`` has those of the harmonics over level."""
+    """Return the standard errors of residual and ratio; ``base_u`` is relative to the level."""
     return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
 
 

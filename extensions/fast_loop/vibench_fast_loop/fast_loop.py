@@ -163,7 +163,7 @@ Begin = Literal["rest", "above"]
 _POINTS = 25
 """Number of motions checked along a branch; stable ones too, because a delayed law may destabilise them."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Numbers of periods to try, and tolerance; the smallest number with whole samples is used."""
+"""Numbers of periods to try, and tolerance; the smallest with a whole number of samples is used."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
 """Samples per period for the slope of the spring force, without and with stops."""
 _PART_S = 1e-6

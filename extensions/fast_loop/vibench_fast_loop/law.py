@@ -186,7 +186,7 @@ def loop_multiplier(
 def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> complex:
     """Return the base displacement per volt of the program, with the law active [m/V].
 
-    Phases refer to the sample times; the motion is that without stops.
+    Phases refer to the sample times; the stops are neglected.
     """
     before, after = _tables_of_step(plant, law, 1)
     played = np.concatenate([plant.stretches()[0][1], np.zeros(len(law.step)), [1.0]])

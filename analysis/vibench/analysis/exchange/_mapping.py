@@ -140,7 +140,7 @@ class ChannelMapping(FrozenModel):
 
     @property
     def kind(self) -> tuple[str, str]:
-        """Quantity and unit of the channel, by default those of its role."""
+        """Quantity and unit of the channel, by default as required by its role."""
         return KNOWN_ROLES.get(self.role, (self.quantity, self.unit))
 
 
@@ -180,7 +180,7 @@ class ImportMapping(FrozenModel):
     """Start and end of each part of the plan, if the parts do not follow one another."""
     channels: tuple[ChannelMapping, ...] = Field(min_length=1)
     specimen: SpecimenTable | None = None
-    """The specimen, if it is not that of the paper."""
+    """Specimen, if it is not the paper's specimen."""
     calibration_valid_days: PositiveInt | None = None
     confirmations: dict[str, str | float] = Field(default_factory=dict)
     """Remarks for the report."""

@@ -22,7 +22,7 @@ RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Respons
 
 
 def draw_sines(axes: Axes, along: Reals, sines: ResponsePrediction, what: str, label: str) -> None:
-    """Draw the response without contact as a line and that to steady sines as dots, over ``along``."""
+    """Draw the response without contact as a line, and responses to steady sines as dots, over ``along``."""
     rising = np.argsort(along)
     axes.plot(along[rising], sines.linear[rising], **style.LINEAR_CURVE)
     axes.plot(along, getattr(sines, ATTRIBUTES[what]), ".", color=style.PREDICTED, label=label)

@@ -10,7 +10,7 @@ from . import style
 
 _HEIGHT_IN = 4.6
 _MOST_NAMES = 16
-"""Largest number of points whose names are written at the axis; with more points, node numbers are."""
+"""Largest number of points whose names are written at the axis; otherwise node numbers are written."""
 
 
 def scan_figure(scan: Scan) -> style.DrawnFigure:

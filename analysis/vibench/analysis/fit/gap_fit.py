@@ -85,7 +85,7 @@ def fit_gap(
 def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = None) -> Iterator[Onset]:
     """Yield the gap at every onset of collisions in a sweep.
 
-    The gap bounds follow from those of the edge, widened by the uncertainty of drive and linear specimen.
+    The bounds of the gap include the bounds of the edge, and the uncertainty of drive and linear specimen.
     """
     reach = float(norm.ppf(0.5 + 0.5 * DEFAULT_CONFIDENCE))
     rate = sweep.response.sweep_rate_hz_per_s

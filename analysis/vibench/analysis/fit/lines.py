@@ -34,7 +34,7 @@ CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
 """Reference frequency of the channels' phases."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
-"""Factors on all frequencies for further starts of the search."""
+"""Factors by which all frequencies are scaled for further starts of the search."""
 _STEP = 1e-6
 """Logarithmic step of central differences; far above rounding, far below the width of a resonance."""
 
@@ -75,7 +75,7 @@ class Freedom:
     parameters: tuple[Parameter, ...] = ()
     model: Model = own_response
     starts: tuple[tuple[float, ...], ...] = ((),)
-    """Starting values of the model's further numbers."""
+    """Start values of the model's further parameters."""
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
 
@@ -98,7 +98,7 @@ class Descended:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines and settings of a fit of parameters (as logarithms), phases of the channels, and a scale."""
+    """Lines, and settings of a fit that determines parameters (logarithms), channel phases, and a scale."""
 
     frequency_hz: Reals
     measured: Complexes
@@ -157,12 +157,12 @@ class Lines:
         )
 
     def squared(self, residuals: Reals) -> Reals:
-        """Add up the squares of magnitude and phase of each line."""
+        """Return the sum of squares of magnitude and phase for each line."""
         magnitudes, phases = np.split(residuals[: 2 * self.frequency_hz.size], 2)
         return np.asarray(magnitudes**2 + phases**2)
 
     def students(self, residuals: Reals) -> Reals:
-        """Transform residuals so that their squares follow chi square despite the estimated scatter."""
+        """Return residuals whose squares follow chi square although the scatter is estimated."""
         count, squared = 2 * self.frequency_hz.size, self.squared(residuals)
         factor = np.sqrt(chi_square_of(squared, self.averages) / np.maximum(squared, 1e-300))
         return np.concatenate([residuals[:count] * np.tile(factor, 2), residuals[count:]])

@@ -55,7 +55,7 @@ class Suspect:
     mends: bool
     """Whether the model fits when this assumption is freed."""
     behind: float
-    """Twice the log likelihood ratio to the best suspect, plus ln(values) per parameter; 0 for the best."""
+    """Twice the log likelihood ratio to the best suspect, plus ln(number of values) per parameter; best 0."""
 
     @property
     def may_be_it(self) -> bool:

@@ -268,7 +268,7 @@ def update_model(
         Receives the progress.
     """
     of_m0 = tuple(each for each in results.results if each.analysis.facts.mass == "m0")
-    results = replace(results, results=of_m0)  # points of a scan may lie on the other masses
+    results = replace(results, results=of_m0)  # scan points may be on the other masses
     if not of_m0:
         raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")
     described = described_specimen(results.facts[0].bench)

@@ -43,7 +43,7 @@ class LevelMeters:
     full_scale
         Full scale of each channel in the unit of the samples, shape (channels,).
     sample_rate_hz
-        Sample rate, from which the time of the peak hold is counted.
+        Sample rate [Hz], for the duration of the peak hold.
     """
 
     def __init__(self, full_scale: Reals, sample_rate_hz: float) -> None:

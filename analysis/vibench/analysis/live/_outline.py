@@ -131,7 +131,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
-    """Return over how many columns each column takes its extremes; 1 leaves its own extremes."""
+    """Return the number of columns over which each column takes its extremes; 1 for the column alone."""
     low, high = edges
     count = low.size
     blocks = max(1, min(_BLOCKS, count // _LEAST_COLUMNS))

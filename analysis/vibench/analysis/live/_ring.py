@@ -70,7 +70,7 @@ class Ring:
         return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
     def since(self, sample: int) -> RingWindow:
-        """Return the available samples from index ``sample`` on."""
+        """Return the samples from index ``sample``, as far as they are still available."""
         return self.newest(self.next_sample - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:

@@ -35,7 +35,7 @@ from .simulated_channels import (
 )
 
 _FEWEST_LINES = 50
-"""Fewest lines in silence; they determine the level of noise to 25 %."""
+"""Minimum number of lines in silence; they determine the noise level to 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
 """Blocks spread over the recording, in addition to the first and last second."""
@@ -51,11 +51,11 @@ class ChannelNoise:
 
     rms: dict[str, float]
     converter_v: float
-    """Smallest noise of all converter inputs, taken as the converter's own [V]."""
+    """Smallest noise of all inputs, taken as the noise of the converter itself [V]."""
 
 
 def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
-    """Return the noise in the quietest stretch of each channel, since recordings start in silence."""
+    """Return the noise in the quietest part of each channel; recordings start in silence."""
     rate, samples = recording.sample_rate_hz, recording.samples
     length = max(16, round(_BLOCK_S * rate))
     ends = np.concatenate([np.arange(0, rate, length), samples - np.arange(length, rate + length, length)])
@@ -284,7 +284,7 @@ _BYTES_PER_SAMPLE = 16
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
-    """Facts of the simulation of a recording."""
+    """Facts on the simulation of a recording."""
 
     DOCUMENT: ClassVar = (
         "drive=driven why draws base_band_hz accuracy masses_kg=specimen.masses "

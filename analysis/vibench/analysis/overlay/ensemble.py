@@ -59,11 +59,11 @@ class EnsembleCurve(Labelled):
 
     name: str
     frequency_hz: Reals
-    """Shape (points,)."""
+    """Frequencies of the points, shape (points,)."""
     measured: Reals
-    """Shape (points,)."""
+    """Measured values, shape (points,)."""
     draws: Reals
-    """Shape (draws, points); NaN if the draw has another kind of motion."""
+    """Simulated values, shape (draws, points); NaN if the draw has another kind of motion."""
 
     @cached_property
     def count(self) -> Integers:
@@ -99,7 +99,7 @@ class EnsembleCurve(Labelled):
     def z(self) -> Reals:
         """Measured value as an equivalent normal deviate, shape (points,); NaN if not compared.
 
-        As probable as Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)).
+        z is as probable as Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)).
         """
         with np.errstate(invalid="ignore"):
             found = _deviates(np.sqrt(self.measured), self._mean, self._sd, self.count)

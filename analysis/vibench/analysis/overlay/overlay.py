@@ -74,7 +74,7 @@ class AbstractOverlay(Labelled, Generic[R]):
 
     @property
     def agreement(self) -> tuple[str, ...]:
-        """Return sentences on quantities that disagree with the twin, then on each quantity."""
+        """Sentence on the quantities that disagree with the simulation, then one on each quantity."""
         outside = [each.name for each in self.ensemble if not each.agrees]
         compared = sum(each.compared > 0 for each in self.ensemble)
         headline = [f"{len(outside)} of {compared} quantities disagree with the twin: {', '.join(outside)}"]
@@ -219,7 +219,7 @@ _EDGE_S = 1.0
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
     """Return the quantities of a sweep that are compared with draws.
 
-    Points are compared where both collide or neither does. Within a second of an edge, motions are mixed.
+    Points are compared where both collide or neither does, except within a second of a region's edge.
     """
     state = found.is_colliding.astype(np.int64)
     reach = max(1, round(_EDGE_S / response.interval_s))
@@ -290,7 +290,7 @@ def dwell_quantities(
 def dwell_overlay(
     analysis: DwellAnalysis, drawn: Drawn[DwellResponse], endings: Sequence[Ending]
 ) -> DwellOverlay:
-    """Compare a dwell with the draws; ``endings`` are the measured ones."""
+    """Compare a dwell with the draws; ``endings`` are the measured ends of the motion."""
     towards_hz = bound_frequencies_hz(analysis.facts)
     measured = analysis.response
     compared = dwell_quantities(measured, towards_hz, endings)
@@ -322,7 +322,7 @@ def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
 
 
 def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]) -> SteppedSineOverlay:
-    """Compare the responses of all steps with those of the draws."""
+    """Compare the measured responses of all steps with the draws."""
     measured = analysis.response
     compared = stepped_quantities(measured)
     return SteppedSineOverlay(

@@ -66,14 +66,14 @@ def predict(
     duration_s: float = PREDICTION_S,
     approach: Approach = Approach.REST,
 ) -> ResponsePrediction:
-    """Simulate a sine at each frequency, from rest on all cores or in sequence like a sweep.
+    """Simulate a sine at each frequency, from rest in parallel or in sequence like a sweep.
 
     Parameters
     ----------
     frequency_hz
         Shape (points,), rising.
     amplitude_m
-        A0, one for all points or one each [m].
+        Base amplitude A0, one value for all points or one per point [m].
     accuracy
         Quick by default: in chaos, Response I scatters by more than any accuracy level removes, and free
         flight is exact at every level.

@@ -32,7 +32,7 @@ class RecordedBaseMotion:
     sample_rate_hz: float
     low_hz: float
     high_hz: float
-    """Ends of the kept band."""
+    """Ends of the frequency band that is kept [Hz]."""
     delay_s: float
     """Corrected delay of the accelerometer channel: sample k is the motion at k / sample_rate_hz."""
 

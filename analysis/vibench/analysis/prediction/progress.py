@@ -288,7 +288,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Maximum number of points of both models together; more can neither be seen nor computed in hours."""
+"""Maximum number of points of both models together; more points take hours and are not visible."""
 
 
 class Exponent(StrEnum):

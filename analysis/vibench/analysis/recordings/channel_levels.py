@@ -39,7 +39,7 @@ class ChannelLevel:
     full_scale: float
     """Full scale of the converter's input [unit of the channel]."""
     share_at_full_scale: float
-    """Share of the samples from 99.9 % of full scale on."""
+    """Share of the samples at or above 99.9 % of full scale."""
     flat_tops: tuple[float, ...] = ()
     """Values at which the peaks are clipped, above, below or on both sides [unit of the channel]."""
 
@@ -165,7 +165,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Smallest height of a peak above the median, relative to the span; lower if the channel rests there."""
+"""Smallest height of a peak above the median, relative to the span; with less, the channel rests there."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:

@@ -127,7 +127,7 @@ class ResponseChannel:
 
     @property
     def noise_gain(self) -> float:
-        """Ratio of the rms noise of the velocity to that of the channel, for white channel noise."""
+        """Ratio of velocity noise to channel noise (rms), for white channel noise."""
         return float(np.linalg.norm(self._kernel)) if self._kernel.size else 1.0
 
     def read(self, start: int, stop: int) -> Reals:

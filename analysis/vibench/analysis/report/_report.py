@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest multipliers, or its lack of motion, at a level without a resonance."""
+    """State the model's largest multipliers at a level without a resonance, or that it has no motion."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
@@ -235,7 +235,7 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
 
 
 def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
-    """State the ratio of a recording's base amplitude to that of the branches, where both exist."""
+    """State the ratio of the base amplitudes of a recording and of the branches, where both exist."""
     request = diagram.request
     ratios = [
         amplitude / request.path.drive(frequency)[1]

@@ -1,6 +1,6 @@
 """Process that computes bounds of a recording during its run.
 
-It runs as ``python -m vibench.analysis.results.growing_bounds``. Its first output line says that it is ready.
+It runs as ``python -m vibench.analysis.results.growing_bounds``. The first output line means it is ready.
 Then each input line requests bounds, and one output line answers. All lines are JSON objects. A run that
 lasts until a bound is met starts this process (`vibench.acquisition.run.until`).
 """
@@ -80,7 +80,7 @@ def bound_of(budget: Budget) -> float | None:
 def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
     """Return the result of a recording up to a time [s] within a stretch.
 
-    ``stretch`` is the number of the step, or 1. Of noise, only complete realisations are analysed. Raises
+    ``stretch`` is the number of the step, or 1. For noise, only complete realisations are analysed. Raises
     AnalysisError when nothing can be analysed.
     """
     plan = facts.measurement.excitation
