@@ -32,20 +32,20 @@ from .restoring_force import PowerSpring, RestoringForce
 from .shooting import SAMPLES, PeriodicOrbit
 
 TAIL = 4
-"""Neglected harmonics are checked up to this multiple of the highest one kept."""
+"""Ratio of the highest neglected harmonic in the error estimate to the highest harmonic kept."""
 
 
 @dataclass(frozen=True)
 class BalanceOptions:
-    """Number of harmonics and tolerance."""
+    """Options of a harmonic balance: harmonics and tolerance."""
 
     kept: HarmonicSet = HarmonicSet.ODD
     fewest: int = 15
     """Highest harmonic of the first attempt."""
     most: int = 511
-    """Highest harmonic allowed."""
+    """Highest harmonic of the last attempt."""
     tolerance: float = 1e-4
-    """Largest relative change of the fundamental of p by neglected harmonics."""
+    """Largest allowed effect of neglected harmonics on p, relative to the fundamental of p."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kept", chosen(HarmonicSet, self.kept))
@@ -58,17 +58,17 @@ class BalanceOptions:
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Start of Newton's iteration: a motion of p in harmonics."""
+    """Initial guess for Newton's iteration: the harmonics of p."""
 
     harmonics: Harmonics
     relative: Complex
-    """P_k under U = A0 sin(w t), shape (m,) [m]."""
+    """Phasors P_k for the drive U = A0 sin(w t), shape (m,) [m]."""
 
 
 def first_guess(
     structure: LinearStructure, spring: RestoringForce, frequency_hz: float, amplitude_m: float
 ) -> Guess:
-    """Start from the weakest first-order motion of a power law, else from the motion without the spring."""
+    """Return the smallest first-order motion of a power law, otherwise the motion without the spring."""
     match spring:
         case PowerSpring():
             return first_order_guesses(structure, spring, frequency_hz, amplitude_m)[0]
@@ -81,7 +81,7 @@ def first_guess(
 def first_order_guesses(
     structure: LinearStructure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
 ) -> list[Guess]:
-    """Start from each of the first-order motions of a power law."""
+    """Return the first-order motions of a power law as initial guesses."""
     states = first_order_states(structure, spring, frequency_hz, amplitude_m)
     return [Guess(np.array([1]), np.array([state.relative])) for state in states]
 
@@ -94,22 +94,22 @@ def balance(
     options: BalanceOptions = BalanceOptions(),
     start: Guess | None = None,
 ) -> Balance:
-    """Find one periodic motion of the drive's period.
+    """Return one periodic motion with the period of the drive.
 
-    The number of harmonics doubles until neglected ones change p by less than the tolerance. Returns the
-    motion; check ``outcome`` first. After NO_SOLUTION it is the best attempt.
+    The number of harmonics is doubled until neglected harmonics change p by less than the tolerance. Check
+    ``outcome`` of the result first: after NO_SOLUTION the result is the best attempt.
 
     Parameters
     ----------
     structure, spring
-        The linear part, and the nonlinear force along its direction b.
+        Linear part of the specimen, and nonlinear force along its direction b.
     frequency_hz, amplitude_m
         Frequency and amplitude of U = amplitude sin(2 pi frequency t); positive.
     options
         Harmonics and tolerance.
     start
-        Start of the iteration, which selects one of several motions; by default `first_guess`. Strong
-        contact needs a nearby start, such as a neighbouring solution or an integrated orbit.
+        Initial guess, which selects one of several motions; by default `first_guess`. Strong contact needs a
+        close guess, such as a neighbouring solution or an integrated orbit.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
         raise ValueError(
@@ -137,7 +137,7 @@ def balance(
 def balance_of_solution(
     problem: BalanceProblem, unknowns: np.ndarray, frequency_hz: float, amplitude_m: float, tolerance: float
 ) -> Balance:
-    """Convert a solution to motions of every mass, with the truncation error."""
+    """Return the motion of every mass for a solution, with its truncation error."""
     omega = 2.0 * math.pi * frequency_hz
     harmonics, phasors = problem.harmonics, problem.phasors(unknowns)
     seen = condense(problem.structure, omega, harmonics)
@@ -166,7 +166,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Solutions with a fixed number of harmonics; the last component is the parameter / scale."""
+    """Solutions with a fixed number of harmonics; the last component of a point is parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath
@@ -176,7 +176,7 @@ class BalanceFamily:
 
     @property
     def tolerance(self) -> float:
-        """Largest truncation error, relative to the fundamental of p."""
+        """Largest allowed truncation error, relative to the fundamental of p."""
         return self.options.tolerance
 
     def drive(self, point: Vector) -> tuple[float, float]:
@@ -184,7 +184,7 @@ class BalanceFamily:
         return self.path.drive(float(point[-1]) * self.scale)
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Residual and its derivatives by all unknowns and the parameter."""
+        """Return the residual, and its derivatives with respect to all unknowns and the parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
         residual, jacobian, by_omega, by_amplitude = self.problem.linearised(point[:-1], omega, amplitude)
@@ -193,7 +193,7 @@ class BalanceFamily:
         return residual, np.column_stack([jacobian, along])
 
     def report(self, point: Vector) -> OrbitReport:
-        """Responses, multipliers and contacts."""
+        """Return responses, Floquet multipliers and contacts of the motion at a point."""
         frequency, amplitude = self.drive(point)
         found = balance_of_solution(self.problem, point[:-1], frequency, amplitude, self.tolerance)
         return OrbitReport(
@@ -207,7 +207,7 @@ class BalanceFamily:
         )
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics; the new harmonics are zero."""
+        """Return the family with twice the harmonics (the new ones are zero); None at the highest number."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:
@@ -226,7 +226,7 @@ class BalanceFamily:
 def orbit_signs(
     structure: LinearStructure, spring: RestoringForce, found: Balance, kept: HarmonicSet
 ) -> OrbitSigns:
-    """Return stability and contacts of a solution, from the exact variational equation along it."""
+    """Return stability and contacts of a solution, from the variational equation along its motion."""
     motion = Motion(found.frequency_hz, found.harmonics, found.relative)
     contacts = len(crossings(spring, motion, 2.0 * math.pi)) // 2
     if kept is HarmonicSet.ODD:
@@ -245,10 +245,10 @@ def balance_branch_within(
     options: BalanceOptions = BalanceOptions(),
     steps: ArcSteps = ArcSteps(),  # noqa: B008 - frozen
 ) -> Branch:
-    """Follow a solution both ways along a drive path to the ends of a range, ascending [Hz, or m].
+    """Follow a solution in both directions along a drive path, from ``low`` to ``high`` [Hz, or m].
 
-    As `periodic_branch_within`; harmonics are added where the error requires it. Raises ValueError when
-    the start did not converge, or lies outside the range.
+    The result is ordered as in `periodic_branch_within`. Harmonics are added where the truncation error
+    requires it. Raises ValueError when the start did not converge, or is outside the range.
     """
     if start.outcome is BalanceEnd.NO_SOLUTION:
         raise ValueError(
@@ -263,11 +263,11 @@ def balance_branch_within(
 
 
 SPECTRUM_SHARE = 8
-"""Ratio of the samples per period to the harmonics that are kept of an orbit's spectrum."""
+"""Ratio of the samples per period to the number of harmonics used from the spectrum of an orbit."""
 
 
 def orbit_guess(orbit: PeriodicOrbit) -> Guess:
-    """Start a harmonic balance from an exact orbit of the drive's period."""
+    """Return the harmonics of an exact orbit with the drive's period as an initial guess."""
     states = orbit.period_map.orbit(orbit.state, orbit.drive, SAMPLES).states[:SAMPLES]
     harmonics = np.arange(SAMPLES // SPECTRUM_SHARE)
     return Guess(harmonics, phasors_of(states[:, Y] - states[:, Z])[harmonics])

@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Rounding within which a multiplier counts as on the unit circle; without damping all lie there."""
+"""Tolerance for a multiplier on the unit circle, where all multipliers are without damping."""
 
 
 class Parameter(StrEnum):
@@ -32,9 +32,9 @@ class BifurcationKind(StrEnum):
     """Kind of a special point of a branch."""
 
     FOLD = "fold"
-    """The branch turns back: a swept response jumps here. One multiplier is +1."""
+    """The branch turns back; the response jumps here in a sweep. One multiplier is +1."""
     SYMMETRY_BREAKING = "symmetry breaking"
-    """Two motions, mirror images of each other, branch off the symmetric one. One multiplier is +1."""
+    """Two motions, mirror images of each other, branch off the symmetric motion. One multiplier is +1."""
     PERIOD_DOUBLING = "period doubling"
     """A motion of twice the period branches off. One multiplier is -1."""
     NEIMARK_SACKER = "Neimark-Sacker"
@@ -45,13 +45,13 @@ class BifurcationKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class BranchEvent:
-    """A special point."""
+    """A bifurcation or grazing point of a branch."""
 
     kind: BifurcationKind
     frequency_hz: float
     amplitude_m: float
     state: Floats
-    """Displacements and velocities at the drive's time zero, shape (2 n,), to start from."""
+    """Displacements and velocities at the drive's time zero, as the start of a run, shape (2 n,)."""
     index: int
     """Index of the last point of the branch before the event."""
 
@@ -62,11 +62,11 @@ class BranchEvent:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A branch of periodic motions in order; m points, n displacements."""
+    """A branch of periodic motions in the order of its points; m points, n displacements."""
 
     parameter: Parameter
     frequencies_hz: Floats
-    """Shape (m,)."""
+    """Drive frequency, shape (m,)."""
     amplitudes_m: Floats
     """Drive amplitude, shape (m,)."""
     response_i: Floats
@@ -79,15 +79,15 @@ class Branch:
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats
-    """Error estimate of each point relative to the fundamental of p, shape (m,): by neglected harmonics for
-    a balance, by the closure error for shooting."""
+    """Estimated error of each point over the fundamental of p, shape (m,): from neglected harmonics in
+    harmonic balance, from the closure error in shooting."""
     contacts: NDArray[np.int64]
-    """Contacts that begin in a period of the motion, shape (m,)."""
+    """Number of contacts that begin in a period of the motion, shape (m,)."""
     events: tuple[BranchEvent, ...]
     end: ArcEnd
-    """Reason why the branch ends at its last point."""
+    """Reason for the end of the branch at its last point."""
     begin: ArcEnd | None = None
-    """Reason why the branch ends at its first point, if followed both ways; None if started there."""
+    """Reason for the end at its first point, if followed in both directions; None if it was started there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
@@ -115,24 +115,24 @@ POINTWISE = (
 
 # Bifurcations between two points of a branch, from Floquet multipliers.
 #
-# A test function changes sign where a multiplier passes -1 (product of mu + 1), or a pair passes the unit
-# circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal. 34 (1997) 1). The
-# number of contacts changes where one begins or ends. Folds are found by the continuation itself.
+# A test function changes sign where a multiplier passes -1 (product of mu + 1), or where a pair passes the
+# unit circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal. 34 (1997) 1).
+# Grazing changes the number of contacts. The continuation itself finds the folds.
 #
-# If a motion mirrors itself after half a period, its monodromy matrix is the square of that of a half-period
-# map. A multiplier -1 of the half map means symmetry breaking, and +1 is a fold.
+# If a motion mirrors itself after half a period, its monodromy matrix is the square of the half-period
+# matrix. A multiplier -1 of the half-period map means symmetry breaking; +1 means a fold.
 
 COMPLEX_PART = 1e-6
-"""A pair with a smaller imaginary part is a real pair of product one: no Neimark-Sacker point."""
+"""Smallest imaginary part of a complex pair; a real pair of product one is no Neimark-Sacker point."""
 
 
 class OrbitShape(StrEnum):
     """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    """Mirrored after half an odd number of drive periods; needs equal stops."""
+    """The motion is its own mirror image half an odd number of drive periods later; needs equal stops."""
     REPEATED = "repeated"
-    """Repeated after a whole number of drive periods."""
+    """The motion repeats after a whole number of drive periods."""
 
 
 OrbitShapeWord = Literal["mirrored", "repeated"]
@@ -140,19 +140,19 @@ OrbitShapeWord = Literal["mirrored", "repeated"]
 
 @dataclass(frozen=True, eq=False)
 class OrbitSigns:
-    """Test functions for events at one point of a branch."""
+    """Data for the detection of bifurcations at one point of a branch."""
 
     multipliers: Complex
-    """Multipliers of the half map if mirrored, else of the period; shape (2 n,)."""
+    """Multipliers of the half-period map if mirrored, otherwise over the period; shape (2 n,)."""
     contacts: int
-    """Crossings of the stops in a period."""
+    """Number of contacts in a period."""
     shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """Distance from a simpler motion that the branch may join, shape (6,); empty for none."""
+    """Difference from a simpler motion (half the period, or mirrored), shape (6,); empty if there is none."""
     joins: BifurcationKind | None = None
-    """Bifurcation on the simpler branch where both join."""
+    """Bifurcation at which this branch leaves the branch of simpler motions."""
     grazing_distance: float = math.inf
-    """Distance from grazing (start or end of a contact), over the gap or the gap times 2 pi f."""
+    """Distance from grazing: of p over the gap, or of dp/dt over the gap times 2 pi f."""
 
     @property
     def over_period(self) -> Complex:
@@ -166,7 +166,7 @@ class OrbitSigns:
 
     @property
     def torus(self) -> float:
-        """Test function that changes sign where a complex pair leaves the closed unit disc."""
+        """Test function that changes sign where a complex pair leaves the unit circle outwards."""
         pairs = itertools.combinations(self.multipliers, 2)
         beyond = np.array([a * b - 1.0 for a, b in pairs])
         beyond[np.abs(beyond) < NEUTRAL] = -NEUTRAL
@@ -174,7 +174,7 @@ class OrbitSigns:
 
     @property
     def has_pair_on_circle(self) -> bool:
-        """Whether the pair whose product is closest to one is complex."""
+        """Whether the pair of multipliers whose product is closest to one is complex."""
         pairs = list(itertools.combinations(self.multipliers, 2))
         first, _ = min(pairs, key=lambda pair: abs(pair[0] * pair[1] - 1.0))
         return bool(abs(first.imag) > COMPLEX_PART)
@@ -194,13 +194,13 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""A motion this close to a simpler one, over the gap, may pass through it within a step."""
+"""Distance from a simpler motion, over the gap, within which a step may pass through that motion."""
 IS_SIMPLER = 1e-7
-"""A motion this close to a simpler one, over the gap, counts as that one: they differ by rounding."""
+"""Distance from a simpler motion, over the gap, that is due to rounding: both are the same motion."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch passed a simpler motion; beyond it, it repeats, shifted or mirrored."""
+    """Return whether a branch passed a simpler motion; beyond that point it repeats, shifted or mirrored."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0
@@ -209,7 +209,7 @@ def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
-    """Return the test function of a kind, which changes sign at the event."""
+    """Return the test function for a kind of event; it changes sign at the event."""
     match kind:
         case BifurcationKind.GRAZING:
             return 1.0 if here.contacts == before.contacts else -1.0

@@ -1,4 +1,4 @@
-"""Follow any family of periodic motions along a parameter, and collect a branch."""
+"""Follow a family of periodic motions along a parameter, and return a branch."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -30,9 +30,9 @@ class FrequencyPath:
     """Path along frequency, with a constant amplitude or a recorded level."""
 
     amplitudes_m: tuple[float, ...]
-    """One amplitude for every frequency, or a single constant one."""
+    """Drive amplitude for each frequency, or one constant amplitude [m]."""
     frequencies_hz: tuple[float, ...] = ()
-    """Ascending; the amplitude is a monotone cubic between and constant outside."""
+    """Ascending frequencies [Hz]; monotone cubic interpolation between them, constant amplitude outside."""
     parameter: ClassVar = Parameter.FREQUENCY
 
     def __post_init__(self) -> None:
@@ -47,13 +47,13 @@ class FrequencyPath:
             _refuse_unless_positive("amplitude", amplitude, "m")
 
     def drive(self, value: float) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [m]."""
+        """Return frequency [Hz] and amplitude [m] for a frequency on the path."""
         if len(self.amplitudes_m) == 1:
             return value, self.amplitudes_m[0]
         return value, float(self._curve(self._inside(value)))
 
     def slopes(self, value: float) -> tuple[float, float]:
-        """Return 1 and the amplitude's slope [m/Hz]."""
+        """Return the derivatives of frequency and amplitude with respect to frequency: 1 and [m/Hz]."""
         if len(self.amplitudes_m) == 1 or self._inside(value) != value:
             return 1.0, 0.0
         return 1.0, float(self._curve(value, 1))
@@ -68,7 +68,7 @@ class FrequencyPath:
 
 @dataclass(frozen=True)
 class AmplitudePath:
-    """Path along the amplitude, at one frequency."""
+    """Path along amplitude, at one frequency."""
 
     frequency_hz: float
     parameter: ClassVar = Parameter.AMPLITUDE
@@ -77,11 +77,11 @@ class AmplitudePath:
         _refuse_unless_positive("frequency", self.frequency_hz, "Hz")
 
     def drive(self, value: float) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [m]."""
+        """Return frequency [Hz] and amplitude [m] for an amplitude on the path."""
         return self.frequency_hz, value
 
     def slopes(self, value: float) -> tuple[float, float]:  # noqa: ARG002 - the same everywhere
-        """Return 0 and 1: only the amplitude changes."""
+        """Return the derivatives of frequency and amplitude with respect to amplitude: 0 and 1."""
         return 0.0, 1.0
 
 
@@ -96,14 +96,14 @@ def _refuse_unless_positive(name: str, value: float, unit: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class OrbitReport:
-    """Results of one point of a branch."""
+    """Results at one point of a branch, with the fields of `Branch`."""
 
     frequency_hz: float
     amplitude_m: float
     response_i: Vector
-    """Shape (n + 1,)."""
+    """Response I of every displacement and of p, shape (n + 1,)."""
     response_ii: Vector
-    """Shape (n + 1,)."""
+    """Response II of every displacement and of p, shape (n + 1,)."""
     state: Vector
     """Displacements and velocities at the drive's time zero, shape (2 n,)."""
     signs: OrbitSigns
@@ -115,37 +115,37 @@ class Family(Curve, Protocol):
 
     @property
     def path(self) -> DrivePath:
-        """Path along which the drive changes."""
+        """Path of the drive in the plane of frequency and amplitude."""
         ...
 
     @property
     def tolerance(self) -> float:
-        """Largest error estimate that a point may have."""
+        """Largest allowed error estimate of a point."""
         ...
 
     def report(self, point: Vector) -> OrbitReport:
-        """Describe the motion at a point."""
+        """Return the results for the motion at a point."""
         ...
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
-        """Return the family at a higher resolution, with a point and a tangent carried over to it.
+        """Return the family at a higher resolution, with a point and a tangent converted to it.
 
-        None when this is the highest.
+        None at the highest resolution.
         """
         ...
 
 
 RANGE_LENGTH = 10.0
-"""Length of the parameter's range; the gap or the spring's length scale has length 1."""
+"""Scaled length of the parameter range; the gap or the spring's length scale has length 1."""
 
 
 def parameter_value(path: DrivePath, drive: Harmonic) -> float:
-    """Return the parameter of a drive on a path [Hz, or m]."""
+    """Return the frequency or amplitude of a drive, whichever the path varies [Hz, or m]."""
     return drive.frequency_hz if path.parameter is Parameter.FREQUENCY else drive.amplitude_m
 
 
 def range_scale(low: float, high: float, value: float) -> float:
-    """Return the unit of length of a range [Hz, or m]."""
+    """Return the parameter change that counts as one unit of length in a range [Hz, or m]."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
         raise ValueError(
             f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
@@ -156,18 +156,18 @@ def range_scale(low: float, high: float, value: float) -> float:
 def follow(
     family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Branch:
-    """Follow a family from a point on it; refine the resolution if the error estimate requires it.
+    """Follow a family from one of its points; refine the resolution where the error requires it.
 
     Parameters
     ----------
     family
         Family at its first resolution.
     start
-        Point on the family.
+        Point on the curve.
     toward, bounds
-        Sign of the first step, and range, of the family's scaled parameter.
+        Sign of the first step of the scaled parameter, and its range.
     steps
-        Lengths and tolerances.
+        Step lengths and tolerances.
     """
     followed = _Followed(family, steps)
     while True:
@@ -185,11 +185,11 @@ def follow(
 
 
 NEARLY_GRAZING = 0.01
-"""A branch that cannot be continued this close to grazing, relative to the gap, ends by grazing."""
+"""A branch that cannot be continued within this distance of grazing, over the gap, ends by grazing."""
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
-    """Follow a family from a point to both ends; follow a closed branch only once."""
+    """Follow a family from a point in both directions; follow a closed branch only once."""
     onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
     if onward is not None and onward.end is ArcEnd.CLOSED:
         return replace(onward, begin=ArcEnd.CLOSED)
@@ -202,7 +202,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
 
 
 def _join_branches(back: Branch, onward: Branch) -> Branch:
-    """Reverse a branch and join it to another from the same point."""
+    """Join two branches that start at the same point; the first is reversed."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
@@ -227,14 +227,14 @@ class _Followed:
     def go_on(
         self, start: Vector, toward: float, bounds: tuple[float, float]
     ) -> tuple[ArcEnd | None, ArcPoint]:
-        """Follow at one resolution; return the reason for its end (None: refine) and the last point."""
+        """Follow at one resolution; return the last point and the reason for the end (None: refine)."""
         family = self.family
         points = trace(family, start, toward, bounds, self.steps)
         before = next(points)
         first = family.report(before.point)
         signs = first.signs
         if not self.reports:
-            # After a refinement, the first point was already reported.
+            # After a refinement the first point has been reported already.
             self.reports.append(first)
         for here in points:
             if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):
@@ -268,7 +268,7 @@ class _Followed:
         return self.branch(ArcEnd.STEP_TOO_SHORT)
 
     def branch(self, end: ArcEnd) -> Branch:
-        """Return the branch so far."""
+        """Return the branch followed so far."""
         reports = self.reports
         return Branch(
             parameter=self.family.path.parameter,
@@ -289,7 +289,7 @@ class _Followed:
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
     def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
-        """End a branch on the simpler motion; beyond it, the branch would repeat, shifted or mirrored."""
+        """End a branch on a simpler motion; beyond that point it would repeat, shifted or mirrored."""
 
         def measure(point: ArcPoint) -> float:
             return float(self.family.report(point.point).signs.apart @ signs.apart)

@@ -1,9 +1,9 @@
 """Follow a curve of solutions through its folds: pseudo-arclength continuation.
 
-n equations in n unknowns and one parameter, r(u, lambda) = 0, define a curve in n + 1 dimensions. Step
-along its tangent, then correct perpendicular to it (Keller 1977; Allgower and Georg, Introduction to
-Numerical Continuation Methods, SIAM 2003, chapters 2, 6 and 9). Folds are passed like other points; they lie
-where the tangent's last component changes sign. Unknowns and parameter should be scaled to the order of one.
+The n equations r(u, lambda) = 0 in n unknowns and one parameter define a curve in n + 1 dimensions. Each step
+follows the tangent of the curve and is then corrected perpendicular to the tangent (Keller 1977; Allgower and
+Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 2, 6 and 9). Folds need no special
+treatment: the tangent's last component changes sign there. Scale unknowns and parameter to the order of one.
 """
 
 import math
@@ -19,12 +19,12 @@ from ..specimen.state import Table, Vector
 
 
 class Curve(Protocol):
-    """Equations whose solutions are followed."""
+    """Equations whose solutions form the curve."""
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
         """Return r, shape (n,), and dr/dpoint, shape (n, n + 1), at (u, lambda), shape (n + 1,).
 
-        Not finite where the equations cannot be evaluated.
+        Values are not finite where the equations cannot be evaluated.
         """
         ...
 
@@ -34,17 +34,17 @@ class ArcSteps:
     """Step lengths and tolerances."""
 
     first: float = 0.01
-    """First step, along the curve."""
+    """Length of the first step along the curve."""
     longest: float = 0.05
     shortest: float = 1e-7
-    """Shortest step."""
+    """Shortest length of a step."""
     most_turn_rad: float = 0.3
-    """Largest turn of the tangent in a step."""
+    """Largest rotation of the tangent in a step."""
     tolerance: float = 1e-10
     """Largest residual of a point on the curve."""
     most_points: int = 2000
     until_s: float = math.inf
-    """Instant of `time.monotonic` after which a curve is not continued [s]."""
+    """Time limit as a value of `time.monotonic` [s]."""
 
 
 class ArcEnd(StrEnum):
@@ -67,41 +67,41 @@ class ArcPoint:
     point: Vector
     """(u, lambda), shape (n + 1,)."""
     tangent: Vector
-    """Unit tangent in the direction of travel."""
+    """Unit tangent in the direction of travel, shape (n + 1,)."""
     arc: float = 0.0
-    """Length of the curve from its start."""
+    """Arc length from the start of the curve."""
     is_fold: bool = False
-    """The parameter turns here; added between two steps."""
+    """Whether the parameter reverses at this point, which is inserted between two steps."""
     end: ArcEnd | None = None
-    """Reason why this point is the last; None on all others."""
+    """Reason for the end of the curve at this point; None for all points before the last."""
 
 
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
-"""A step corrected in fewer iterations is followed by a longer one."""
+"""Number of iterations for which the step length is kept; after fewer iterations the next step is longer."""
 FARTHEST_ASIDE = 0.5
-"""Largest correction relative to the step; a larger one means another branch."""
+"""Largest correction over the step length; a larger correction means another branch."""
 LEAP_GROWTH = 10.0
-"""Factor between the lengths tried at a kink."""
+"""Ratio between successive step lengths tried across a kink."""
 LONGEST_LEAP = 5.0
-"""Largest correction of a leap relative to its length."""
+"""Largest distance between the points before and after a kink, over the length of the step."""
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
-"""Tolerance of test functions (a tangent's component, a multiplier's distance)."""
+"""Tolerance of a zero of a test function (a component of the tangent, a multiplier's distance)."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
-"""Step length over the shortest, and number of consecutive steps below it, that indicate a kink."""
+"""A kink is assumed if MOST_CRAWLED successive steps are shorter than CRAWLING times the shortest step."""
 NEAR_START = 0.2
-"""Relative distance from the start below which a step is checked for closing."""
+"""Distance of a step from the start, over the step length, below which the curve may have closed."""
 SAME_POINT = 1e-6
-"""Distance along the curve below which the start is reached again."""
+"""Distance between two points below which they are the same point of the curve."""
 SHORTEST_BRACKET = 1e-12
-"""Distance along the curve below which points are not distinguished."""
+"""Length of the interval at which the search for a zero ends."""
 
 
 def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:
     """Correct ``guess`` by Newton's method in the hyperplane perpendicular to ``normal``.
 
-    Returns the point and the iterations it took; 0 iterations mean that it did not converge.
+    Return the point and the number of iterations; 0 iterations mean that the method did not converge.
     """
     point = guess.copy()
     for iteration in range(1, NEWTON_ITERATIONS + 1):
@@ -120,7 +120,7 @@ def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tu
 
 
 def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
-    """Return the unit tangent of the curve, in the half-space of ``along``."""
+    """Return the unit tangent of the curve whose product with ``along`` is positive, shape (n + 1,)."""
     _, jacobian = curve.linearised(point)
     system = np.vstack([jacobian, along])
     aim = np.zeros(len(point))
@@ -138,7 +138,7 @@ def trace(
 ) -> Iterator[ArcPoint]:
     """Follow the curve from a point on it until the parameter leaves its bounds.
 
-    Yields the start, then every point and the folds between points; `end` of the last point is the reason.
+    Yield the start, then every point and the folds between points; `end` of the last point is the reason.
 
     Parameters
     ----------
@@ -147,11 +147,11 @@ def trace(
     start
         Point on the curve within the tolerance, shape (n + 1,).
     toward
-        The sign gives the parameter's direction at the start.
+        Its sign is the direction of the parameter at the start.
     bounds
         Range of the parameter, ends included.
     steps
-        Lengths and tolerances.
+        Step lengths and tolerances.
     """
     along = np.zeros(len(start))
     along[-1] = math.copysign(1.0, toward)
@@ -165,7 +165,7 @@ def trace(
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
         if ahead is None or slow > MOST_CRAWLED:
-            # Two kinks this close together leave no smooth curve between them: stop here.
+            # Between two kinks this close together there is no smooth curve: stop here.
             is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap(curve, here, steps)
@@ -195,7 +195,7 @@ def trace(
 
 
 def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
-    """Take one step, shortened until it converges; return the point and the length of the next step."""
+    """Take one step, shortened until it converges; return its point and the length of the next step."""
     while step >= steps.shortest:
         guess = here.point + step * here.tangent
         point, iterations = correct(curve, guess, here.tangent, steps.tolerance)
@@ -222,17 +222,17 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
         return False
     if float(start.tangent @ ahead.tangent) < 0.0:
         return False
-    # Compare points of this curve, because another curve may be as near.
+    # Compare points of this curve only, because another curve may be equally close.
     guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
     point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
 
 
 def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
-    """Cross a kink, where a contact begins and the branch continues or turns back within a rounding error.
+    """Return a point beyond a kink, where a contact begins and the branch may turn back; None if not found.
 
-    The unknowns continue, but the parameter may reverse. Therefore try steps of growing length along the
-    tangent, and along the tangent with reversed parameter, without a limit on the turn.
+    The unknowns continue, but the parameter may reverse. Steps of growing length are tried along the tangent,
+    and along the tangent with reversed parameter, without a limit on the rotation of the tangent.
     """
     mirrored = here.tangent.copy()
     mirrored[-1] = -mirrored[-1]
@@ -250,14 +250,14 @@ def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the ratio of the next step's length to the last, from iterations and turn."""
+    """Return the ratio of the next step length to the last, from iterations and rotation of the tangent."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))
 
 
 def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
-    """Locate a change of sign of the tangent's parameter component, as `locate` does."""
+    """Return the fold between two points; None if there is none or it cannot be located."""
     if before.tangent[-1] * after.tangent[-1] >= 0.0:
         return None
     found = locate(curve, before, after, lambda point: float(point.tangent[-1]), steps.tolerance)
@@ -265,15 +265,15 @@ def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSte
 
 
 Measure = Callable[[ArcPoint], float]
-"""A test function of a point on the curve, which changes sign at an event."""
+"""Test function on the curve, which changes sign at an event."""
 
 
 def locate(
     curve: Curve, before: ArcPoint, after: ArcPoint, measure: Measure, tolerance: float
 ) -> ArcPoint | None:
-    """Find where ``measure`` vanishes between two neighbouring points; Illinois regula falsi on the arc.
+    """Return the point at which ``measure`` vanishes between two neighbouring points, by regula falsi.
 
-    None when a point between them cannot be found on the curve.
+    None if no point of the curve can be found between them.
     """
     low, high = before, after
     value_low, value_high = measure(before), measure(after)
@@ -286,7 +286,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois method: halve the value of an end that is kept twice, so that both ends move.
+        # Illinois method: halve the value at an end that is kept twice, so that both ends move.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0
@@ -299,7 +299,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Find a point of the curve at a share of the chord; try other shares if a kink prevents it."""
+    """Return a point of the curve at a fraction of the chord; a kink may require other fractions."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:
@@ -316,7 +316,7 @@ def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance
 def _at_bound(
     curve: Curve, before: ArcPoint, after: ArcPoint, bounds: tuple[float, float], steps: ArcSteps
 ) -> ArcPoint:
-    """Return the point exactly on the passed bound."""
+    """Return the point of the curve at the bound that the step has passed."""
     bound = bounds[0] if after.point[-1] <= bounds[0] else bounds[1]
     span = after.point[-1] - before.point[-1]
     part = (bound - before.point[-1]) / span if span != 0.0 else 1.0

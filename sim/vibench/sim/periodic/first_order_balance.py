@@ -1,15 +1,14 @@
 """The paper's analytical solution: first-order harmonic balance of power laws, all branches. SI units.
 
 With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs. 4 and 5) is
-P (1 + G N(|P|)) = P_lin: G is the compliance that the spring sees and N its describing function. Squared,
-it is one equation for |P| with a few powers (`vibench.sim.periodic`), so no branch can be missed.
+P (1 + G N(|P|)) = P_lin. G is the compliance at the spring, and N the describing function of the spring. The
+squared magnitude is an equation with a few powers of |P|; all its zeros are found, so no branch is missed.
 
-`positive_zeros` finds all positive zeros of a sum of a few powers with any exponents.
-
-A polynomial of degree 201 with four terms has at most three positive zeros (Descartes), but companion
-matrices and powers of u lose them. Rolle's theorem finds them all: a sum of m powers, divided by its lowest
-power, is monotone between the zeros of its derivative, a sum of m - 1 powers. In t = ln u, and with every
-term divided by the largest, nothing overflows.
+`positive_zeros` finds all positive zeros of a sum of a few powers with any exponents. Companion matrices are
+not accurate enough for this: a polynomial of degree 201 with four terms has at most three positive zeros
+(Descartes), and they miss some. Instead, by Rolle's theorem, a sum of m powers divided by its lowest power is
+monotone between the zeros of its derivative, which has m - 1 powers. The sum is evaluated in t = ln u with
+every term divided by the largest, which avoids overflow.
 """
 
 import math
@@ -23,20 +22,20 @@ from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
-"""Value of a turning point over its largest term, below which it is a double zero."""
+"""Relative value of the sum at an extremum below which the extremum is a double zero."""
 ROOT_TOLERANCE = 1e-15
-"""Absolute tolerance on ln u; brentq adds four units in its last place."""
+"""Absolute tolerance of ln u; brentq adds four units in the last place."""
 
 
 def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
-    """Find every u > 0 with sum c_i u^e_i = 0, ascending.
+    """Return every u > 0 with sum c_i u^e_i = 0, ascending, shape (n,) with n < m.
 
-    Returns an array of shape (n,), n < m; a double zero is given once.
+    A double zero is returned once.
 
     Parameters
     ----------
     coefficients, exponents
-        Shape (m,), finite; exponents may repeat and need not be whole.
+        Finite numbers, shape (m,); exponents may repeat and need not be whole numbers.
     """
     kept, powers = _sum_equal_exponents(
         np.asarray(coefficients, dtype=np.float64), np.asarray(exponents, dtype=np.float64)
@@ -45,7 +44,7 @@ def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
 
 
 def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Floats, Floats]:
-    """Sum equal exponents, drop zeros, sort."""
+    """Add coefficients of equal exponents, drop zeros, and sort by exponent."""
     powers, place = np.unique(exponents, return_inverse=True)
     sums = np.zeros(len(powers))
     np.add.at(sums, place, coefficients)
@@ -53,13 +52,13 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Return the sum divided by its largest term; only the sign is used."""
+    """Return the sum divided by its largest term, because only its sign is needed."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 
 
 def _bounds(coefficients: Floats, exponents: Floats) -> tuple[float, float]:
-    """Return bounds on t, beyond which the lowest or the highest power exceeds all others together."""
+    """Return bounds on t; beyond them the lowest or the highest power exceeds the sum of all others."""
     sizes = np.log(np.abs(coefficients)) + np.log(len(coefficients))
     own = np.log(np.abs(coefficients))
     low = np.min((own[0] - sizes[1:]) / (exponents[1:] - exponents[0]))
@@ -93,9 +92,9 @@ FUNDAMENTAL = np.array([1])
 
 
 def fundamental_share(exponent: int) -> float:
-    """Amplitude of the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1); 3/4 for n = 3, 5/8 for n = 5.
+    """Return the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1), 3/4 for n = 3, 5/8 for n = 5.
 
-    Two exact integers are divided, so the result is correctly rounded for every odd n.
+    The quotient of two exact integers is correctly rounded for every odd n.
     """
     if exponent < 1 or exponent % 2 == 0:
         raise ValueError(
@@ -109,20 +108,20 @@ class FirstOrderState:
     """One solution of the first-order balance at one frequency."""
 
     relative: complex
-    """Phasor P of p, time as exp(+i w t) under U = A0 sin(w t) [m]."""
+    """Phasor P of p for exp(+i w t) and the drive U = A0 sin(w t) [m]."""
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """False on the middle one of three branches, which is not observed in experiments.
+    """False on the middle of three branches, which is not observed in experiments.
 
-    Other instabilities are not included; see `vibench.sim.periodic`.
+    Other instabilities are not included; `vibench.sim.periodic` determines them.
     """
 
 
 def first_order_states(
     structure: LinearStructure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
 ) -> list[FirstOrderState]:
-    """Find every first-order solution at one frequency and drive amplitude, by ascending abs(P).
+    """Return every first-order solution at one frequency and drive amplitude, by ascending abs(P).
 
     Raises ValueError when frequency or amplitude is not allowed.
 
@@ -131,7 +130,7 @@ def first_order_states(
     structure, spring
         Result of `vibench.sim.periodic.harmonic_balance.structure_of`, and the power law.
     frequency_hz, amplitude_m
-        Drive U = amplitude sin(2 pi frequency t): frequency positive, amplitude zero or positive.
+        Drive U = amplitude sin(2 pi frequency t); positive frequency, zero or positive amplitude.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
         raise ValueError(
@@ -161,7 +160,7 @@ def first_order_states(
 
 
 def _describing(size: float, spring: PowerSpring) -> float:
-    """Return N = F_1 / P [N/m] at abs(P) = size * length; infinite if it overflows."""
+    """Return the describing function N = F_1 / P at abs(P) = size * length [N/m]; inf if it overflows."""
     with np.errstate(over="ignore"):
         return float(
             sum(
@@ -172,7 +171,7 @@ def _describing(size: float, spring: PowerSpring) -> float:
 
 
 def _balance_squared(compliance: complex, spring: PowerSpring) -> tuple[Floats, Floats]:
-    """Return |P/length|^2 |1 + G N|^2 as coefficients and exponents of |P|/length."""
+    """Return |P/length|^2 |1 + G N|^2 as coefficients and exponents of a sum of powers of |P|/length."""
     weights = np.array([fundamental_share(n) * f / spring.length for n, f in spring.terms])
     powers = np.array([float(n) for n, _ in spring.terms])
     coefficients = np.concatenate(

@@ -1,11 +1,11 @@
 """Stability of a periodic motion: Floquet multipliers from the variational equation. SI units.
 
-Small departures d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
-e = dF/d(dp/dt) along the motion; their map over one period is the monodromy matrix, whose eigenvalues
-determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). A stretch
-of flight is one matrix exponential. Contacts begin and end exactly where p reaches a stop, and are crossed by
-fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253). Steps are shorter at both ends,
-where the stiffness of a Hertz contact starts like a square root.
+Small perturbations d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
+e = dF/d(dp/dt) along the motion. Their map over one period is the monodromy matrix, whose eigenvalues
+determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Motion
+without contact is one matrix exponential. A contact, from the exact times at which p reaches a stop, is
+integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253). Steps are shorter
+at both ends, where the stiffness of a Hertz contact is a square root.
 """
 
 import math
@@ -21,9 +21,9 @@ from .harmonic_balance import Harmonics, LinearStructure, grid_size, motion_on_g
 from .restoring_force import RestoringForce
 
 CONTACT_STEPS = 96
-"""Magnus steps across one contact."""
+"""Fewest Magnus steps across one contact."""
 STEPS_PER_TURN = 8.0
-"""Magnus steps per radian of the fastest motion of the structure or the compressed spring."""
+"""Magnus steps per radian of the fastest motion of structure and compressed spring."""
 STEPS_PER_HARMONIC = 16
 """Magnus steps per period of the highest harmonic, for a spring that is smooth everywhere."""
 SMOOTH_STEPS = 128
@@ -34,26 +34,26 @@ GAUSS = math.sqrt(3.0) / 6.0
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A periodic motion of p in harmonics."""
+    """Harmonics of a periodic motion of p."""
 
     frequency_hz: float
     harmonics: Harmonics
     relative: Complex
-    """P_k, shape (m,) [m]."""
+    """Phasors P_k, shape (m,) [m]."""
 
     def p(self, turn: Floats) -> Floats:
-        """Displacement p [m] at phases ``turn`` [rad]."""
+        """Return p at phases ``turn`` [rad], shape (k,) [m]."""
         return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ self.relative)
 
     def rate(self, turn: Floats) -> Floats:
-        """dp/dt at phases ``turn`` [m/s]."""
+        """Return dp/dt at phases ``turn`` [rad], shape (k,) [m/s]."""
         omega = 2.0 * math.pi * self.frequency_hz
         factors = 1j * omega * self.harmonics * self.relative
         return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ factors)
 
 
 def multipliers(monodromy: NDArray[np.float64]) -> Complex:
-    """Return the eigenvalues, largest magnitude first."""
+    """Return the eigenvalues of a monodromy matrix, largest magnitude first, shape (2 n,)."""
     values = np.linalg.eigvals(monodromy).astype(np.complex128)
     return values[np.argsort(-np.abs(values), kind="stable")]
 
@@ -61,7 +61,7 @@ def multipliers(monodromy: NDArray[np.float64]) -> Complex:
 def transition(
     structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
 ) -> NDArray[np.float64]:
-    """Return the transition matrix of small departures (d, d') over ``span_rad``, shape (2 n, 2 n)."""
+    """Return the transition matrix of small perturbations (d, d') over ``span_rad``, shape (2 n, 2 n)."""
     departures = _Departures(structure, spring, motion)
     edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
     result = np.eye(2 * structure.size)
@@ -71,20 +71,20 @@ def transition(
 
 
 class _Departures:
-    """Small departures from a motion, between the phases at which p crosses a stop."""
+    """Transition matrices of small perturbations, between the phases at which p crosses a stop."""
 
     def __init__(self, structure: LinearStructure, spring: RestoringForce, motion: Motion) -> None:
         self._structure, self._spring, self._motion = structure, spring, motion
         n = structure.size
         self._system = np.zeros((2 * n, 2 * n))
-        """State matrix without the spring."""
+        """State matrix without the spring, shape (2 n, 2 n)."""
         self._system[:n, n:] = np.eye(n)
         self._system[n:, :n] = -np.linalg.solve(structure.mass, structure.stiffness)
         self._system[n:, n:] = -np.linalg.solve(structure.mass, structure.damping)
         push = -np.linalg.solve(structure.mass, structure.direction)
         self._spring_in = np.concatenate([np.zeros(n), push])
-        """Effect of the spring's force on the state, shape (2 n,)."""
-        # The fastest rate of the structure plus that of the spring at its stiffest [rad/s].
+        """Derivative of the state's rate by the spring's force, shape (2 n,)."""
+        # Fastest eigenvalue of the structure plus angular frequency on the stiffest spring [rad/s].
         samples = grid_size(int(motion.harmonics[-1]))
         omega = 2.0 * math.pi * motion.frequency_hz
         p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
@@ -101,7 +101,7 @@ class _Departures:
         return self._by_magnus(self._marks(start, stop, self._fastest * length))
 
     def _marks(self, start: float, stop: float, turn: float) -> Floats:
-        """Phases between which Magnus steps are taken [rad]."""
+        """Return the phases that bound the Magnus steps, shape (steps + 1,) [rad]."""
         needed = math.ceil(STEPS_PER_TURN * turn)
         if self._spring.kinks:
             even = np.linspace(0.0, math.pi, max(CONTACT_STEPS, needed) + 1)
@@ -110,7 +110,7 @@ class _Departures:
         return np.linspace(start, stop, steps + 1)
 
     def _by_magnus(self, marks: Floats) -> Floats:
-        """Return the transition matrix over all steps between ``marks``, by fourth-order Magnus exponents."""
+        """Return the transition matrix over all steps between ``marks``, by fourth-order Magnus steps."""
         widths = np.diff(marks)
         middles = 0.5 * (marks[1:] + marks[:-1])
         early, late = self._rates(middles - GAUSS * widths), self._rates(middles + GAUSS * widths)
@@ -119,7 +119,7 @@ class _Departures:
         exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
         steps = _exponentials(exponents)
         while len(steps) > 1:
-            # Multiply in pairs: the same number of products, but on whole arrays.
+            # Multiply in pairs, so that numpy works on whole arrays.
             pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
             steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
         return np.asarray(steps[0])
@@ -131,13 +131,13 @@ class _Departures:
         return np.asarray(self._system + self._spring_in[None, :, None] * rows[:, None, :])
 
     def _slopes(self, turn: Floats) -> tuple[Floats, Floats]:
-        """Return stiffness and damping of the spring at phases."""
+        """Return stiffness and damping of the spring at phases, shape (k,) each."""
         p, rate = self._motion.p(turn), self._motion.rate(turn)
         return self._spring.stiffness(p, rate), self._spring.damping(p, rate)
 
 
 def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[float]:
-    """Phases in the span at which p crosses a stop, ascending [rad]."""
+    """Return the phases from 0 to ``span_rad`` at which p crosses a stop, ascending [rad]."""
     samples = grid_size(int(motion.harmonics[-1]))
     grid = 2.0 * math.pi * np.arange(samples + 1) / samples
     wave = waveform(motion.relative, motion.harmonics, samples)
@@ -157,7 +157,7 @@ def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[f
 
 
 def _exponentials(small: Floats) -> Floats:
-    """Exponentials of many matrices whose eigenvalues are below one, by the Pade approximant [3/3]."""
+    """Return the exponentials of matrices whose eigenvalues are below one, by the Pade approximant [3/3]."""
     squared = small @ small
     even = np.eye(small.shape[-1]) + squared / 10.0
     odd = small / 2.0 + squared @ small / 120.0

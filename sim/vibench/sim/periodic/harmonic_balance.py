@@ -1,9 +1,9 @@
 """Periodic motion by harmonic balance, with any number of harmonics, condensed to p. SI units.
 
-The equations P_k + compliance_k F_k(P) = linear_k U, one for every harmonic kept, are solved by damped Newton
-iteration with the exact Jacobian. The alternating frequency-time scheme gives the force. Contact needs many
-harmonics (51 to 400); power laws need few. Their number is chosen by the effect of neglected harmonics,
-which also shows whether the result has converged.
+The equations P_k + compliance_k F_k(P) = linear_k U, one for each harmonic kept, are solved by a damped
+Newton iteration with the exact Jacobian. The alternating frequency-time scheme gives the force. Contact needs
+many harmonics (51 to 400); power laws need few. The estimated effect of neglected harmonics determines their
+number, and shows whether the result has converged.
 """
 
 import math
@@ -18,11 +18,11 @@ from ..specimen.specimen import Specimen
 from ..specimen.state import Complex, Floats, Table, Vector
 from .restoring_force import RestoringForce
 
-# A linear structure seen from its one nonlinear spring. SI units.
+# Condensation of a linear structure to its one nonlinear spring. SI units.
 #
-# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. At harmonic k of the frequency omega the
-# linear equations can be solved for q, so that only the scalar p is unknown (Krack and Gross, Harmonic
-# Balance for Nonlinear Vibration Problems, Springer 2019, section 2.5):
+# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. At each harmonic k of omega the equations are
+# linear in q and are solved for q, so that only the scalar p is unknown (Krack and Gross, Harmonic Balance
+# for Nonlinear Vibration Problems, Springer 2019, section 2.5):
 #
 #     P_k = linear_k U - compliance_k F_k,   compliance_k = b.Z_k^-1 b,   Z_k = K - (k w)^2 M + i k w C
 
@@ -32,20 +32,20 @@ Harmonics = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class LinearStructure:
-    """Masses, springs and dampers, with the directions in which nonlinear spring and drive act."""
+    """Linear structure, with the directions in which the nonlinear spring and the drive act."""
 
     mass: Matrix
-    """M, shape (n, n), regular [kg]."""
+    """Mass matrix M, regular, shape (n, n) [kg]."""
     damping: Matrix
-    """C, shape (n, n) [N s/m]."""
+    """Damping matrix C, shape (n, n) [N s/m]."""
     stiffness: Matrix
-    """K, shape (n, n), regular [N/m]."""
+    """Stiffness matrix K, regular, shape (n, n) [N/m]."""
     direction: Vector
-    """b, shape (n,): p = b.q, and the spring pulls with -b F."""
+    """Direction b of the spring, shape (n,): p = b.q, and the spring's force on the structure is -b F."""
     entry_stiffness: Vector
-    """e_k, shape (n,) [N/m]: force per displacement of the drive."""
+    """Force e_k per displacement of the drive, shape (n,) [N/m]."""
     entry_damping: Vector
-    """e_c, shape (n,) [N s/m]: force per velocity of the drive."""
+    """Force e_c per velocity of the drive, shape (n,) [N s/m]."""
 
     def __post_init__(self) -> None:
         size = len(self.direction)
@@ -57,7 +57,7 @@ class LinearStructure:
 
     @property
     def size(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return len(self.direction)
 
 
@@ -74,7 +74,7 @@ def structure_of(specimen: Specimen) -> LinearStructure:
 
 
 class Condensed(NamedTuple):
-    """A structure at one frequency, per harmonic; slopes are derivatives by omega."""
+    """Condensed structure at one frequency, for each harmonic; slopes are derivatives by omega."""
 
     compliance: Complex
     """b.Z_k^-1 b, shape (m,) [m/N]."""
@@ -83,22 +83,22 @@ class Condensed(NamedTuple):
     """P_1 / U without the spring."""
     linear_slope: complex
     reach: Complex
-    """Z_k^-1 b, shape (m, n): every displacement per force in the spring [m/N]."""
+    """Displacements per force of the spring, Z_k^-1 b, shape (m, n) [m/N]."""
     carried: Complex
-    """Z_1^-1 e, shape (n,): every displacement over U without the spring."""
+    """Displacements without the spring over U, Z_1^-1 e, shape (n,)."""
 
 
 def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> Condensed:
-    """Solve the linear part of the structure at the given multiples of ``omega``.
+    """Return the structure condensed to its spring, at the given multiples of ``omega``.
 
     Parameters
     ----------
     structure
-        Structure; its stiffness must be regular if harmonic 0 is requested.
+        Linear structure; harmonic 0 requires a regular stiffness matrix.
     omega
         Angular frequency of the drive, positive [rad/s].
     harmonics
-        Shape (m,), zero and above.
+        Harmonic numbers, zero or positive, shape (m,).
     """
     turn = harmonics.astype(np.float64)[:, None, None]
     dynamic = _dynamic(structure, omega * turn)
@@ -126,16 +126,16 @@ def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
     return structure.stiffness - omega**2 * structure.mass + 1j * omega * structure.damping
 
 
-# Between harmonics and time: the alternating frequency-time scheme for one spring. SI units.
+# Alternating frequency-time scheme for one spring. SI units.
 #
-# p(theta) = Re sum P_k exp(i k theta) over the harmonics kept, theta = omega t in [0, 2 pi). The force and
-# its slopes are evaluated on a grid in time and transformed by FFT. The Fourier coefficients S_m and E_m of
-# the slopes give the exact Jacobian,
+# p(theta) = Re sum P_k exp(i k theta) over the harmonics kept, with theta = omega t in [0, 2 pi). The force
+# and its derivatives are evaluated on a time grid and transformed by FFT. The Fourier coefficients S_m of
+# dF/dp and E_m of dF/d(dp/dt) give the exact Jacobian,
 # dF_k = sum_l (S_{k-l} + i l w E_{k-l}) dP_l + (S_{k+l} - i l w E_{k+l}) dP_l*
 # (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
 
 SAMPLES_PER_HARMONIC = 16
-"""Grid points per period of the highest harmonic: only components 15 times above it alias."""
+"""Grid points per period of the highest harmonic; only components 15 times above that harmonic alias."""
 FEWEST_SAMPLES = 1024
 
 
@@ -143,13 +143,13 @@ class ForceHarmonics(NamedTuple):
     """Harmonics of the spring's force, and their derivatives by the harmonics of the motion."""
 
     force: Complex
-    """F_k of the harmonics kept, shape (m,) [N]."""
+    """Force harmonics F_k, shape (m,) [N]."""
     holomorphic: Complex
     """dF_k / dP_l, shape (m, m) [N/m]."""
     conjugate: Complex
     """dF_k / dP_l*, shape (m, m) [N/m]."""
     frequency_slope: Complex
-    """dF_k / domega at fixed P, shape (m,) [N s]: the rate-dependent part."""
+    """dF_k / domega at fixed P, which is due to the rate-dependent force, shape (m,) [N s]."""
 
 
 def grid_size(highest: int) -> int:
@@ -167,7 +167,7 @@ def waveform(phasors: Complex, harmonics: Harmonics, samples: int) -> Floats:
 
 
 def phasors_of(wave: Floats) -> Complex:
-    """Return all harmonics of a period on an even grid, shape (samples/2 + 1,): inverse of `waveform`."""
+    """Return all harmonics of one period on an even grid, shape (samples/2 + 1,); inverse of `waveform`."""
     spectrum = 2.0 / len(wave) * np.fft.rfft(wave)
     spectrum[0] *= 0.5
     return spectrum
@@ -176,7 +176,7 @@ def phasors_of(wave: Floats) -> Complex:
 def motion_on_grid(
     phasors: Complex, harmonics: Harmonics, omega: float, samples: int
 ) -> tuple[Floats, Floats]:
-    """Displacement p and dp/dt over one period, shape (samples,) each [m, m/s]."""
+    """Return p and dp/dt over one period, shape (samples,) each [m, m/s]."""
     return waveform(phasors, harmonics, samples), waveform(
         1j * harmonics * omega * phasors, harmonics, samples
     )
@@ -185,7 +185,7 @@ def motion_on_grid(
 def force_harmonics(
     spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float
 ) -> ForceHarmonics:
-    """Evaluate the spring in time along a motion given in harmonics; not finite where it overflows."""
+    """Return the harmonics of the spring's force for those of the motion; not finite on overflow."""
     samples = grid_size(int(harmonics[-1]))
     p, rate = motion_on_grid(phasors, harmonics, omega, samples)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -204,7 +204,7 @@ def _force_harmonics(
     turning = 1j * omega * harmonics[None, :]
     holomorphic = stiffness_lines[difference] + turning * damping_lines[difference]
     conjugate = stiffness_lines[total] - turning * damping_lines[total]
-    # A mean has no conjugate partner: it counts once, not as half of a pair.
+    # The mean has no conjugate partner: it counts once, not as half of a pair.
     once = np.where(harmonics == 0, 0.5, 1.0)[:, None]
     return ForceHarmonics(
         force=phasors_of(spring.force(p, rate))[harmonics],
@@ -215,7 +215,7 @@ def _force_harmonics(
 
 
 def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float) -> Complex:
-    """Return all force harmonics that the grid resolves, shape (samples/2 + 1,), to estimate the error."""
+    """Return all force harmonics that the grid resolves, for the error estimate, shape (samples/2 + 1,)."""
     samples = grid_size(int(harmonics[-1]))
     p, rate = motion_on_grid(phasors, harmonics, omega, samples)
     return phasors_of(spring.force(p, rate))
@@ -224,20 +224,20 @@ def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, o
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12
 ROUNDING = 1e-12
-"""Newton's iteration has converged when all residuals are below this part of the spring's length scale."""
+"""Largest residual of a converged Newton iteration, over the spring's length scale."""
 
 
 class HarmonicSet(StrEnum):
     """Harmonics of a solution."""
 
     ODD = "odd"
-    """Motions that mirror themselves after half a period, as of a symmetric specimen at low levels."""
+    """Odd harmonics, for motions that mirror themselves after half a period (equal stops, low levels)."""
     ALL = "all"
-    """Any motion of the drive's period, including a mean."""
+    """All harmonics and the mean: any motion with the drive's period."""
 
 
 class BalanceEnd(StrEnum):
-    """Outcome of a balance, with advice."""
+    """Outcome of a harmonic balance, with advice to the user."""
 
     CONVERGED = "converged"
     TOO_FEW_HARMONICS = "the harmonics left out still matter: allow more, or loosen the tolerance"
@@ -245,7 +245,7 @@ class BalanceEnd(StrEnum):
 
 
 def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
-    """Return the harmonic numbers, ascending."""
+    """Return the harmonic numbers up to ``highest``, ascending, shape (m,)."""
     if highest < 1:
         raise ValueError(f"Highest harmonic {highest} is not allowed: it must be 1 or more.")
     return np.arange(1, highest + 1, 2) if kept is HarmonicSet.ODD else np.arange(highest + 1)
@@ -253,7 +253,7 @@ def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
 
 @dataclass(frozen=True, eq=False)
 class BalanceProblem:
-    """The equations at one frequency: real unknowns (Re P, Im P) over the spring's length scale."""
+    """Equations of harmonic balance with the real unknowns (Re P, Im P) over the spring's length scale."""
 
     structure: LinearStructure
     spring: RestoringForce
@@ -265,11 +265,11 @@ class BalanceProblem:
         return 2 * len(self.harmonics) - int(self.harmonics[0] == 0)
 
     def packed(self, phasors: Complex) -> Vector:
-        """Convert phasors [m] to unknowns."""
+        """Return the unknowns for phasors [m], shape (size,)."""
         return _real(phasors, self.harmonics) / self.spring.length
 
     def phasors(self, unknowns: Vector) -> Complex:
-        """Convert unknowns to phasors, shape (m,) [m]."""
+        """Return the phasors for unknowns, shape (m,) [m]."""
         scaled = unknowns * self.spring.length
         count = len(self.harmonics)
         imaginary = np.zeros(count)
@@ -281,7 +281,7 @@ class BalanceProblem:
     ) -> tuple[Vector, Table, Vector, Vector]:
         """Return the residual, its Jacobian, and its derivatives by omega and by the drive amplitude.
 
-        Shapes (n,), (n, n), (n,), (n,). Not finite where the force overflows.
+        Shapes (n,), (n, n), (n,), (n,). Values are not finite where the force overflows.
         """
         phasors = self.phasors(unknowns)
         seen = condense(self.structure, omega, self.harmonics)
@@ -313,23 +313,23 @@ class BalanceProblem:
 
 
 def _real(phasors: Complex, harmonics: Harmonics) -> Vector:
-    """Return real parts, then imaginary parts; a mean has no imaginary part."""
+    """Return the real parts, then the imaginary parts; the mean has no imaginary part."""
     return np.concatenate([phasors.real, phasors.imag[int(harmonics[0] == 0) :]])
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """A periodic motion in harmonics, with an error estimate."""
+    """Harmonics of a periodic motion, with an error estimate."""
 
     frequency_hz: float
     amplitude_m: float
     harmonics: Harmonics
     relative: Complex
-    """Phasors P_k of p, time as exp(+i k w t) under U = A0 sin(w t), shape (m,) [m]."""
+    """Phasors P_k of p for exp(+i k w t) and the drive U = A0 sin(w t), shape (m,) [m]."""
     displacements: Complex
     """Phasors of every displacement of the structure, shape (m, n) [m]."""
     left_out: float
-    """Error estimate: effect of neglected force harmonics on p, relative to its fundamental."""
+    """Error estimate: effect of neglected force harmonics on p, over the fundamental of p."""
     outcome: BalanceEnd
 
     @property
@@ -348,14 +348,14 @@ class Balance:
 
     @property
     def response_i(self) -> Vector:
-        """Largest magnitude over a period of every displacement and of p, over the drive amplitude."""
+        """Largest magnitude of every displacement and of p, over the drive amplitude, shape (n + 1,)."""
         samples = grid_size(int(self.harmonics[-1]))
         each = np.column_stack([self.displacements, self.relative]).T
         return np.array([_largest(line, self.harmonics, samples) for line in each]) / self.amplitude_m
 
 
 def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
-    """Return the largest magnitude on the grid, refined by a parabola through the neighbouring points."""
+    """Return the largest magnitude, from a parabola through the largest grid value and its neighbours."""
     wave = np.abs(waveform(phasors, harmonics, samples))
     top = int(np.argmax(wave))
     before, here, after = wave[top - 1], wave[top], wave[(top + 1) % samples]
@@ -364,7 +364,7 @@ def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
 
 
 def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: float) -> tuple[Vector, bool]:
-    """Solve by damped Newton iteration, halving steps; return unknowns and success."""
+    """Solve by Newton's iteration with step halving; return the unknowns and whether it converged."""
     unknowns = start.copy()
     residual, jacobian, _, _ = problem.linearised(unknowns, omega, amplitude_m)
     error = size_of(residual)
@@ -382,20 +382,20 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
             if trial_error < error:
                 break
         else:
-            # No step reduces the error: converged if the error is at rounding level, else failed.
+            # No step reduces the error: the iteration has converged if the error is at rounding level.
             return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
         unknowns, residual, jacobian, error = trial, trial_residual, trial_jacobian, trial_error
     return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
 
 
 def size_of(values: Vector) -> float:
-    """Return the largest magnitude; infinite when anything is not finite."""
+    """Return the largest magnitude; infinite if any value is not finite."""
     size = float(np.max(np.abs(values)))
     return size if math.isfinite(size) else math.inf
 
 
 def with_harmonics(phasors: Complex, known: Harmonics, wanted: Harmonics) -> Complex:
-    """Return phasors for another set of harmonics; unknown ones are zero."""
+    """Return the phasors for another set of harmonics; harmonics that are not known are zero."""
     carried = np.zeros(max(int(known[-1]), int(wanted[-1])) + 1, dtype=np.complex128)
     carried[known] = phasors
     return carried[wanted]

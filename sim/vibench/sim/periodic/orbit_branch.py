@@ -27,7 +27,7 @@ from .continuation import ArcSteps
 from .shooting import PeriodicOrbit, PeriodMap, ShootingEnd, describe_orbit
 
 ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
-"""The tolerance is 1e-9 of the gap, the smallest that the flow at reference accuracy allows."""
+"""Step lengths; the tolerance of 1e-9 gaps is the smallest that integration at reference accuracy allows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +36,9 @@ class ExactFamily:
 
     mapping: PeriodMap
     reference: Harmonic
-    """Drive from which the scales of states follow."""
+    """Drive that defines the scales of states."""
     tolerance: ClassVar = math.inf
-    """No limit: the flow is exact."""
+    """No limit on the error estimate, because the integration is exact."""
 
     @property
     def scales(self) -> Vector:
@@ -48,20 +48,20 @@ class ExactFamily:
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
         """Return the closure error over a period, its derivative by the state, and a ratio of scales.
 
-        The map scales velocities by the drive, a family by its reference: multiply slopes by the ratio.
+        The map scales velocities by its drive, the family by its reference drive; the ratio converts slopes.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
         return (self.mapping.image(state, drive) - state) / self.scales, derivative - np.eye(6), ratio
 
-    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
+    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002
         """Return None: there is no finer resolution."""
         return None
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitFamily(ExactFamily):
-    """Fixed points along a path; the last component of a point is the parameter over its scale."""
+    """Fixed points along a drive path; the last component of a point is parameter / scale."""
 
     path: DrivePath
     scale: float
@@ -95,7 +95,7 @@ class OrbitFamily(ExactFamily):
         return slope
 
     def report(self, point: Vector) -> OrbitReport:
-        """Responses, multipliers and contacts."""
+        """Return responses, Floquet multipliers and contacts of the motion at a point."""
         state, drive = self.state_at(point), self.drive_at(point)
         gone = (self.mapping.image(state, drive) - state) / state_scales(self.mapping.specimen, drive)
         orbit = describe_orbit(self.mapping, drive, state, gone)
@@ -115,8 +115,8 @@ def periodic_branch(
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m] to ``stop``.
 
-    The branch ends at ``stop``, or back at the value of its start if it turns back. Pseudo-arclength
-    continuation (Keller 1977): steps along the curve, so that folds are passed.
+    The branch ends at ``stop``, or at its starting value if it turns back. It is followed through folds by
+    pseudo-arclength continuation (Keller 1977).
 
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.
     """
@@ -136,22 +136,22 @@ def periodic_branch(
 def periodic_branch_within(
     orbit: PeriodicOrbit, path: DrivePath, low: float, high: float, steps: ArcSteps = ORBIT_STEPS
 ) -> Branch:
-    """Follow a periodic motion both ways along a drive path, through folds, to the ends of a range.
+    """Follow a periodic motion in both directions along a drive path, from ``low`` to ``high``.
 
-    Returns the whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` are
-    the reasons for its ends. A closed branch is followed once. Raises ValueError when the orbit did not
-    converge, or lies outside the range.
+    Return the whole branch, through its folds; its parameter ascends where it has no fold. `Branch.begin` and
+    `Branch.end` are the reasons for its ends. A closed branch is followed once. Raises ValueError when the
+    orbit did not converge, or is outside the range.
 
     Parameters
     ----------
     orbit
-        Periodic motion whose drive lies on the path, within the range.
+        Periodic motion whose drive is on the path and within the range.
     path
         `FrequencyPath` or `AmplitudePath`.
     low, high
         Ends of the range, ascending [Hz, or m].
     steps
-        Lengths and tolerances; the range is ten units long.
+        Step lengths and tolerances; the range is ten units long.
     """
     value = parameter_value(path, orbit.drive)
     family, start = _family_at(orbit, path, value, range_scale(low, high, value))

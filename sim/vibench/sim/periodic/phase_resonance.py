@@ -1,10 +1,10 @@
-"""A mode's phase resonance along the level of the drive, stable or not: its backbone. SI units.
+"""Backbone of a mode: its phase resonance, stable or not, as a function of the drive level. SI units.
 
 At a phase resonance the fundamental of m0 lags the base by a given angle, usually a quarter of a period
-(Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u drives the motion relative to
-the base by m w^2 u, in phase with u; so the relative motion lags by a quarter of a period. Shooting, with the
-phase as a seventh equation and the frequency as a seventh unknown, finds the phase resonance.
-Pseudo-arclength continuation follows it over the level.
+(Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u exerts the inertia force m w^2 u
+on the motion relative to the base. It is in phase with u, so the relative motion lags u by a quarter of a
+period. Shooting with the phase as a seventh equation and the frequency as a seventh unknown finds the phase
+resonance. Pseudo-arclength continuation follows it over the level.
 """
 
 import math
@@ -27,25 +27,25 @@ from .shooting import PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
-"""Steps along the branch; one decade of level has the length `LENGTH_PER_DECADE`."""
+"""Step lengths along the branch; a decade of level has the length `LENGTH_PER_DECADE`."""
 LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
-"""A change of the frequency by this share counts as one unit of length."""
+"""Relative change of the frequency that counts as one unit of length."""
 FARTHEST = 20.0
-"""Largest distance of an iteration from the start, in units of frequency or level."""
+"""Largest change of frequency or level in an iteration, in units of length."""
 STRAYED = 1e3
-"""Largest state of an iteration in gaps; on a hard spring, larger ones would take minutes."""
+"""Largest state in an iteration, over the gap; on a hard spring, larger states would take minutes."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
-"""Step of differences for derivatives of the phase, over each unknown's scale."""
+"""Step of the finite differences for derivatives of the phase, over the scale of each unknown."""
 SCAN_POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseResonanceFamily(ExactFamily):
-    """Motions with a given phase; the last two components are the logarithms of frequency and amplitude.
+    """Motions with a given phase; the last two unknowns are the logarithms of frequency and amplitude.
 
-    They refer to the drive from which the scales of states follow.
+    The logarithms are relative to the reference drive.
     """
 
     phase_rad: float
@@ -53,11 +53,11 @@ class PhaseResonanceFamily(ExactFamily):
 
     @property
     def path(self) -> DrivePath:
-        """Path along amplitude; the frequency follows from the phase."""
+        """Path along amplitude; its frequency is not used, because the phase determines the frequency."""
         return AmplitudePath(self.reference.frequency_hz)
 
     def amplitude_m(self, point: Vector) -> float:
-        """Drive amplitude at a point [m]."""
+        """Return the drive amplitude at a point [m]."""
         return self.reference.amplitude_m * float(10.0 ** (point[7] / LENGTH_PER_DECADE))
 
     def drive_at(self, point: Vector) -> Harmonic:
@@ -66,7 +66,7 @@ class PhaseResonanceFamily(ExactFamily):
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return the closure error over a period, the phase error, and their derivatives, shape (7, 8)."""
+        """Return closure error and phase error, shape (7,), and their derivatives, shape (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         drive, state = self.drive_at(point), point[:6] * self.scales
@@ -81,7 +81,7 @@ class PhaseResonanceFamily(ExactFamily):
         return np.append(gone, off), np.vstack([np.column_stack([by_state, by_frequency, by_level]), slopes])
 
     def _off(self, point: Vector) -> float:
-        """Return the sine of the error of the phase of x over the base."""
+        """Return the sine of the phase error of m0 relative to the base."""
         run = self.mapping.orbit(point[:6] * self.scales, self.drive_at(point), SAMPLES)
         count = self.mapping.periods * SAMPLES
         # The base A0 sin(w t) has the phasor -i A0.
@@ -90,7 +90,7 @@ class PhaseResonanceFamily(ExactFamily):
         return float(turned.imag / abs(turned))
 
     def report(self, point: Vector) -> OrbitReport:
-        """Responses, multipliers and contacts."""
+        """Return responses, Floquet multipliers and contacts of the motion at a point."""
         drive = self.drive_at(point)
         family = OrbitFamily(self.mapping, drive, AmplitudePath(drive.frequency_hz), drive.amplitude_m)
         return family.report(np.append(point[:6] * self.scales / family.scales, 1.0))
@@ -104,23 +104,23 @@ def phase_resonance_branch(
     phase_rad: float = QUARTER_BEHIND,
     steps: ArcSteps = STEPS,
 ) -> Branch:
-    """Follow a mode's phase resonance from the motion without contacts over the level of the base.
+    """Follow the phase resonance of a mode over the level of the base, from a level without contact.
 
-    Returns the branch over amplitude, with the frequency and the multipliers of each motion; it may turn
-    back. Raises ValueError without damping, when the motion without contacts does not have this phase exactly
-    once in the band, when no motion is found at the lower level, or it reaches the stops there, or when `of`
-    is not a word of `PhaseReference`.
+    Return the branch over amplitude, with the frequency and the multipliers of each motion; it may turn back.
+    Raises ValueError without damping, unless the motion without contact has this phase exactly once in the
+    band, when no motion is found at the lower level or m1 reaches its stops there, or when `of` is not a word
+    of `PhaseReference`.
 
     Parameters
     ----------
     specimen
-        Any contact law; two equal stops, or none.
+        Specimen with any contact law, and two equal stops or none.
     band_hz
-        Band around one mode, where the motion without contacts has this phase once [Hz].
+        Band around one mode, in which the motion without contact has this phase once [Hz].
     levels_m
-        Drive amplitudes, ascending [m]; at the lower one, m1 must not reach its stops.
+        Drive amplitudes, ascending [m]; at the lower level m1 must not reach its stops.
     of, phase_rad
-        Reference of the motion of m0, and its phase relative to the base, both as displacements.
+        Motion of m0 (absolute or relative to the base), and its phase relative to the base displacement.
     steps
         Step lengths along the branch: half a unit is a quarter of a decade of level, or 5 % of frequency.
     """
@@ -156,7 +156,7 @@ def phase_resonance_branch(
 def linear_phase_resonance_hz(
     specimen: Specimen, band_hz: tuple[float, float], of: PhaseReference, phase_rad: float
 ) -> float:
-    """Find the frequency in a band at which m0, free of contacts, has a phase over the base [Hz]."""
+    """Return the frequency in a band at which m0, without contact, has a given phase to the base [Hz]."""
 
     def off(frequency_hz: float) -> float:
         seen = complex(base_transmissibility(specimen, frequency_hz)[0, 0])
@@ -165,7 +165,7 @@ def linear_phase_resonance_hz(
 
     grid = np.linspace(*band_hz, SCAN_POINTS)
     values = [off(float(each)) for each in grid]
-    # Only falling values: the motion lags more as the frequency rises through a mode.
+    # Use only falling values: the lag increases as the frequency rises through a mode.
     found_hz = [
         float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
         for k in range(len(grid) - 1)

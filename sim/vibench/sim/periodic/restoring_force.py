@@ -1,4 +1,4 @@
-"""The nonlinear spring between m1 and m2: force and derivatives. SI units."""
+"""Nonlinear spring between m1 and m2: force and derivatives. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from ..specimen.state import Floats
 
 @dataclass(frozen=True)
 class PowerSpring:
-    """A sum of odd powers, F = sum F_i (p / length)^n_i; this form has no overflowing coefficients."""
+    """Sum of odd powers, F = sum F_i (p / length)^n_i; in this form the coefficients do not overflow."""
 
     length: float
-    """Displacement at which the terms have the given forces [m]."""
+    """Reference displacement, at which term i has the force F_i [m]."""
     terms: tuple[tuple[int, float], ...]
-    """(n_i, F_i [N]) with n_i odd; none for no force."""
+    """Exponents and forces (n_i, F_i [N]) with n_i odd; empty for no force."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.length < math.inf:
@@ -34,7 +34,7 @@ class PowerSpring:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Values of p where a derivative of the force jumps [m]: none, because a power law is smooth."""
+        """Values of p at which a derivative of the force jumps [m]; empty, because a power law is smooth."""
         return ()
 
     @property
@@ -43,33 +43,33 @@ class PowerSpring:
         return True
 
     def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
-        """F [N]; infinite where it overflows."""
+        """Return the force F, shape of ``p`` [N]; infinite on overflow."""
         with np.errstate(over="ignore", under="ignore"):
             return np.asarray(sum(f * (p / self.length) ** n for n, f in self.terms) + 0.0 * p)
 
     def stiffness(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
-        """dF/dp [N/m]."""
+        """Return the stiffness dF/dp, shape of ``p`` [N/m]."""
         with np.errstate(over="ignore", under="ignore"):
             slope = sum(n * f / self.length * (p / self.length) ** (n - 1) for n, f in self.terms)
             return np.asarray(slope + 0.0 * p)
 
     def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - no loss of its own
-        """Zero."""
+        """Return the damping dF/d(dp/dt), which is zero, shape of ``p`` [N s/m]."""
         return np.zeros_like(p)
 
 
 @dataclass(frozen=True)
 class GapSpring:
-    """Stops on one or both sides: (k d^exponent + beside d) (1 + loss dd/dt) at the penetration d."""
+    """Stops on one or both sides: F = (k d^exponent + beside d) (1 + loss dd/dt) at penetration d."""
 
     stiffness_coefficient: float
-    """k [N/m^exponent]."""
+    """Contact stiffness k [N/m^exponent]."""
     exponent: float
-    """1 for a linear stop, 3/2 for Hertz."""
+    """Exponent: 1 for a linear stop, 3/2 for a Hertz contact."""
     upper: float
-    """Position of the stop at positive p [m]."""
+    """Gap at positive p [m]; infinite for no stop."""
     lower: float
-    """The stop at negative p, as a positive distance [m]; infinite for none."""
+    """Gap at negative p, positive [m]; infinite for no stop."""
     loss: float = 0.0
     """Hunt and Crossley's lambda over k [s/m]."""
     beside: float = 0.0
@@ -88,32 +88,32 @@ class GapSpring:
 
     @property
     def length(self) -> float:
-        """Gap of the nearer stop [m]."""
+        """Smaller gap [m]."""
         return min(self.upper, self.lower)
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Values of p where a derivative of the force jumps, ascending [m]: the stops."""
+        """Values of p at which a derivative of the force jumps, ascending [m]: the stops."""
         return tuple(stop for stop in (-self.lower, self.upper) if math.isfinite(stop))
 
     @property
     def is_odd(self) -> bool:
-        """Whether the gaps are equal."""
+        """Whether F(-p, -v) = -F(p, v): True for equal gaps."""
         return self.upper == self.lower
 
     def force(self, p: Floats, rate: Floats) -> Floats:
-        """F [N]."""
+        """Return the force F, shape of ``p`` [N]."""
         side, depth = self._pressed(p)
         return side * self._push(depth) * (1.0 + self.loss * side * rate)
 
     def stiffness(self, p: Floats, rate: Floats) -> Floats:
-        """dF/dp [N/m]."""
+        """Return the stiffness dF/dp, shape of ``p`` [N/m]."""
         side, depth = self._pressed(p)
         slope = self.exponent * self.stiffness_coefficient * depth ** (self.exponent - 1.0) + self.beside
         return np.where(depth > 0.0, slope * (1.0 + self.loss * side * rate), 0.0)
 
     def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - linear in the rate
-        """dF/d(dp/dt) [N s/m]."""
+        """Return the damping dF/d(dp/dt), shape of ``p`` [N s/m]."""
         _, depth = self._pressed(p)
         return self.loss * self._push(depth)
 
@@ -126,15 +126,15 @@ class GapSpring:
 
 
 RestoringForce = PowerSpring | GapSpring
-"""F(p, dp/dt), added to the linear spring between the masses."""
+"""Force F(p, dp/dt) between m1 and m2, in addition to the linear spring."""
 LINEAR = PowerSpring(1.0, ())
-"""No force, with an arbitrary length scale."""
+"""Spring without force, with an arbitrary length scale."""
 
 
 def spring_of(specimen: Specimen) -> RestoringForce:
     """Return the restoring force of a specimen's stops for harmonic balance.
 
-    Raises ValueError when the stops are rigid, whose force is not finite.
+    Raises ValueError for rigid stops, because their force is not finite.
     """
     lower, upper = specimen.gaps_m
     match specimen.contact:

@@ -1,7 +1,7 @@
-"""Periodic motions with impacts by shooting: states to which the exact flow returns. SI units.
+"""Periodic motions with impacts by shooting: fixed points of the exact period map. SI units.
 
-Newton's iteration on the period map finds stable and unstable motions alike, of any number of drive
-periods (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 6.4).
+Newton's iteration on the period map finds stable and unstable motions with any number of drive periods
+(Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 6.4).
 """
 
 import math
@@ -31,22 +31,22 @@ from .harmonic_balance import phasors_of, size_of
 
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #
-# A mirrored motion returns with all signs changed after half a drive period. It is a fixed point of the half
-# map: the flow over half a period, then a change of sign. The derivative by the state is exact, because it is
-# propagated with the motion; towards a grazing contact on a rigid stop it tends to infinity. The derivatives
-# by frequency and amplitude are fourth-order central differences at reference accuracy. Their steps are far
-# above the error of the flow (1e-10) and far below the gap. They have five to seven digits, and only Newton's
-# iteration uses them.
+# A mirrored motion has the opposite state half a drive period later. It is a fixed point of the half-period
+# map: integrate over half a period, then change all signs. The derivative by the state is exact, because it
+# is propagated with the motion; it tends to infinity as a contact with a rigid stop approaches grazing. The
+# derivatives by frequency and amplitude are fourth-order central differences at reference accuracy. Their
+# steps are far above the integration error (1e-10) and far below the gap. They are accurate to five to seven
+# digits, and only Newton's iteration uses them.
 
 DIFFERENCE = 1e-5
-"""Step of a difference, relative to the parameter."""
+"""Step of the finite differences, over the parameter."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
-"""Fourth-order central difference."""
+"""Offsets and weights of the fourth-order central difference."""
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodMap:
-    """The map whose fixed points are periodic motions; states over their scales."""
+    """Map of a state over a whole or half period, whose fixed points are periodic motions."""
 
     specimen: Specimen
     shape: OrbitShape = OrbitShape.REPEATED
@@ -68,7 +68,7 @@ class PeriodMap:
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Map of a simpler motion (half the period, or mirrored), which this motion may become."""
+        """Map of simpler motions (half the period, or mirrored) among the fixed points; None if none."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -77,7 +77,7 @@ class PeriodMap:
         return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the image of ``state``, shape (6,), at the drive's phase zero; NaN if lost."""
+        """Return the image of a state at the drive's phase zero, shape (6,); NaN if the run was lost."""
         if not self._may_start(state):
             return np.full(6, math.nan)
         run = self._run(state, drive, self.turns)
@@ -86,7 +86,7 @@ class PeriodMap:
         return -run.final_state if self.shape is OrbitShape.MIRRORED else run.final_state
 
     def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
-        """Follow the whole motion, sampled ``samples`` times a drive period."""
+        """Return the motion over its whole period, with ``samples`` samples per drive period."""
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
@@ -112,7 +112,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * state_scales(self.specimen, drive)))
 
     def _may_start(self, state: Vector) -> bool:
-        """Return whether a start is possible; a diverging iteration may go beyond a rigid stop."""
+        """Return whether a run can start from a state; a diverging iteration may pass a rigid stop."""
         match self.specimen.contact:
             case RigidStops():
                 lower, upper = self.specimen.gaps_m
@@ -138,16 +138,16 @@ MOST_HALVINGS = 8
 RETURNED = 1e-9
 """Largest closure error of a periodic motion, over the state's scale."""
 FLOW_ERROR = 1e-10
-"""Error of a period at reference accuracy, over the state's scale; the measured error is a tenth of it
-(docs/accuracy.md)."""
+"""Assumed integration error in a period at reference accuracy, over the state's scale; ten times the measured
+error (docs/accuracy.md)."""
 SAMPLES = 4096
-"""Samples of a drive period from which responses are taken."""
+"""Samples per drive period for the responses."""
 SETTLING_PERIODS = 400
-"""Drive periods followed before shooting begins, where no state is given."""
+"""Drive periods of the run from rest that gives the initial guess if no state is given."""
 
 
 class ShootingEnd(StrEnum):
-    """Outcome of shooting, with advice."""
+    """Outcome of shooting, with advice to the user."""
 
     CONVERGED = "converged"
     NO_ORBIT = "no periodic motion near the start: start elsewhere, or ask for another shape or period"
@@ -155,7 +155,7 @@ class ShootingEnd(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
-    """A periodic motion, its stability and its responses."""
+    """A periodic motion with its stability and responses."""
 
     drive: Harmonic
     period_map: PeriodMap
@@ -165,7 +165,7 @@ class PeriodicOrbit:
     defect: float
     """Closure error over the state's scale."""
     error: float
-    """Error bound relative to the fundamental of p: closure and flow error, amplified by the map."""
+    """Error bound over the fundamental of p: closure and integration error, amplified by (map - I)^-1."""
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
@@ -184,7 +184,7 @@ class PeriodicOrbit:
 
     @property
     def impacts(self) -> int:
-        """Contacts that begin in a period of the motion."""
+        """Number of contacts that begin in a period of the motion."""
         return self.signs.contacts
 
 
@@ -195,19 +195,18 @@ def periodic_orbit(
     periods: int = 1,
     start: ArrayLike | None = None,
 ) -> PeriodicOrbit:
-    """Find a periodic motion near a state.
+    """Return the periodic motion near a state; check its ``outcome`` first.
 
-    Returns the motion; check ``outcome`` first. Raises ValueError when the drive has a phase, or no
-    amplitude.
+    Raises ValueError when the phase of the drive is not zero, or its amplitude is zero.
 
     Parameters
     ----------
     specimen, drive
-        The drive's amplitude must be positive, its phase zero.
+        Specimen, and drive with positive amplitude and phase zero.
     shape, periods
-        How it repeats: see `OrbitShape`; a mirrored motion needs an odd number of ``periods``.
+        Symmetry (see `OrbitShape`), and period in drive periods; odd for a mirrored motion.
     start
-        x, y, z, vx, vy, vz at time zero, shape (6,); None: the state after 400 periods from rest.
+        x, y, z, vx, vy, vz at time zero, shape (6,); None for the state 400 periods after a start from rest.
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         raise ValueError(
@@ -235,7 +234,7 @@ def periodic_orbit(
 def _damped_step(
     mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
 ) -> tuple[Vector, Vector, bool]:
-    """Halve the step until the closure error falls; return the state, the error, and success."""
+    """Halve the step until the closure error falls; return the state, its error, and whether it fell."""
     scales = state_scales(mapping.specimen, drive)
     for halving in range(MOST_HALVINGS):
         trial = state - 0.5**halving * step
@@ -246,7 +245,7 @@ def _damped_step(
 
 
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
-    """Return stability and responses of a motion from ``state`` with closure error ``gone``, over scales."""
+    """Return the motion from ``state`` with its responses; ``gone`` is its closure error over scales."""
     run = mapping.orbit(state, drive, SAMPLES)
     moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # NaN if the run was lost before the end
     moved[: len(run.states)] = run.states[: len(moved)]
@@ -269,9 +268,9 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
 
 
 def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
-    """Return largest magnitudes, shape (n,), of periodic waves, shape (m, n), by cubics between samples.
+    """Return the largest magnitudes, shape (n,), of periodic waves, shape (m, n), interpolated by cubics.
 
-    Two samples of a wave and of its rate define a cubic (Hermite); its extremes are where its slope is zero.
+    Two samples of a wave and of its rate define a Hermite cubic, whose extremes are zeros of its slope.
     """
     found = np.abs(waves).max(axis=0)
     ahead, rates_ahead = np.roll(waves, -1, axis=0), np.roll(rates, -1, axis=0)
@@ -282,7 +281,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
         cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
-            # Both extremes, in a form without cancellation; only one within the step counts.
+            # Both extremes, in a form without cancellation; those outside the step are ignored.
             places = np.stack([-first / (square + root), -first / (square - root)])
         inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
         tops = start + inside * (first + inside * (square + inside * cubic))
@@ -291,7 +290,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
 
 
 def _missing(derivative: Table, gone: Vector) -> float:
-    """Return the error bound: errors of flow and closure times the norm of (map - identity)^-1."""
+    """Return the error bound: closure and integration error times the norm of (map - identity)^-1."""
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
         return math.inf
@@ -319,7 +318,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the smallest distance from grazing, over the gap or the gap times 2 pi f."""
+    """Return the smallest distance from grazing: of p over the gap, of dp/dt over the gap times 2 pi f."""
     match specimen.contact:
         case NoContact() | PowerLaw():
             return math.inf
@@ -332,22 +331,22 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
     dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
     nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
     rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
-    # Speed at the sample before each contact.
+    # Use the speed at the last sample before each contact.
     places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
     slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
     return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))
 
 
 class PhaseReference(StrEnum):
-    """Motion of m0 that defines a phase resonance."""
+    """Motion of m0 whose phase defines a phase resonance."""
 
     RELATIVE = "relative"
-    """Relative to the base: for the lowest mode, or where contacts leave little motion."""
+    """Motion relative to the base: for the lowest mode, or where contacts allow little relative motion."""
     ABSOLUTE = "absolute"
-    """Absolute: for a mode far above the others, where m0 hardly follows the base."""
+    """Absolute motion: for a mode far above the others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
-        """Return the motion whose phase is used, over the base's motion, from m0's transmissibility."""
+        """Return the motion whose phase is used, over the base motion, from the transmissibility of m0."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 
