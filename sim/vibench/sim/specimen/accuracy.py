@@ -1,25 +1,25 @@
-"""Accuracy of a simulation: three named levels, each with one tolerance."""
+"""Accuracy of a simulation: three named levels, each with a tolerance."""
 
 from enum import StrEnum
 from typing import Literal
 
 
 class Accuracy(StrEnum):
-    """Largest error of the state after seconds of periodic impacts; flight is exact at every level.
+    """Accuracy level, by the largest error of the state after seconds of periodic impacts.
 
-    In units of 100 um and 0.1 m/s, against an independent solution; measured in docs/accuracy.md.
+    Errors are in units of 100 um and 0.1 m/s, measured against an independent solution (docs/accuracy.md).
     """
 
     QUICK = "quick"
-    """Error 1e-5. Chaotic motion gains nothing from a finer level."""
+    """Error 1e-5. A stricter level does not improve results for chaotic motion."""
     STANDARD = "standard"
     """Error 1e-6."""
     REFERENCE = "reference"
-    """Error 1e-9: the reference for the other two."""
+    """Error 1e-9: reference for the other two levels."""
 
     @property
     def tolerance(self) -> float:
-        """Relative error allowed in one step of a contact; smaller than `promise` because errors add up."""
+        """Relative tolerance of one time step in contact; smaller than `promise` because errors add up."""
         return _TOLERANCES[self]
 
     @property

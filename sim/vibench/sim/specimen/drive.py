@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from .stops import Strict, require_positive
 
 FEWEST_SAMPLES = 4
-"""A not-a-knot cubic spline needs four points."""
+"""Fewest samples: a not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e100
-"""Squares of smaller displacements underflow, so that stated errors would be zero."""
+"""Allowed amplitudes; squares of smaller displacements would underflow and give zero error estimates."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
-"""Powers of higher frequencies overflow, and so do durations in drive periods."""
+"""Allowed frequencies; powers of higher frequencies, and durations in drive periods, would overflow."""
 
 
 @dataclass(frozen=True)
 class Harmonic(Strict):
-    """U = amplitude_m * sin(2 pi frequency_hz t + phase_rad)."""
+    """Harmonic base displacement U = amplitude_m * sin(2 pi frequency_hz t + phase_rad)."""
 
     frequency_hz: float
     amplitude_m: float
@@ -33,7 +33,7 @@ class Harmonic(Strict):
 
 @dataclass(frozen=True)
 class _Sweep(Strict):
-    """A sine of constant displacement amplitude and rising or falling frequency; starts at phase zero."""
+    """Sine sweep of constant displacement amplitude, up or down, that starts at phase zero."""
 
     start_hz: float
     stop_hz: float
@@ -45,53 +45,53 @@ class _Sweep(Strict):
 
     @property
     def highest_hz(self) -> float:
-        """The higher end of the sweep."""
+        """Highest frequency of the sweep."""
         return max(self.start_hz, self.stop_hz)
 
 
 @dataclass(frozen=True)
 class LinearSweep(_Sweep):
-    """A sine of constant displacement amplitude whose frequency changes at a constant rate.
+    """Sine sweep of constant displacement amplitude whose frequency changes at a constant rate.
 
-    Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
+    The sweep goes up or down, starts at phase zero, and is defined from 0 to ``duration_s``.
     """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Phase in turns: start t + (stop - start) t^2 / (2 duration)."""
+        """Return the phase in cycles, start t + (stop - start) t^2 / (2 duration), shape of ``time_s``."""
         return (self.start_hz + 0.5 * (self.stop_hz - self.start_hz) / self.duration_s * time_s) * time_s
 
     def frequency_hz(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Frequency at each instant."""
+        """Return the frequency at each time, shape of ``time_s`` [Hz]."""
         return self.start_hz + (self.stop_hz - self.start_hz) / self.duration_s * time_s
 
 
 @dataclass(frozen=True)
 class LogarithmicSweep(_Sweep):
-    """A sine of constant displacement amplitude that spends equal times in every octave.
+    """Sine sweep of constant displacement amplitude with a constant number of octaves per second.
 
-    Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
+    The sweep goes up or down, starts at phase zero, and is defined from 0 to ``duration_s``.
     """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Phase in turns: start (exp(g t) - 1) / g, with g = ln(stop/start) / duration."""
+        """Return the phase in cycles, start (exp(g t) - 1) / g with g = ln(stop/start) / duration."""
         growth = math.log(self.stop_hz / self.start_hz) / self.duration_s
         return self.start_hz * np.expm1(growth * time_s) / growth
 
     def frequency_hz(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Frequency at each instant."""
+        """Return the frequency at each time, shape of ``time_s`` [Hz]."""
         growth = math.log(self.stop_hz / self.start_hz) / self.duration_s
         return self.start_hz * np.exp(growth * time_s)
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Measured or computed displacement, interpolated by a cubic spline (C2, not-a-knot).
+    """Measured or computed base displacement, interpolated by a cubic spline (C2, not-a-knot).
 
-    Sample 0 is time zero; the drive exists up to its last sample.
+    The first sample is at time zero; the drive ends at its last sample.
     """
 
     displacement_m: NDArray[np.float64]
-    """Shape (samples,) [m]."""
+    """Samples of the displacement, shape (samples,) [m]."""
     sample_rate_hz: float
 
     def __post_init__(self) -> None:
@@ -112,7 +112,7 @@ class Sampled:
 
     @property
     def duration_s(self) -> float:
-        """Time of the last sample."""
+        """Time of the last sample [s]."""
         return (len(self.displacement_m) - 1) / self.sample_rate_hz
 
 
@@ -148,4 +148,4 @@ def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude
 
 
 WHOLE = 1e-9
-"""A window this close to a whole number of periods counts as whole."""
+"""Relative tolerance within which a window contains a whole number of periods."""

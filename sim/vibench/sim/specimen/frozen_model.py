@@ -1,4 +1,4 @@
-"""Base class of every model that a TOML or JSON file describes."""
+"""Base class of all models that are read from TOML or JSON files."""
 
 import re
 from typing import Any
@@ -13,9 +13,9 @@ _SCALES = {"": 1.0, "%": 0.01, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def number_of(text: str, *units: str) -> float:
-    """Return the number in `text` in SI units [SI], alone or followed by one of these `units`.
+    """Return the number in `text`, alone or followed by one of `units`, converted to SI units [SI].
 
-    Raises ValueError, also for ``1_0`` and digits of other scripts, which Python's `float` accepts.
+    Raises ValueError for other text, including ``1_0`` and digits of other scripts, which `float` accepts.
     """
     found = _NUMBER.fullmatch(text)
     if found is None or found[2] not in ("", *units):
@@ -25,7 +25,7 @@ def number_of(text: str, *units: str) -> float:
 
 
 class NumberWith:
-    """Accept a number, or text with a number and possibly one of `units`; limits apply to both."""
+    """Field type that accepts a number, or text with a number and a unit; limits apply to both."""
 
     def __init__(self, *units: str) -> None:
         self._units = units
@@ -46,23 +46,23 @@ def _number(given: object) -> object:
 
 
 def _time(given: object) -> object:
-    # pydantic reads 1 and "1" as seconds since 1970.
+    # pydantic would read 1 and "1" as seconds since 1970.
     if isinstance(given, int | float) or (isinstance(given, str) and not re.match(r"\d{4}-\d", given)):
         raise PydanticCustomError("datetime_type", "give a date, time and time zone")
     return given
 
 
 def _with_numbers_only(schema: Any) -> Any:
-    """Return a core schema that reads only numbers as numbers and only booleans as booleans."""
+    """Return the core schema with checks that numbers are numbers and booleans are booleans."""
     match schema:
         case {"type": "float" | "int" | "datetime"} | {"type": "literal", "expected": [int(), *_]}:
-            # pydantic's own strict mode would also refuse 1e3 for an integer, and numpy's numbers.
+            # pydantic's strict mode is not used: it refuses 1e3 for an integer, and numpy's numbers.
             check = _time if schema["type"] == "datetime" else _number
             return core_schema.no_info_before_validator_function(check, {**schema})
         case {"type": "bool"}:
             return {**schema, "strict": True}
         case {"type": "dict", "values_schema": values}:
-            # Keys of a table are always text in TOML and JSON, also keys of type int.
+            # In TOML and JSON all keys of a table are text, even those of type int.
             return {**schema, "values_schema": _with_numbers_only(values)}
         case dict():
             return {key: _with_numbers_only(value) for key, value in schema.items()}
@@ -73,16 +73,16 @@ def _with_numbers_only(schema: Any) -> Any:
 
 
 class FrozenModel(BaseModel):
-    """Immutable model that refuses unknown keys and accepts only numbers as numbers.
+    """Immutable model that refuses unknown keys and does not convert other types to numbers.
 
-    pydantic reads ``true`` as 1 and ``"45e-6"`` as a number. In a file both are mistakes, and ``true`` would
-    become a mass of 1 kg. Therefore every number in every field, at any depth, must be a number.
+    pydantic alone would read ``true`` as 1 and ``"45e-6"`` as a number. In a file both are mistakes: ``true``
+    would become a mass of 1 kg. The check applies to every field at any depth.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema of the model, which accepts only numbers as numbers."""
+        """Return the core schema of the model with the check of number types."""
         schema: CoreSchema = _with_numbers_only(handler(source))
         return schema

@@ -1,4 +1,4 @@
-"""An elastic sphere on a plane: the paper's stops. SI units."""
+"""Hertz contact of an elastic sphere on a plane: the paper's stops. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ class Hertz(Strict):
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5"}
 
     stiffness: float
-    """k_contact [N/m^1.5]."""
+    """Contact stiffness k_contact [N/m^1.5]."""
     kind: Literal["hertz"] = "hertz"
 
     def __post_init__(self) -> None:
@@ -22,7 +22,7 @@ class Hertz(Strict):
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the law for the engine."""
+        """Parameters of the law for the engine."""
         return Stops(contact_stiffness=float(self.stiffness))
 
 
@@ -36,10 +36,10 @@ HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz"
 
 @dataclass(frozen=True)
 class Elasticity:
-    """Elastic constants of a body, for its contact with another one."""
+    """Elastic constants of one of two bodies in contact."""
 
     youngs_modulus: float
-    """E [Pa]."""
+    """Young's modulus E [Pa]."""
     poissons_ratio: float
 
     def __post_init__(self) -> None:
@@ -51,15 +51,15 @@ class Elasticity:
 
     @property
     def plane_strain_compliance(self) -> float:
-        """(1 - nu^2) / E [1/Pa]: the body's share of a contact's compliance."""
+        """Plane-strain compliance (1 - nu^2) / E [1/Pa]; a contact has the sum of both bodies."""
         return (1.0 - self.poissons_ratio**2) / self.youngs_modulus
 
 
 def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> float:
-    """Stiffness k of a sphere pressed on a plane, F = k d^(3/2) [N/m^1.5].
+    """Return the stiffness k of a sphere on a plane, F = k d^(3/2) [N/m^1.5].
 
-    k = 4/3 E* sqrt(R), 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; Johnson, Contact Mechanics (1985),
-    eq. 4.23. Holds for frictionless, elastic contact much smaller than the radius.
+    k = 4/3 E* sqrt(R) with 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson, Contact Mechanics (1985), eq.
+    4.23), valid for a frictionless, elastic contact much smaller than the radius.
 
     Raises ValueError when the radius is not positive.
     """

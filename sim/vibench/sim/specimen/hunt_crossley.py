@@ -9,19 +9,19 @@ from .stops import LawWord, Reference, Stops, Strict, number_in, require_positiv
 
 @dataclass(frozen=True)
 class HuntCrossley(Strict):
-    """Hertz contact that loses energy: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
+    """Hertz contact with energy loss: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
 
     Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. Without other
-    forces m1 leaves more slowly than 1/loss at any approach speed, so the force never becomes negative. If
-    springs pull m1 off faster, the force becomes negative and the stop pulls.
+    forces the separation speed is below 1/loss at any approach speed, so the force is never negative. If
+    springs pull m1 off the stop faster than 1/loss, the force becomes negative.
     """
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}
 
     stiffness: float
-    """[N/m^1.5]."""
+    """Contact stiffness [N/m^1.5]."""
     loss: float
-    """chi [s/m]; for small loss about 3/2 (1 - restitution) / approach speed. Zero gives Hertz."""
+    """Loss factor [s/m]; about 3/2 (1 - restitution) / approach speed if small. Zero gives Hertz."""
     kind: Literal["hunt_crossley"] = "hunt_crossley"
 
     def __post_init__(self) -> None:
@@ -33,7 +33,7 @@ class HuntCrossley(Strict):
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the law for the engine."""
+        """Parameters of the law for the engine."""
         return Stops(contact_stiffness=float(self.stiffness), loss=float(self.loss))
 
 

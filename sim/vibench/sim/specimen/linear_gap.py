@@ -1,4 +1,4 @@
-"""Stops that are springs. SI units."""
+"""Linear elastic stops. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from .stops import PAPER_INDENTATION_M, LawWord, Reference, Stops, Strict, numbe
 
 @dataclass(frozen=True)
 class LinearGap(Strict):
-    """Stops that are springs: F = stiffness * penetration, without loss."""
+    """Linear elastic stops: F = stiffness * penetration, without loss."""
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1"}
 
     stiffness: float
-    """[N/m]."""
+    """Stop stiffness [N/m]."""
     kind: Literal["linear_gap"] = "linear_gap"
 
     def __post_init__(self) -> None:
@@ -22,12 +22,12 @@ class LinearGap(Strict):
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the law for the engine."""
+        """Parameters of the law for the engine."""
         return Stops(linear_stiffness=float(self.stiffness))
 
 
 def fit_linear_gap(contact_stiffness: float, indentation_m: float = PAPER_INDENTATION_M) -> LinearGap:
-    """Fit springy stops to a Hertz contact of k [N/m^1.5]: equal force at the given indentation."""
+    """Return linear stops with the force of a Hertz contact of k [N/m^1.5] at the given indentation."""
     require_positive("Indentation of the fit", indentation_m, "m")
     return LinearGap(contact_stiffness * math.sqrt(indentation_m))
 

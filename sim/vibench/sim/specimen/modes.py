@@ -1,4 +1,4 @@
-"""The specimen without contact, solved exactly: state matrix, modes, transmissibility. SI units."""
+"""Exact solution of the specimen without contact: state matrix, modes, transmissibility. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from .state import VX, VZ, Complex, Floats, Table, Vector, X, Z
 
 
 def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
-    """Return A, shape (6, 6), and b, shape (6,), of the motion in flight: d/dt s = A s + b f.
+    """Return A, shape (6, 6), and b, shape (6,), of the motion without contact, d/dt s = A s + b f.
 
-    The state is s = (x, y, z, vx, vy, vz), and f = k0 U + c0 dU/dt.
+    The state is s = (x, y, z, vx, vy, vz). The base force is f = k0 U + c0 dU/dt.
     """
     system = _first_order(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
     entry = np.zeros(6)
@@ -24,7 +24,7 @@ def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
 
 
 def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
-    """Return the state matrix, displacements before velocities, shape (2n, 2n)."""
+    """Return the state matrix for displacements followed by velocities, shape (2n, 2n)."""
     inverse, size = np.linalg.inv(mass), len(mass)
     system = np.zeros((2 * size, 2 * size))
     system[:size, size:] = np.eye(size)
@@ -34,7 +34,7 @@ def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
 
 
 def angular_frequencies(frequency_hz: ArrayLike) -> Floats:
-    """Return 2 pi f of a row of frequencies [rad/s]; refuse negative and infinite ones."""
+    """Return 2 pi f for frequencies, shape (n,) [rad/s]; raise ValueError if negative or not finite."""
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
         raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
@@ -42,21 +42,21 @@ def angular_frequencies(frequency_hz: ArrayLike) -> Floats:
 
 
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
-    """Return the transmissibility without contact: displacements of the masses and p over the base's.
+    """Return the transmissibility without contact: displacements of the masses and p over the base motion.
 
-    (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0); exact, for any damping. Raises ValueError when a frequency
-    is negative or not finite.
+    It is (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0), exact for any damping. Raises ValueError when a
+    frequency is negative or not finite.
 
     Parameters
     ----------
     specimen
-        Contact law and gap are ignored.
+        Specimen; contact law and gap are ignored.
     frequency_hz
-        Shape (n,) [Hz]; zero and above.
+        Frequencies, zero or positive, shape (n,) [Hz].
 
     Returns
     -------
-    Complex, shape (n, 4): x, y, z and p = y - z over U; time goes as exp(+i w t).
+    Complex, shape (n, 4): x, y, z and p = y - z over U, for the time factor exp(+i w t).
     """
     omega = angular_frequencies(frequency_hz)
     (m0, m1, m2), squared = specimen.masses, omega**2
@@ -71,51 +71,51 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
 
 
 class ModalForm(NamedTuple):
-    """Free motion of d displacements as s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
+    """Free motion of d displacements, s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
 
     rates: Complex
-    """Shape (n,) [1/s]: one of each conjugate pair, and every real one; d <= n <= 2d."""
+    """Eigenvalues: one of each conjugate pair, and all real ones; shape (n,), d <= n <= 2d [1/s]."""
     shapes: Complex
-    """Shape (n, 2d)."""
+    """Right eigenvectors, shape (n, 2d)."""
     rows: Complex
-    """Shape (n, 2d): left eigenvectors, doubled for a pair."""
+    """Left eigenvectors, doubled for a conjugate pair, shape (n, 2d)."""
 
 
 COINCIDENT = 1e7
-"""Condition number of the eigenvectors beyond which two modes coincide (critical damping to 14 digits)."""
+"""Condition number of the eigenvectors above which two modes coincide (critical damping to 14 digits)."""
 PROPORTIONAL = 1e-12
-"""Off-diagonal modal damping below this part of the largest is rounding: the modes are then uncoupled."""
+"""Off-diagonal modal damping, over the largest modal damping, below which the modes are uncoupled."""
 CRITICAL = 1e-12
-"""abs(1 - damping ratio^2) below which a mode counts as critically damped."""
+"""Value of abs(1 - damping ratio^2) below which a mode counts as critically damped."""
 WIDEST = 1e10
-"""Ratio of natural frequencies beyond which double precision does not resolve the slowest mode."""
+"""Ratio of natural frequencies above which double precision does not resolve the slowest mode."""
 REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per cent."
 
 
 @lru_cache(maxsize=64)
 def modal_form(specimen: Specimen) -> ModalForm:
-    """Diagonalise the specimen without contact, for any damping; do not write to the returned arrays.
+    """Return the modal form without contact, for any damping; do not write to its arrays.
 
-    Raises ValueError as `diagonal_form`.
+    Raises ValueError in the same cases as `diagonal_form`.
     """
     return diagonal_form(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
 
 
 def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
-    """Diagonalise M s'' + C s' + K s = 0 with a diagonal M.
+    """Return the modal form of M s'' + C s' + K s = 0 with a diagonal M.
 
-    The undamped modes come from a symmetric problem, so they are orthogonal even if two frequencies nearly
-    coincide. With damping zero or proportional to the springs, they are also the damped modes.
+    The undamped modes are those of a symmetric problem, so they are orthogonal even if two frequencies nearly
+    coincide. If the damping is zero or proportional to the stiffness, they are also the damped modes.
 
-    Raises ValueError when two modes coincide (critical damping), because then no full set of modes exists,
-    or when natural frequencies lie too far apart.
+    Raises ValueError when two modes coincide (critical damping), because no complete set of modes exists, or
+    when the natural frequencies are too far apart.
     """
     root = np.sqrt(np.diag(mass))
     try:
         factor = np.linalg.cholesky(stiffness / np.outer(root, root))
     except np.linalg.LinAlgError:
         factor = np.zeros_like(stiffness)
-    # Singular values are the frequencies. Squaring would lose twice as many digits of a slow mode.
+    # Singular values are the frequencies; eigenvalues of K would lose twice as many digits of a slow mode.
     modes, omega, _ = np.linalg.svd(factor)
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
@@ -132,14 +132,14 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
 
 
 def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table) -> ModalForm:
-    """Return the modal form where each mode satisfies q'' + damping q' + omega^2 q = 0."""
+    """Return the modal form for uncoupled modes, q'' + damping q' + omega^2 q = 0."""
     parts = [part for mode in zip(omega, 0.5 * damping, shapes.T, rows, strict=True) for part in _mode(*mode)]
     rates, moved, read = zip(*parts, strict=True)
     return ModalForm(np.asarray(rates, np.complex128), np.array(moved), np.array(read))
 
 
 def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
-    """Return the terms of one mode q = row.displacement: one for a conjugate pair, or two real ones."""
+    """Return the terms of one mode q = row.displacement: one for a conjugate pair, two for real rates."""
     turn = (omega - decay) * (omega + decay)
     if abs(turn) <= CRITICAL * omega**2:
         raise ValueError(REFUSAL)
@@ -162,8 +162,8 @@ def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> 
 
 
 def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
-    """Return the modal form where damping couples the undamped modes."""
-    # The coordinates q and q' / omega keep the condition number small when fast and slow modes coexist.
+    """Return the modal form for undamped modes that are coupled by damping."""
+    # With the coordinates q and q' / omega the condition number is small even for fast and slow modes.
     values, vectors = np.linalg.eig(
         np.block(
             [
@@ -180,7 +180,7 @@ def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) ->
     size = len(omega)
     moved = np.hstack([vectors.T[:, :size] @ shapes.T, vectors.T[:, size:] @ (shapes * omega).T])
     read = np.hstack([left[:, :size] @ rows, left[:, size:] @ (rows / omega[:, None])])
-    # A passive structure does not grow: a positive real part is rounding.
+    # The motion of a passive structure does not grow: a positive real part is due to rounding.
     rates = np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]
     return ModalForm(
         rates=rates.astype(np.complex128),
@@ -190,9 +190,9 @@ def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) ->
 
 
 def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tuple[Complex, complex]:
-    """Return phasors of the steady motion without contact under U = amplitude sin(omega t).
+    """Return the phasors of the steady motion without contact and of the base force [N].
 
-    The motion S has shape (6,), s(t) = Re(S exp(i omega t)); the second phasor is the base force [N].
+    The drive is U = amplitude sin(omega t). The motion S has shape (6,), with s(t) = Re(S exp(i omega t)).
     """
     base = -1j * amplitude_m
     displacement = base_transmissibility(specimen, omega / (2.0 * np.pi))[0, :3] * base
@@ -200,30 +200,30 @@ def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tup
     return np.concatenate([displacement, 1j * omega * displacement]), force
 
 
-# Response of a specimen to its base with p free, or with p imposed by the stops, in closed form. SI units.
+# Closed-form response of a specimen to its base, with p free or imposed by the stops. SI units.
 #
-# The stops push m1 and m2 apart with equal and opposite forces, so x follows from the base U and from p
-# alone: x = stuck U + lever p. Here ``stuck`` is the response while m1 sticks to m2, and ``lever`` is the
-# response to a p imposed by the stops. While collisions hold abs(p) at about the gap, abs(x) is at most
-# abs(stuck U) + abs(lever) gap, if the fundamental dominates the motion.
+# The stops exert equal and opposite forces on m1 and m2, so the base U and p determine x: x = stuck U + lever
+# p. Here ``stuck`` is the response while m1 sticks to m2, and ``lever`` is the response to a p imposed by the
+# stops. While collisions limit abs(p) to about the gap, abs(x) is at most abs(stuck U) + abs(lever) gap, if
+# the fundamental dominates the motion.
 
 
 @dataclass(frozen=True, eq=False)
 class BaseResponse:
-    """Phasors per unit of base displacement, each of shape (n,); time goes as exp(+i w t)."""
+    """Response to the base at n frequencies, for the time factor exp(+i w t); each field has shape (n,)."""
 
     free_p: Complex
-    """p without contact, over U."""
+    """Ratio p / U without contact."""
     free_x: Complex
-    """x without contact, over U."""
+    """Ratio x / U without contact."""
     stuck_x: Complex
-    """x while m1 sticks to m2, over U."""
+    """Ratio x / U while m1 sticks to m2."""
     lever: Complex
-    """x over p, with p imposed by the stops and the base at rest."""
+    """Ratio x / p, with p imposed by the stops and the base at rest."""
 
 
 def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
-    """Return the response of x and p at each frequency, shape (n,) [Hz]; zero and above."""
+    """Return the response of x and p to the base at frequencies of shape (n,), zero or positive [Hz]."""
     free = base_transmissibility(specimen, frequency_hz)
     omega = angular_frequencies(frequency_hz)
     dynamic = (
@@ -236,30 +236,30 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
     return BaseResponse(free[:, 3], free[:, 0], free[:, 0] - lever * free[:, 3], lever)
 
 
-# The specimen with m1 held on m2 by a rigid stop: two bodies, solved exactly. SI units.
+# Exact solution of the specimen while a rigid stop holds m1 on m2: two bodies. SI units.
 #
-# While m1 sticks to a stop, m1 and m2 move as one: y = z + side * gap, and the spring and damper between
-# them are inside a rigid body. The motion of x and z is linear, as long as the stop pushes. The native
-# engine follows the motion and finds the instant at which the stop would have to pull.
+# While m1 sticks to a stop, m1 and m2 are one rigid body with y = z + side * gap, and the spring and damper
+# between them have no effect. The motion of x and z is linear as long as the stop force is compressive. The
+# native engine follows the motion and finds the time at which the force would become tensile.
 
 PLACES = [X, Z, VX, VZ]
-"""Indices of the four unknowns of the bound motion in a state."""
+"""Indices in a state of the four unknowns of the bound motion."""
 
 
 class BoundMotion(NamedTuple):
-    """Motion with m1 held on m2: n modes, 2 to 4, and the steady part; y without the constant gap."""
+    """Motion with m1 held on m2: n modes (2 to 4) and the steady part; y excludes the constant gap."""
 
     modes: ModalForm
-    """Of the state x, y, z, vx, vy, vz; rows are nonzero only at x, z, vx, vz."""
+    """Modal form for x, y, z, vx, vy, vz; rows are nonzero only at x, z, vx, vz."""
     steady: Complex
     """Phasors of the steady motion, shape (6,)."""
     pulls: Complex
-    """Force k2 (z - x) + c2 (vz - vx) by which m2 pulls m0, for a unit phasor of each mode and for the steady
-    motion, shape (n + 1,) [N]."""
+    """Force k2 (z - x) + c2 (vz - vx) of m2 on m0, for a unit phasor of each mode and for the steady motion,
+    shape (n + 1,) [N]."""
 
 
 def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> BoundMotion:
-    """Diagonalise the bound motion under U = amplitude sin(omega t).
+    """Return the modes and the steady part of the bound motion under U = amplitude sin(omega t).
 
     Raises ValueError when two bound modes coincide.
     """

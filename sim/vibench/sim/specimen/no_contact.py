@@ -8,13 +8,13 @@ from .stops import LawWord, Reference, Stops, Strict, require_nothing
 
 @dataclass(frozen=True)
 class NoContact(Strict):
-    """No stops: the linear specimen. Its gap is ignored."""
+    """No stops: the linear specimen, whose gap is ignored."""
 
     kind: Literal["linear"] = "linear"
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the law for the engine."""
+        """Parameters of the law for the engine."""
         return Stops()
 
 

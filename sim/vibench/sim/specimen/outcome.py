@@ -1,4 +1,4 @@
-"""Outcome of a simulation: a value, not an exception. Its text tells the user what to change."""
+"""Outcome of a simulation, with advice for the user. It is a value, not an exception."""
 
 from enum import IntEnum
 
@@ -12,7 +12,7 @@ _TEXTS = (
 
 
 class Outcome(IntEnum):
-    """The codes that the engine returns."""
+    """Outcome of a run, with the codes of the engine."""
 
     REACHED_END = 0
     TOO_MANY_IMPACTS = 1
@@ -22,5 +22,5 @@ class Outcome(IntEnum):
 
     @property
     def text(self) -> str:
-        """What happened and what to change, for the user."""
+        """Description of the outcome and advice for the user."""
         return _TEXTS[self]

@@ -1,4 +1,4 @@
-"""Power-law forces that act at every p: the continuous substitute of stops. SI units."""
+"""Power-law forces that act at every p, as a smooth approximation of stops. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -19,23 +19,23 @@ from .stops import (
 
 MOST_TERMS = 6
 HIGHEST_EXPONENT = 1001
-"""Higher exponents act like a rigid wall: a thousandth of p changes the force by a factor of e."""
+"""Highest exponent: a change of p by 0.1 % then changes the force by a factor of e, as at a rigid wall."""
 
 
 @dataclass(frozen=True)
 class PowerLaw(Strict):
-    """The continuous substitute of stops: F = sum force_i (p / reference)^exponent_i, at every p.
+    """Smooth approximation of stops: F = sum force_i (p / reference)^exponent_i, at every p.
 
-    Forces are stated at a reference displacement, because the coefficient of p^47 in SI units is 1e204.
-    The gap does not enter (Gong et al. 2025, eq. 3).
+    Forces are given at a reference displacement, because the coefficient of p^47 in SI units is 1e204. The
+    force does not depend on the gap (Gong et al. 2025, eq. 3).
     """
 
     OWN_UNITS: ClassVar = {"reference": "m"}
 
     reference: float
-    """Displacement p at which the terms have the forces given [m]."""
+    """Displacement p at which term i has the force force_i [m]."""
     terms: tuple[tuple[int, float], ...]
-    """(exponent, force [N]); exponents odd and ascending, forces positive."""
+    """Pairs (exponent, force [N]) with odd, ascending exponents and positive forces."""
     kind: Literal["power"] = "power"
 
     def __post_init__(self) -> None:
@@ -56,7 +56,7 @@ class PowerLaw(Strict):
 
     @property
     def stops(self) -> Stops:
-        """No stops: the force acts at every p."""
+        """Parameters for the engine: no stops, because the force acts at every p."""
         return Stops()
 
 
@@ -67,19 +67,19 @@ def fit_power_law(
     indentation_m: float = PAPER_INDENTATION_M,
     shares: Sequence[float] | None = None,
 ) -> PowerLaw:
-    """Fit a sum of powers to a Hertz contact as the paper does: equal force at p = gap + indentation.
+    """Return the power law with the force of a Hertz contact at p = gap + indentation, as in the paper.
 
     Raises ValueError when an argument is not allowed.
 
     Parameters
     ----------
     exponents
-        Odd, in any order: (5,) or (3, 5, 7).
+        Odd exponents in any order, such as (5,) or (3, 5, 7).
     contact_stiffness, gap_m, indentation_m
-        k_contact [N/m^1.5] of the Hertz contact, and the p = gap + indentation at which forces are equal.
+        k_contact of the Hertz contact [N/m^1.5]; gap and indentation, where both forces are equal [m].
     shares
-        Part of the force for each power; they must add up to 1. The paper does not state them; the
-        default is equal parts.
+        Share of each power in the force; the sum must be 1. The paper does not state the shares; the default
+        is equal shares.
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
     if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):
@@ -93,7 +93,7 @@ def fit_power_law(
 
 
 def _parse(detail: str, reference: Reference) -> PowerLaw:
-    """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``; an indentation may follow a colon."""
+    """Return the law for ``3+5+7`` (equal shares) or ``3@0.2+7@0.8``; an indentation may follow a colon."""
     powers, _, indentation = detail.partition(":")
     terms = [term.partition("@") for term in powers.split("+")]
     try:

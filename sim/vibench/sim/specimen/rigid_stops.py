@@ -8,7 +8,7 @@ from .stops import LawWord, Reference, Stops, Strict, number_in
 
 @dataclass(frozen=True)
 class RigidStops(Strict):
-    """Rigid stops: m1 and m2 separate with ``restitution`` times the speed of approach (Newton)."""
+    """Rigid stops: m1 and m2 separate at ``restitution`` times the approach speed (Newton's law)."""
 
     restitution: float
     """Coefficient of restitution: 0 (the masses stay together) to 1 (no energy is lost)."""
@@ -20,7 +20,7 @@ class RigidStops(Strict):
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the law for the engine."""
+        """Parameters of the law for the engine."""
         return Stops(restitution=float(self.restitution))
 
 

@@ -1,8 +1,8 @@
 """The 3-DOF vibro-impact specimen: masses, springs, dampers, gap and contact. SI units.
 
-The base displacement U moves m0 through (k0, c0); m2 hangs on m0 through (k2, c2); m1 hangs on m2
-through (k1, c1) and strikes stops on m2 where ``|p| = |y - z|`` reaches the gap. Coordinates are in
-the order (x, y, z), the absolute displacements of m0, m1, m2 (Gong et al. 2025, eq. 1).
+Spring and damper (k0, c0) connect m0 to the base with displacement U, (k2, c2) connect m2 to m0, and (k1, c1)
+connect m1 to m2. m1 touches a stop on m2 where ``|p| = |y - z|`` reaches the gap. The coordinates (x, y, z)
+are the absolute displacements of m0, m1, m2 (Gong et al. 2025, eq. 1).
 """
 
 import math
@@ -20,13 +20,13 @@ from .stops import Strict
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
-"""Clearances at negative and at positive p [m]; one of them may be infinite."""
+"""Clearances of the stops at negative and at positive p [m]; one may be infinite."""
 Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Specimen(Strict):
-    """The specimen on the shaker. Index i of a triple belongs to m_i, k_i, c_i of the paper."""
+    """The specimen on the shaker. Element i of a triple is m_i, k_i or c_i of the paper."""
 
     OWN_UNITS: ClassVar = {
         "masses": "kg",
@@ -36,19 +36,19 @@ class Specimen(Strict):
         "stiffness_matrix": "N m-1",
         "damping_matrix": "N s m-1",
     }
-    """Units of values whose names do not state one."""
+    """Units of attributes whose names contain no unit."""
 
     masses: Triple
-    """m0, m1, m2 [kg]."""
+    """Masses m0, m1, m2 [kg]."""
     stiffnesses: Triple
-    """k0, k1, k2 [N/m]."""
+    """Stiffnesses k0, k1, k2 [N/m]."""
     dampings: Triple
-    """c0, c1, c2 [N s/m]; zero is allowed."""
+    """Damping coefficients c0, c1, c2, zero or positive [N s/m]."""
     gap_m: float
     """Clearance between m1 and each stop at rest [m]; infinite for no stop at positive p."""
     contact: ContactLaw
     lower_gap_m: float | None = None
-    """Clearance of the stop at negative p, if different; infinite for no stop there."""
+    """Clearance of the stop at negative p, if different [m]; infinite for no stop there."""
 
     def __post_init__(self) -> None:
         _refuse_unless_positive("mass m", "kg", self.masses)
@@ -68,22 +68,22 @@ class Specimen(Strict):
 
     @property
     def gaps_m(self) -> Gaps:
-        """Clearances of the stops at negative and at positive p, both positive [m]."""
+        """Clearances of the stops at negative and at positive p, as positive numbers [m]."""
         return (self.gap_m if self.lower_gap_m is None else self.lower_gap_m), self.gap_m
 
     @property
     def mass_matrix(self) -> Matrix:
-        """M, shape (3, 3) [kg]."""
+        """Mass matrix M, shape (3, 3) [kg]."""
         return np.diag(np.asarray(self.masses, dtype=np.float64))
 
     @property
     def stiffness_matrix(self) -> Matrix:
-        """K without contact, shape (3, 3) [N/m]."""
+        """Stiffness matrix K without contact, shape (3, 3) [N/m]."""
         return _chain_matrix(self.stiffnesses)
 
     @property
     def damping_matrix(self) -> Matrix:
-        """C, shape (3, 3) [N s/m]."""
+        """Damping matrix C, shape (3, 3) [N s/m]."""
         return _chain_matrix(self.dampings)
 
     @property
@@ -101,7 +101,7 @@ class Specimen(Strict):
     def damping_ratios(self) -> NDArray[np.float64]:
         """Damping ratio of each mode without contact, ordered by frequency, shape (3,).
 
-        ``-Re(s) / abs(s)`` of the pair of poles. Above 1 the mode does not oscillate.
+        It is ``-Re(s) / abs(s)`` for a complex pair of poles. Above 1 the mode does not oscillate.
         """
         root = np.sqrt(np.asarray(self.masses))
         values, vectors = np.linalg.eigh(self.stiffness_matrix / np.outer(root, root))
@@ -119,8 +119,8 @@ def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64
     """Return damping ratios of coupled modes from undamped frequencies [rad/s] and modal damping [1/s]."""
     poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
     still = np.sort(np.abs(poles[poles.imag == 0.0]))
-    # Overdamped modes: the slowest pole is paired with the fastest. Their product is the square of the
-    # mode's frequency, and their sum is the damping.
+    # Overdamped modes: pair the slowest pole with the fastest. Their product is the squared frequency of the
+    # mode, and their sum is its damping.
     pairs = list(zip(still[: still.size // 2], still[: still.size // 2 - 1 : -1], strict=True))
     found = [(math.sqrt(slow * fast), 0.5 * (slow + fast) / math.sqrt(slow * fast)) for slow, fast in pairs]
     found += [(abs(pole), -pole.real / abs(pole)) for pole in poles if pole.imag > 0.0]
@@ -128,11 +128,11 @@ def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64
 
 
 JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-"""Columns: (x, y, z) for unit x and for unit z, while m1 sticks to m2."""
+"""Displacements (x, y, z) for unit x and for unit z (columns), while m1 sticks to m2."""
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
-    """Return M, C and K of the two bodies, x and z, that remain while m1 sticks to m2.
+    """Return M, C and K of the specimen while m1 sticks to m2, for the coordinates x and z.
 
     Returns
     -------
@@ -145,15 +145,15 @@ def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
 
 
 PAPER_MASSES: Triple = (5.8e-3, 2.1e-3, 2.0e-3)
-"""Gong et al. 2025, section 2 [kg]."""
+"""Masses m0, m1, m2 of Gong et al. 2025, section 2 [kg]."""
 PAPER_FREQUENCIES_HZ: Triple = (322.0, 100.0, 390.6)
-"""f0, f1, f2 of the single oscillators, k_i = m_i (2 pi f_i)^2; section 2 of the paper."""
+"""Frequencies f0, f1, f2 of each mass on its spring, k_i = m_i (2 pi f_i)^2; section 2 of the paper."""
 STEEL = Elasticity(206e9, 0.27)
-"""Sphere m1; section 2 of the paper."""
+"""Material of the sphere m1; section 2 of the paper."""
 ALUMINIUM = Elasticity(67e9, 0.3)
-"""Stops; section 2 of the paper."""
+"""Material of the stops; section 2 of the paper."""
 PAPER_RADIUS_M = 4.4e-3
-"""Radius in the paper; a steel sphere of 2.1 g would have 4.0 mm."""
+"""Radius of the sphere in the paper; a steel sphere of 2.1 g would have a radius of 4.0 mm."""
 
 
 def gong2025(
@@ -161,20 +161,20 @@ def gong2025(
     gap_m: float | Gaps = 45e-6,
     contact: str = "hertz",
 ) -> Specimen:
-    """Build the specimen of Gong et al. 2025, section 2.
+    """Return the specimen of Gong et al. 2025, section 2.
 
     Raises ValueError when damping time, gap or contact law is not allowed.
 
     Parameters
     ----------
     damping_time_s
-        c_i = damping_time_s * k_i [s]. The paper does not state it. The default is the only value
-        found for which both statements of the paper on chaos hold.
+        Damping over stiffness, c_i = damping_time_s * k_i [s]. The paper does not state this value. The
+        default is the only value found that reproduces both statements of the paper on chaos.
     gap_m
-        Clearance at each stop [m], or (lower, upper); a power law is fitted at the smaller one.
+        Clearance at each stop [m], or (lower, upper); a power law is fitted at the smaller clearance.
     contact
-        ``"hertz"``: the paper's stops; ``"linear"``: no stops; ``"power:5"`` and others: see
-        `vibench.sim.specimen`.
+        Name of the contact law: ``"hertz"`` (the paper's stops), ``"linear"`` (no stops), ``"power:5"`` or
+        others of `vibench.sim.specimen`.
     """
     if not 0.0 <= damping_time_s < math.inf:
         raise ValueError(f"Damping time {damping_time_s} s is not allowed: it must be zero or positive.")
@@ -205,7 +205,7 @@ def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
 
 
 def _chain_matrix(links: Triple) -> Matrix:
-    """Symmetric matrix of the links base-m0 (0), m2-m1 (1), m0-m2 (2) in (x, y, z)."""
+    """Return the matrix in (x, y, z) of springs or dampers base-m0 (0), m2-m1 (1), m0-m2 (2)."""
     c0, c1, c2 = links
     return np.array([[c0 + c2, 0.0, -c2], [0.0, c1, -c1], [-c2, -c1, c1 + c2]])
 
@@ -217,13 +217,13 @@ def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]
 
 
 def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
-    """Return a state's scales, shape (6,): the gap for displacements, gap times 2 pi f for velocities."""
+    """Return the scales of a state, shape (6,): gap for displacements, gap times 2 pi f for velocities."""
     speed = 2.0 * np.pi * drive.frequency_hz
     return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
 
 
 def energy_metric(specimen: Specimen) -> Floats:
-    """Return the matrix E for which s' E s is twice the energy of state s without stops, shape (6, 6)."""
+    """Return the matrix E, shape (6, 6); s' E s is twice the energy of state s without stops."""
     metric = np.zeros((6, 6))
     metric[:3, :3], metric[3:, 3:] = specimen.stiffness_matrix, specimen.mass_matrix
     return metric

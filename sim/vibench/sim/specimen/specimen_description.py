@@ -1,7 +1,7 @@
-"""Description of a specimen: its numbers and their sources, in a file or in a table of another file.
+"""Description of a specimen: its parameters and their sources, in a file or in a table of another file.
 
-A description is complete: there are no default values. It may start from another one (``model``, by name or
-path) and state only differences, as the tables of rigs, studies and imports do.
+A description is complete: parameters have no default values. It may start from another description
+(``model``, a name or path) and state only the differences, as the tables of rigs, studies and imports do.
 """
 
 import math
@@ -38,32 +38,32 @@ from .specimen import Gaps, Specimen, Triple
 from .toml_table import fault_in_words, toml_table
 
 BASE = "model"
-"""Key that names the specimen from which a table starts."""
+"""Key for the name or path of the specimen from which a table starts."""
 FOLDER = "folder"
-"""Key in pydantic's validation context: the folder to which a path in ``model`` is relative. Without it only
-shipped specimens can be named, so that a recording cannot open other files."""
+"""Key in pydantic's validation context for the folder of relative paths in ``model``. Without a folder only
+specimens of vibench can be named, so that a recording cannot open other files."""
 SOURCES = "sources"
 SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
-"""Key for the format version of a file, and the version that is read."""
+"""Key for the format version of a file, and the supported version."""
 DEEPEST = 5
-"""Longest chain of files that start from one another."""
+"""Longest chain of files of which each starts from the next."""
 USUAL_SPECIMEN = "gong2025"
-"""The specimen of a rig, study or command that names no specimen."""
+"""Default specimen of rigs, studies and commands."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
-"""Pairs of alternative keys: a specimen has exactly one of each pair."""
+"""Pairs of alternative keys; a specimen has exactly one key of each pair."""
 _ANY_GAP_M = 1e-5
-"""Arbitrary gap, to check whether a contact law is known."""
+"""Arbitrary gap for the check whether a contact law is known."""
 PositiveTriple = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
 NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 
 
 class UnknownSpecimenError(ValueError):
-    """A specimen that is not shipped, or a file that describes none."""
+    """A specimen name that is not known, or a file that does not describe a specimen."""
 
 
 class SpecimenWarning(UserWarning):
-    """Springs or dampings that change because other numbers of a specimen were replaced."""
+    """Warning of stiffnesses or dampings that change because other parameters were replaced."""
 
 
 class _Described(FrozenModel):
@@ -74,9 +74,9 @@ class Material(_Described):
     """Elastic constants of a body."""
 
     youngs_modulus_pa: PositiveFloat
-    """E."""
+    """Young's modulus E [Pa]."""
     poissons_ratio: Annotated[float, Field(gt=-1.0, le=0.5)]
-    """Lateral over axial strain."""
+    """Poisson's ratio: lateral over axial strain."""
 
     @property
     def elasticity(self) -> Elasticity:
@@ -85,16 +85,16 @@ class Material(_Described):
 
 
 class SphereOnPlane(_Described):
-    """A sphere on a plane: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
+    """Sphere on a plane: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
 
     radius_m: PositiveFloat
-    """Radius of the sphere at the point that touches."""
+    """Radius of the sphere at the contact point [m]."""
     sphere: Material
     plane: Material
 
     @property
     def stiffness(self) -> float:
-        """K of F = k d^(3/2) [N/m^1.5]."""
+        """Hertz stiffness k of F = k d^(3/2) [N/m^1.5]."""
         return hertz_stiffness(self.sphere.elasticity, self.plane.elasticity, self.radius_m)
 
 
@@ -104,24 +104,24 @@ def _known_law(word: str) -> str:
 
 
 ContactWord = Annotated[str, AfterValidator(_known_law)]
-"""A contact law as `CONTACT_LAWS` spells it: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
+"""Name of a contact law from `CONTACT_LAWS` with its numbers: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
 
 
 def _infinity(value: object) -> object:
-    """Read the word for an infinite gap, because JSON has no infinite numbers."""
+    """Convert the word for an infinite gap to a number, because JSON has no infinite numbers."""
     return math.inf if value in ("inf", "Infinity") else value
 
 
 Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True), BeforeValidator(_infinity)]
 DampingTime = Annotated[float, Field(ge=0.0, le=1.0)]
-"""Damping over stiffness [s]; the longest is 300 times critical in the paper's first mode. Much longer ones
-make runs take minutes or overflow."""
+"""Damping over stiffness [s]. The maximum is 300 times critical damping in the paper's first mode; with much
+larger values, runs take minutes or overflow."""
 
 
 class SpecimenDescription(_Described):
     """Three masses in a chain, base - m0 - m2 - m1, with stops for m1 on m2 (Gong et al. 2025, eq. 1).
 
-    Other numbers of masses, other places of the stops, hardening springs, friction and several pairs of
+    Other numbers of masses, stops between other masses, hardening springs, friction and several pairs of
     stops are not supported.
     """
 
@@ -130,35 +130,35 @@ class SpecimenDescription(_Described):
     about: str = ""
     """Description in one line."""
     masses_kg: PositiveTriple
-    """m0, m1, m2."""
+    """Masses m0, m1, m2 [kg]."""
     single_frequencies_hz: PositiveTriple | None = None
-    """f0, f1, f2 of each mass on its own spring: k_i = m_i (2 pi f_i)^2; instead of the stiffnesses."""
+    """f0, f1, f2 of each mass on its spring alone, k_i = m_i (2 pi f_i)^2; alternative to the stiffnesses."""
     stiffnesses_n_per_m: PositiveTriple | None = None
-    """k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2)."""
+    """Stiffnesses k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2) [N/m]."""
     damping_time_s: DampingTime | None = None
-    """c_i = damping time * k_i; instead of the dampings."""
+    """Damping over stiffness, c_i / k_i [s]; alternative to the dampings."""
     dampings_ns_per_m: NonNegativeTriple | None = None
-    """c0, c1, c2, beside k0, k1, k2."""
+    """Damping coefficients c0, c1, c2, parallel to k0, k1, k2 [N s/m]."""
     gap_m: Gap | tuple[Gap, Gap]
-    """Clearance between m1 and each stop at rest, or (lower, upper) at negative and at positive p = y - z;
+    """Clearance between m1 and each stop at rest, or (lower, upper) at negative and positive p = y - z [m];
     infinite for a side without a stop."""
     contact: ContactWord
-    """Law of the stops: hertz, linear (no stops), linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, ..."""
+    """Contact law: hertz, linear (no stops), linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, ..."""
     hertz_stiffness: PositiveFloat | SphereOnPlane
-    """k of F = k d^(3/2) at a stop [N/m^1.5], or the two bodies; other laws are fitted to it."""
+    """Hertz stiffness k of a stop [N/m^1.5], or the two bodies; other laws are fitted to this contact."""
     sources: dict[str, str] = Field(default={})
-    """Source of each number, by its key."""
+    """Source of each parameter, by its key."""
     _meant: ClassVar[Mapping[str, str]] = {}
     """Default keys and values of a table."""
 
     def __hash__(self) -> int:
-        # The dict of sources cannot be hashed; the JSON text contains everything.
+        # The dict of sources cannot be hashed; the JSON text contains all fields.
         return hash(self.model_dump_json())
 
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, value: object, info: ValidationInfo) -> object:
-        """Complete a table from the specimen that it names; a name alone means that specimen."""
+        """Return a table completed from the specimen that it names; text is the name of a specimen."""
         folder: Path | None = (info.context or {}).get(FOLDER)
         match value:
             case str():
@@ -179,7 +179,7 @@ class SpecimenDescription(_Described):
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
     def _number_or_bodies(cls, value: object, handler: ValidatorFunctionWrapHandler) -> object:
-        """Report the error in the given bodies; pydantic would first report that it is not a number."""
+        """Report a fault in the bodies first; pydantic would report first that they are not a number."""
         try:
             return handler(value)
         except ValidationError as error:
@@ -192,7 +192,7 @@ class SpecimenDescription(_Described):
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
-        """Return an infinite clearance as a word, because JSON has no infinite numbers."""
+        """Return the clearances with infinite ones as words, because JSON has no infinite numbers."""
         if isinstance(gap_m, float):
             return gap_m
         return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
@@ -222,18 +222,18 @@ class SpecimenDescription(_Described):
         damping_time_s: float | None = None,
         gap_m: float | Gaps | None = None,
     ) -> Specimen:
-        """Build the specimen, with another contact law, damping or gap where one is given.
+        """Return the specimen, optionally with another contact law, damping or gap.
 
-        Raises ValueError in one sentence, when a number or the law is not allowed.
+        Raises ValueError when a number or the law is not allowed.
 
         Parameters
         ----------
         contact
-            A word of `CONTACT_LAWS`, with its numbers.
+            Name of a law from `CONTACT_LAWS`, with its numbers.
         damping_time_s
-            c_i = damping_time_s * k_i [s].
+            Damping over stiffness, c_i = damping_time_s * k_i [s].
         gap_m
-            Clearance at both stops [m], or (lower, upper). A power law is fitted at the smaller one.
+            Clearance at both stops [m], or (lower, upper). A power law is fitted at the smaller clearance.
         """
         gap = self.gap_m if gap_m is None else gap_m
         lower, upper = gap if isinstance(gap, tuple) else (None, gap)
@@ -249,7 +249,7 @@ class SpecimenDescription(_Described):
 
     @property
     def stiffnesses(self) -> Triple:
-        """k0, k1, k2 [N/m]."""
+        """Stiffnesses k0, k1, k2 [N/m]."""
         if self.stiffnesses_n_per_m is not None:
             return self.stiffnesses_n_per_m
         assert self.single_frequencies_hz is not None, "one of the two is given"
@@ -261,7 +261,7 @@ class SpecimenDescription(_Described):
 
     @property
     def hertz_k(self) -> float:
-        """K of F = k d^(3/2) at a stop [N/m^1.5]."""
+        """Hertz stiffness k of F = k d^(3/2) at a stop [N/m^1.5]."""
         return (
             self.hertz_stiffness
             if isinstance(self.hertz_stiffness, float)
@@ -280,18 +280,18 @@ class SpecimenDescription(_Described):
 
 
 class SpecimenTable(SpecimenDescription):
-    """Specimen of a rig, study or import: differences from the named specimen, by default the paper's."""
+    """Specimen table of a rig, study or import: differences from a named specimen (default: the paper's)."""
 
     _meant = MappingProxyType({BASE: USUAL_SPECIMEN})
 
 
 def usual_specimen() -> SpecimenTable:
-    """Return the default specimen: the paper's."""
+    """Return the default specimen, which is that of the paper."""
     return SpecimenTable.model_validate(USUAL_SPECIMEN)
 
 
 def load_specimen(specimen: str | Path) -> SpecimenDescription:
-    """Read a described specimen: the name of a shipped one, or the path of a TOML file.
+    """Return the description of a specimen, by the name of one in vibench or the path of a TOML file.
 
     Raises UnknownSpecimenError when there is no such file, or it does not describe a specimen.
     """
@@ -307,7 +307,7 @@ def shipped_specimens() -> Mapping[str, SpecimenDescription]:
 
 
 def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dict[str, Any]:
-    """Merge a table into the specimen that it starts from, recursively."""
+    """Return a table completed from the specimen that it starts from, recursively."""
     if BASE not in table:
         return table
     if depth > DEEPEST:
@@ -333,7 +333,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
-    """Read a file and check its format version, if it states one."""
+    """Return the table of a file without its format version, which is checked if given."""
     table = toml_table(path)
     written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
@@ -346,7 +346,7 @@ def _of_this_version(path: Path) -> dict[str, Any]:
 
 @cache
 def _shipped_texts() -> Mapping[str, str]:
-    """Text of each specimen that comes with vibench, by its name."""
+    """Return the TOML text of each specimen that comes with vibench, by name."""
     found = [each for each in (files("vibench.sim") / "specimens").iterdir() if each.name.endswith(SUFFIX)]
     return {
         each.name.removesuffix(SUFFIX): each.read_text("utf-8")
@@ -355,7 +355,7 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace the given values; remove `about`, and the alternative and the source of each given key."""
+    """Return a table with replaced values, without `about` and the sources and alternatives of given keys."""
     replaced = {key for pair in ALTERNATIVES if table.keys() & pair for key in pair} | table.keys()
     replaced |= {"about"} if table else set()
     kept = {key: value for key, value in base.items() if key not in replaced}
@@ -367,7 +367,7 @@ def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], table: Mapping[str, Any]) -> None:
-    """Warn of springs and dampers that change because they are computed from given values."""
+    """Warn of stiffnesses and dampings that change because they are computed from replaced values."""
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
         before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))
@@ -390,7 +390,7 @@ def _join(numbers: Triple) -> str:
 
 
 def _complaint(specimen: str, error: ValidationError) -> str:
-    """Describe the first fault: key, given value, and allowed values."""
+    """Return a description of the first fault: key, given value, and allowed values."""
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"] if isinstance(part, int) or part in _KEYS)
     message = fault_in_words(first)

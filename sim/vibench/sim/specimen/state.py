@@ -1,10 +1,10 @@
-"""The order of a state vector. SI units."""
+"""Order of the elements of a state vector. SI units."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 X, Y, Z, VX, VY, VZ = range(6)
-"""Absolute displacements and velocities: always valid, in flight and in contact."""
+"""Indices of the absolute displacements and velocities, the same with and without contact."""
 
 
 Vector = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Common parts of the contact laws: numbers for the engine, and names in files. SI units."""
+"""Common parts of the contact laws: parameters for the engine, and names in files. SI units."""
 
 import math
 from collections.abc import Callable
@@ -10,9 +10,9 @@ from pydantic import ConfigDict
 
 Law_co = TypeVar("Law_co", covariant=True)
 HERTZ_EXPONENT = 1.5
-"""Exponent of the indentation, for a sphere on a plane."""
+"""Exponent of the indentation for a sphere on a plane."""
 PAPER_INDENTATION_M = 1e-6
-"""The paper fits its continuous models where the contact is pressed in by 1 um (its section 2)."""
+"""Indentation at which the paper fits its power laws to the Hertz contact (its section 2)."""
 
 
 class Strict:
@@ -22,20 +22,20 @@ class Strict:
 
 
 class Stops(NamedTuple):
-    """Numbers of F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at the indentation d."""
+    """Parameters of F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at indentation d."""
 
     linear_stiffness: float = 0.0
-    """[N/m]."""
+    """Coefficient of d [N/m]."""
     contact_stiffness: float = 0.0
-    """[N/m^1.5]."""
+    """Coefficient of d^(3/2) [N/m^1.5]."""
     loss: float = 0.0
-    """[s/m]."""
+    """Coefficient of dd/dt [s/m]."""
     restitution: float | None = None
-    """Restitution of rigid stops; None for elastic stops or no stops."""
+    """Coefficient of restitution of rigid stops; None for elastic stops or no stops."""
 
     @property
     def term(self) -> tuple[float, float]:
-        """Stiffness and exponent of the term with the highest power of a compliant law."""
+        """Coefficient and exponent of the term with the highest power."""
         if self.contact_stiffness:
             return self.contact_stiffness, HERTZ_EXPONENT
         return self.linear_stiffness, 1.0
@@ -48,10 +48,10 @@ class Stops(NamedTuple):
 
 @dataclass(frozen=True)
 class Reference:
-    """Hertz contact and clearance that fitted laws approximate."""
+    """Hertz contact and clearance to which other laws are fitted."""
 
     stiffness: float
-    """k_contact [N/m^1.5]."""
+    """Contact stiffness k_contact [N/m^1.5]."""
     gap_m: float
 
     def __post_init__(self) -> None:
@@ -60,24 +60,24 @@ class Reference:
 
 @dataclass(frozen=True)
 class LawWord(Generic[Law_co]):
-    """Entry of `CONTACT_LAWS`: form of a law's name, and a function that parses it."""
+    """Entry of `CONTACT_LAWS`: form of a law's name, and the function that parses it."""
 
     form: str
-    """Allowed forms, for messages."""
+    """Allowed forms of the name, for messages."""
     about: str
-    """Short description, for lists."""
+    """Short description of the law, for lists."""
     example: str
-    """Example of the form, for pictures."""
+    """Example of the name, for figures."""
     made: Callable[[str, Reference], Law_co]
-    """Create the law from the text after the colon; raises `UnreadableLawError` for an unreadable number."""
+    """Function that returns the law for the text after the colon; raises `UnreadableLawError`."""
 
 
 class UnreadableLawError(ValueError):
-    """The text after a law's name does not have the law's form."""
+    """Error: the text after the name of a law does not have the required form."""
 
 
 def number_in(detail: str) -> float:
-    """Read the one number of a law."""
+    """Return the only number of a law; raise `UnreadableLawError` for other text."""
     try:
         return float(detail)
     except ValueError:
@@ -85,13 +85,13 @@ def number_in(detail: str) -> float:
 
 
 def require_nothing(detail: str) -> None:
-    """Refuse text after the name of a law without parameters."""
+    """Raise `UnreadableLawError` for text after the name of a law without parameters."""
     if detail:
         raise UnreadableLawError(detail)
 
 
 def require_positive(name: str, value: float, unit: str) -> None:
-    """Refuse numbers that are not positive and finite."""
+    """Raise ValueError for a number that is not positive and finite."""
     if not 0.0 < value < math.inf:
         raise ValueError(f"{name} {value} {unit} is not allowed: it must be positive and finite.")
 
@@ -100,7 +100,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def chosen(kind: type[Choice], word: str) -> Choice:
-    """Return an enum's member from the member itself or from its name in text.
+    """Return the member of an enum for its word, or the member itself.
 
     Raises ValueError when the enum has no such word.
     """

@@ -1,4 +1,4 @@
-"""Read TOML files, and describe errors in one sentence."""
+"""Read TOML files, and describe their errors in one sentence."""
 
 import re
 import tomllib
@@ -8,16 +8,16 @@ from typing import Any
 
 
 class UnreadableTomlError(ValueError):
-    """A file that cannot be read or is not TOML; the message begins with its path."""
+    """Error: a file cannot be read or is not TOML; the message begins with its path."""
 
 
 def toml_table(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+    """Return the table of a TOML file.
 
     Raises UnreadableTomlError when the file is missing, is not text, or is not TOML.
     """
     try:
-        # Some editors on Windows begin a file with a byte-order mark.
+        # utf-8-sig, because some editors on Windows begin a file with a byte-order mark.
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise UnreadableTomlError(
@@ -32,7 +32,7 @@ def toml_table(path: Path) -> dict[str, Any]:
 
 
 _ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
-"""An enum's member as Python prints it, ``<Start.UP: 'up'>``."""
+"""Pattern of an enum's member as Python prints it, ``<Start.UP: 'up'>``."""
 _LIST, _TABLE = "give a list, in square brackets", "give a table"
 _TIME = "give a date, time and time zone, such as 2026-03-01T12:00:00Z"
 _IN_WORDS_OF_TOML: Mapping[str, str] = {
@@ -57,11 +57,11 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "union_tag_not_found": "{discriminator} is missing: it says what this is",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
-"""Replacements of pydantic's messages that use Python's terms, by type of error."""
+"""Replacements, by type of error, for messages of pydantic in terms of Python."""
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:
-    """Return what a value in a TOML file should be, in terms of TOML instead of Python.
+    """Return the message for a wrong value in a TOML file, in terms of TOML instead of Python.
 
     Parameters
     ----------
