@@ -1,9 +1,9 @@
 """Chains of vibro-impact cells: specimens coupled at their m0.
 
-Cell i is a `Specimen`; its (k0, c0) couple its m0 to the previous cell, or to the base; the far end is
-free. A run proceeds in windows: in each, cells with contact are integrated separately, and the rest of the
-chain enters as a series (docs/decisions/0011-chains.md). Any drive is supported; periodic orbits and
-branches are not. Exponents come from two neighbouring motions.
+Cell i is a `Specimen` whose (k0, c0) couple its m0 to the previous cell, or to the base; the far end is free.
+A run is divided into short windows. In each window, cells in contact are integrated separately, and the
+motion of the rest of the chain is a Taylor series (docs/decisions/0011-chains.md). All drives are supported;
+periodic orbits and branches are not. Lyapunov exponents are computed from two neighbouring motions.
 
 >>> from vibench.sim import gong2025
 >>> from vibench.sim.chain import band_gaps, bloch_factor, chain_of, chain_transmissibility

@@ -1,7 +1,7 @@
-"""A chain of vibro-impact cells, coupled at their outer masses. SI units.
+"""Chain of vibro-impact cells, coupled at their outer masses. SI units.
 
-Cell i is a `Specimen`; its (k0, c0) couple its m0 to the m0 of the previous cell, those of the first cell to
-the base. The far end is free. Displacements are in the order x1, y1, z1, x2, y2, z2, ...
+Cell i is a `Specimen` whose (k0, c0) couple its m0 to the m0 of the previous cell; those of the first cell
+couple it to the base. The far end is free. Displacements have the order x1, y1, z1, x2, y2, z2, ...
 """
 
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from ..specimen.specimen import Matrix, Specimen, Triple
 from ..specimen.stops import Strict
 
 MASSES_PER_CELL = 3
-"""m0, m1, m2: a cell's displacements x, y, z."""
+"""Number of masses of a cell: m0, m1, m2 with displacements x, y, z."""
 MOST_CELLS = 1000
-"""Most cells whose modes fit into ordinary memory."""
+"""Largest number of cells; the modes of more do not fit into ordinary memory."""
 
 
 @dataclass(frozen=True)
 class Chain(Strict):
-    """Cells from the driven base to the free end; they may differ in all parameters."""
+    """Chain of cells, which may differ in all parameters."""
 
     cells: tuple[Specimen, ...]
-    """Cell 0 is coupled to the base through its (k0, c0), cell i to cell i - 1."""
+    """Cells from the base to the free end; (k0, c0) couple cell 0 to the base, and cell i to cell i - 1."""
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.cells) <= MOST_CELLS:
@@ -43,17 +43,17 @@ class Chain(Strict):
 
     @property
     def masses(self) -> NDArray[np.float64]:
-        """Shape (3 cells,) [kg]."""
+        """Masses m0, m1, m2 of every cell, shape (3 cells,) [kg]."""
         return np.asarray([mass for cell in self.cells for mass in cell.masses])
 
     @property
     def stiffness_matrix(self) -> Matrix:
-        """K without contact, shape (3 cells, 3 cells) [N/m]."""
+        """Stiffness matrix K without contact, shape (3 cells, 3 cells) [N/m]."""
         return _assemble([cell.stiffnesses for cell in self.cells])
 
     @property
     def damping_matrix(self) -> Matrix:
-        """C, shape (3 cells, 3 cells) [N s/m]."""
+        """Damping matrix C, shape (3 cells, 3 cells) [N s/m]."""
         return _assemble([cell.dampings for cell in self.cells])
 
     @cached_property
@@ -65,16 +65,16 @@ class Chain(Strict):
 
 
 def chain_of(specimen: Specimen, cells: int) -> Chain:
-    """Build a chain of equal cells.
+    """Return a chain of equal cells.
 
-    Raises ValueError when there is no cell.
+    Raises ValueError when the number of cells is not allowed.
 
     Parameters
     ----------
     specimen
         One cell; its k0 and c0 are the coupling to the base and between cells.
     cells
-        One or more; one cell is the specimen itself.
+        Number of cells, from 1 to `MOST_CELLS`; a single cell is the specimen itself.
     """
     if not 1 <= cells <= MOST_CELLS:
         raise ValueError(f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}.")
@@ -82,7 +82,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
 
 
 def _assemble(links: list[Triple]) -> Matrix:
-    """Return the symmetric matrix of springs (or dampers): links 0, 1, 2 of every cell."""
+    """Return the matrix of all springs or dampers from links 0, 1, 2 of every cell."""
     size = MASSES_PER_CELL * len(links)
     matrix = np.zeros((size, size))
     for cell, (outer, inner, middle) in enumerate(links):

@@ -1,13 +1,13 @@
-"""Waves in an infinite chain without contact: bands, gaps, attenuation per unit. SI units.
+"""Waves in an infinite chain without contact: bands, band gaps, attenuation per unit. SI units.
 
-A unit consists of one or several cells and repeats. The inner pair of a cell acts on its m0 as
-one dynamic stiffness S(w). With the link K = k0 + i w c0 to the previous cell, the displacement x of m0 and
-the force f in the link change from cell to cell by
+The chain repeats a unit of one or several cells. In each cell, m1 and m2 act on m0 as a dynamic stiffness
+S(w). With the link K = k0 + i w c0 to the previous cell, the displacement x of m0 and the force f in the link
+change from cell to cell by
 
     x' = x + f / K,    f' = f + (S - w^2 m0) x'
 
-The factor of a wave per unit, exp(i mu), is an eigenvalue of the product of the cells' matrices, whose
-determinant is 1 (Brillouin, Wave Propagation in Periodic Structures, 2nd ed. 1953, chapters IV, V and X).
+From unit to unit a wave is multiplied by exp(i mu), an eigenvalue of the product of these transfer matrices,
+whose determinant is 1 (Brillouin, Wave Propagation in Periodic Structures, 2nd ed. 1953, chapters IV, V, X).
 """
 
 from typing import NamedTuple
@@ -21,11 +21,11 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Relative width below which a gap counts as rounding; it occurs for units of equal cells."""
+"""Relative width below which a gap is due to rounding; such gaps occur for units of several equal cells."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Return the ratio of a unit's motion to the previous unit's, for the outgoing or decaying wave.
+    """Return the ratio of the motions of successive units, for the outgoing or decaying wave.
 
     Raises ValueError when a frequency is not positive.
 
@@ -34,11 +34,11 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     unit
         Cells of the unit; contact laws and gaps are ignored.
     frequency_hz
-        Shape (n,) [Hz]; positive.
+        Positive frequencies, shape (n,) [Hz].
 
     Returns
     -------
-    exp(i mu), shape (n,): magnitude 1 within a band without damping, below 1 in a gap or with damping.
+    exp(i mu), shape (n,): magnitude 1 within a band without damping; below 1 in a gap or with damping.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):
@@ -47,7 +47,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     for cell in unit.cells:
         across = _across(cell, omega) @ across
     cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
-    # The roots of q^2 - 2 cosine q + 1 have the product 1; only the larger one is free of cancellation.
+    # The roots of q^2 - 2 cosine q + 1 have the product 1; only the larger root has no cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
     larger = np.where(np.abs(cosine + root) >= np.abs(cosine - root), cosine + root, cosine - root)
     return np.asarray(1.0 / larger, dtype=np.complex128)
@@ -61,20 +61,20 @@ def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
 
 
 class SeenFromOutside(NamedTuple):
-    """A cell under harmonic motion of its m0; fields of shape (n,)."""
+    """Response of a cell to harmonic motion of its m0; each field has shape (n,)."""
 
     link: Complex
-    """K = k0 + i w c0 [N/m]."""
+    """Stiffness of the link to the previous cell, K = k0 + i w c0 [N/m]."""
     stiffness: Complex
-    """S(w) - w^2 m0: force on m0 over its displacement, without the link [N/m]."""
+    """Force on m0 over its displacement without the link, S(w) - w^2 m0 [N/m]."""
     inner: Complex
-    """y over x."""
+    """Ratio y / x."""
     middle: Complex
-    """z over x."""
+    """Ratio z / x."""
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
-    """Reduce a cell without contact to its m0, finite also at the resonance of m1 alone."""
+    """Return a cell without contact reduced to its m0; finite even at the resonance of m1 on its spring."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping
@@ -89,9 +89,9 @@ def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
 
 
 def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:
-    """Return the frequencies of undamped waves with phase ``wave_number`` from unit to unit [Hz].
+    """Return the frequencies of undamped waves at given wave numbers, ascending, shape (n, 3 cells) [Hz].
 
-    Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,).
+    ``wave_number`` is the phase difference from unit to unit, shape (n,) [rad].
 
     Raises ValueError when a wave number is not finite.
     """
@@ -100,7 +100,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
         raise ValueError("A wave number that is not finite is not allowed: give radians per unit.")
     root = np.sqrt(unit.masses)
     first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
-    # The first cell is coupled to the last of the previous unit, whose phase lags.
+    # The first cell is coupled to the last cell of the previous unit, whose phase lags.
     stiffness = np.tile(unit.stiffness_matrix.astype(np.complex128), (len(phase), 1, 1))
     stiffness[:, last, last] += link
     stiffness[:, first, last] -= link * np.exp(-1j * phase)
@@ -110,16 +110,16 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
 
 
 class BandGap(NamedTuple):
-    """Frequencies between which no wave travels [Hz]; the last gap has no upper end."""
+    """Frequency range in which no wave propagates [Hz]; the last gap has no upper end."""
 
     lower_hz: float
     upper_hz: float
 
 
 def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
-    """Find the gaps of the infinite chain without damping and contact.
+    """Return the band gaps of the infinite chain without damping and contact.
 
-    Cells are coupled in one displacement, so a band is monotone from mu = 0 to mu = pi and ends there.
+    Cells are coupled in one displacement only, so each band is monotone and ends at mu = 0 and mu = pi.
     """
     ends = band_frequencies_hz(unit, [0.0, np.pi])
     lowest, highest = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
@@ -131,24 +131,24 @@ def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
 
 
 def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Return the transmissibility without contact: displacements of the masses and p over the base's.
+    """Return the transmissibility without contact: displacements of the masses and p over the base motion.
 
     Raises ValueError when a frequency is negative.
 
     Parameters
     ----------
     chain
-        A chain; contact laws and gaps are ignored.
+        Chain; contact laws and gaps are ignored.
     frequency_hz
-        Shape (n,) [Hz]; zero and above.
+        Frequencies, zero or positive, shape (n,) [Hz].
 
     Returns
     -------
-    Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell over U; time goes as exp(+i w t).
+    Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell over U, for the time factor exp(+i w t).
     """
     omega = angular_frequencies(frequency_hz)
     cells = [reduce_to_m0(cell, omega) for cell in chain.cells]
-    # From the free end: reduce each cell and all cells behind it to one stiffness at its m0.
+    # Begin at the free end: reduce each cell and all cells behind it to a stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
         seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))

@@ -18,13 +18,13 @@ from ._chain import Chain
 from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces_between
 
 STATES_PER_CELL = 6
-"""x, y, z, vx, vy, vz."""
+"""Number of state variables of a cell: x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
-"""Most windows of a run; `check_work` refuses such runs long before."""
+"""Largest number of windows of a run; `check_work` rejects far shorter runs already."""
 
 
 class ChainRun:
-    """A run of a chain: its state, samples and observations."""
+    """Run of a chain, with its state, samples and observations."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class ChainRun:
         """Allocate memory for impacts, and for samples at ``start_time_s`` + k / ``sample_rate_hz``."""
         engine, cells = native_engine(), chain.size
         self._states = engine.rows("CellState", cells)
-        # Only filled entries are read.
+        # These arrays are not initialised, because only filled entries are read.
         self._times, self._places = np.empty(most_impacts), np.empty(most_impacts)
         self._samples = np.empty((samples, cells, STATES_PER_CELL))
         self.peaks_m, self._lines = np.zeros((cells, 2)), np.zeros(cells, np.complex128)
@@ -70,7 +70,7 @@ class ChainRun:
         fill_drive(self._motion["drive"], drive, chain.cells[0])
 
     def place(self, motion: Floats, time_s: float) -> None:
-        """Set x, y, z, vx, vy, vz of every cell, shape (cells, 6), at an instant."""
+        """Set x, y, z, vx, vy, vz of every cell, shape (cells, 6), and the time."""
         x, y, z, vx, vy, vz = motion.T
         for name, values in {"x": x, "p": y - z, "z": z, "vx": vx, "vp": vy - vz, "vz": vz}.items():
             self._states[name] = values
@@ -78,34 +78,34 @@ class ChainRun:
         native_engine().call("start_chain", self._motion)
 
     def drive_by(self, pieces: Pieces) -> None:
-        """Use these pieces instead of the harmonic drive from now on."""
+        """Use piecewise polynomials instead of the harmonic drive from now on."""
         native_engine().fill(
             self._motion, pieces=pieces.terms, piece_start=pieces.start_s, piece_length=pieces.length_s
         )
 
     def watch(self, what: Watch) -> None:
-        """Observe ``what`` from now on."""
+        """Set what is observed from now on."""
         self._motion["watch"] = what
 
     def advance(self, until_s: float) -> Outcome:
-        """Advance to an instant [s]; do nothing if it has already passed."""
+        """Advance to a time [s] and return the outcome; a time in the past changes nothing."""
         self._motion["until"] = until_s
         return Outcome(native_engine().call("follow_chain", self._motion))
 
     @property
     def motion(self) -> Floats:
-        """x, y, z, vx, vy, vz of every cell now, shape (cells, 6)."""
+        """Current x, y, z, vx, vy, vz of every cell, shape (cells, 6)."""
         s = self._states
         return np.column_stack([s["x"], s["p"] + s["z"], s["z"], s["vx"], s["vp"] + s["vz"], s["vz"]])
 
     @property
     def time_s(self) -> float:
-        """Current time of the motion."""
+        """Current time of the motion [s]."""
         return float(self._motion["clock_high"])
 
     @property
     def forces(self) -> Complex:
-        """Integral of each cell's force times exp(-i (omega t + phase)), for observed lines [N s]."""
+        """Integral of contact force times exp(-i (omega t + phase)) of every cell, shape (cells,) [N s]."""
         return self._lines
 
     @property
@@ -115,26 +115,26 @@ class ChainRun:
 
     @property
     def impact_times_s(self) -> Floats:
-        """Start times of contacts, ascending except within a window."""
+        """Start times of contacts, in ascending order except within a window, shape (count,) [s]."""
         return self._times[: self.impacts]
 
     @property
     def impact_cells(self) -> NDArray[np.int64]:
-        """Cells of these contacts."""
+        """Cells of the contacts, in the order of `impact_times_s`, shape (count,)."""
         return self._places[: self.impacts].astype(np.int64)
 
     def samples(self, outcome: Outcome) -> Floats:
-        """Return x, y, z, vx, vy, vz of every cell at the samples of a finished run, shape (n, cells, 6)."""
+        """Return the samples of x, y, z, vx, vy, vz of every cell in a finished run, shape (n, cells, 6)."""
         kept = int(self._motion["samples_kept"])
         if outcome is not Outcome.REACHED_END:
             return self._samples[:kept]
-        # Rounding may put the last sample just beyond the end.
+        # Rounding may place the last sample just after the end.
         self._samples[kept:] = self.motion
         return self._samples
 
 
 MOST_CELL_WINDOWS = 10**10
-"""Most windows times cells of a run, because more take hours."""
+"""Largest number of windows times cells of a run; a longer run would take hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +142,9 @@ class ChainImpacts:
     """Times and cells of contacts."""
 
     times_s: Floats
-    """Ascending, shape (count,) [s]."""
+    """Start times of contacts, ascending, shape (count,) [s]."""
     cells: NDArray[np.int64]
-    """Cell of each contact, counted from 0 at the base; shape (count,)."""
+    """Cell of each contact, counted from 0 at the base, shape (count,)."""
     per_cell: NDArray[np.int64]
     """Number of contacts in each cell, shape (cells,)."""
 
@@ -159,15 +159,15 @@ class ChainTrajectory:
     """Motion, impacts and outcome of a run of a chain."""
 
     time_s: Floats
-    """Shape (n,); empty when no sample rate was requested."""
+    """Sample times, shape (n,) [s]; empty if no sample rate was requested."""
     states: Floats
-    """Shape (n, cells, 6): x, y, z, vx, vy, vz of every cell [m, m/s], absolute."""
+    """x, y, z, vx, vy, vz of every cell in the inertial frame, shape (n, cells, 6) [m, m/s]."""
     final_state: Floats
-    """Shape (cells, 6), at ``end_time_s``."""
+    """State of every cell at ``end_time_s``, shape (cells, 6)."""
     end_time_s: float
     impacts: ChainImpacts
     outcome: Outcome
-    """Only REACHED_END means that the run reached the requested time."""
+    """Outcome; only with REACHED_END the run reached the requested time."""
     accuracy: Accuracy
 
 
@@ -184,9 +184,9 @@ def integrate_chain(
 ) -> ChainTrajectory:
     """Integrate a chain of cells under a drive.
 
-    Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
-    excluded by bounds and resolved with the tolerance of ``accuracy``, in any number of cells at once.
-    Sampling changes no step. A single cell is integrated by `vibench.sim.motion`. Raises
+    Motion without contact is exact: a harmonic drive in closed form, other drives as piecewise polynomials.
+    Bounds ensure that no contact is missed. Contacts, in any number of cells at once, are integrated with the
+    tolerance of ``accuracy``. Sampling changes no step. A single cell uses `vibench.sim.motion`. Raises
     ValueError when an argument is not allowed, the run would take hours, or the drive ends before the run.
 
     Parameters
@@ -194,10 +194,10 @@ def integrate_chain(
     chain, drive, duration_s, accuracy, sample_rate_hz, start_time_s
         As in `vibench.sim.motion.integrate`.
     initial_state
-        x, y, z, vx, vy, vz of every cell, absolute [m, m/s], shape (cells, 6); at rest when None. Cells may
-        be in contact.
+        x, y, z, vx, vy, vz of every cell in the inertial frame, shape (cells, 6) [m, m/s]; None for rest.
+        Cells may be in contact.
     max_impact_rate_hz
-        Mean impact rate per cell above which a run ends with TOO_MANY_IMPACTS.
+        Mean impact rate per cell above which the run ends with TOO_MANY_IMPACTS.
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
@@ -237,7 +237,7 @@ def integrate_chain(
 
 
 def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
-    """Raise ValueError for a run that would take hours, in windows of at most ``window_s``."""
+    """Raise ValueError for a run that would take hours with windows of ``window_s``."""
     work = duration_s / window_s * chain.size
     if work > MOST_CELL_WINDOWS:
         raise ValueError(
@@ -248,7 +248,7 @@ def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
 
 
 def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
-    """Return the checked initial state, shape (cells, 6); rest if None."""
+    """Return the checked initial state, shape (cells, 6); zeros (rest) for None."""
     shape = (chain.size, STATES_PER_CELL)
     motion = np.zeros(shape) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != shape or not bool(np.all(np.isfinite(motion))):
@@ -260,7 +260,7 @@ def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
 
 
 def _of_one(run: Trajectory) -> ChainTrajectory:
-    """Return the trajectory of a specimen as that of a chain of one cell."""
+    """Return the trajectory of a specimen as the trajectory of a chain of one cell."""
     impacts = run.impacts
     return ChainTrajectory(
         time_s=run.time_s,
@@ -276,7 +276,7 @@ def _of_one(run: Trajectory) -> ChainTrajectory:
 
 
 def most_chain_impacts(chain: Chain, rate_hz: float, duration_s: float) -> int:
-    """Return the number of impacts allowed in a run for a largest mean impact rate per cell.
+    """Return the largest number of impacts in a run, from the largest mean impact rate per cell.
 
     Raises ValueError when the rate is not allowed.
     """

@@ -1,9 +1,9 @@
-"""The largest Lyapunov exponent of a chain, from two neighbouring motions. SI units.
+"""Largest Lyapunov exponent of a chain, from two neighbouring motions. SI units.
 
-Two motions a small distance apart are followed. After every interval their distance in the energy norm is
+Two motions a small distance apart are integrated. After every interval their distance in the energy norm is
 recorded, and the second motion is moved back to the small distance along the line between them (Benettin,
 Galgani and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The distance
-must be far above the error of a contact and far below the motion, so the default accuracy is REFERENCE.
+must be far above the error of a contact and far below the size of the motion: use REFERENCE accuracy.
 """
 
 import math
@@ -24,11 +24,11 @@ from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impact
 from ._tables import chain_tables, longest_window_s
 
 NEARNESS = 1e-6
-"""Distance of the two motions relative to the size of the first."""
+"""Distance between the two motions, over the size of the first."""
 SHORTEST_INTERVAL_S = 5e-3
-"""Shortest time between readings; an exponent of 100 per second then gives a factor below 2."""
+"""Shortest interval [s]; with an exponent of 100 per second, the distance grows by a factor below 2."""
 FEWEST_INTERVALS = 32
-"""Fewest intervals in the duration for estimating the error of the mean."""
+"""Fewest intervals in the duration, for the estimate of the error of the mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,16 +38,16 @@ class ChainExponent:
     drive: Harmonic
     accuracy: Accuracy
     exponent_per_s: float
-    """Mean growth rate [1/s]; negative for converging neighbours."""
+    """Mean growth rate of the distance [1/s]; negative if neighbouring motions converge."""
     standard_error_per_s: float
     blocks: BlockedMean | None
-    """Mean and error from blocks [1/s]."""
+    """Mean and error estimated from blocks [1/s]."""
     interval_s: float
-    """Whole drive periods between readings."""
+    """Length of an interval, in whole drive periods [s]."""
     local_exponents_per_s: Floats
-    """Growth rate in each interval after settling, shape (n,)."""
+    """Growth rate in each interval after settling, shape (n,) [1/s]."""
     impacts: int
-    """Impacts of all cells in these intervals."""
+    """Number of impacts of all cells in these intervals."""
     final_state: Floats
     """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6)."""
     outcome: Outcome
@@ -66,17 +66,17 @@ def chain_lyapunov_exponent(
 ) -> ChainExponent:
     """Return the largest Lyapunov exponent of a chain.
 
-    Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too few
-    intervals for an error.
+    Raises ValueError when an argument is not allowed, the run would take hours, or the duration contains too
+    few intervals for an error estimate.
 
     Parameters
     ----------
     chain, drive, accuracy, initial_state, max_impact_rate_hz
         As in `vibench.sim.chain.integrate_chain`.
     duration_s, settle_s
-        The exponent is the mean over ``duration_s``, after ``settle_s`` for reaching the attractor [s].
+        Averaging time of the exponent, and time before it for reaching the attractor [s].
     seed
-        Seed of the initial direction to the second motion.
+        Seed of the initial direction from the first to the second motion.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz
@@ -87,7 +87,7 @@ def chain_lyapunov_exponent(
             f"it must be finite and hold {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
     tables = chain_tables(chain, drive, accuracy)
-    # The limit of work covers both motions.
+    # The limit applies to both motions together.
     check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
@@ -142,9 +142,9 @@ def chain_lyapunov_exponent(
 
 
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
-    """Move the second motion towards the first, to the small distance from it."""
+    """Return the second motion moved to the small distance from the first, on the line between them."""
     apart = second - first
-    # At rest, a motion of all masses by the drive amplitude sets the size.
+    # The size is at least that of displacing all masses by the drive amplitude, because of starts at rest.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))
@@ -152,7 +152,7 @@ def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Fl
 
 
 def _size(chain: Chain, state: Floats) -> float:
-    """Return the root of twice the energy of a motion without contacts [J^0.5]."""
+    """Return the energy norm of a state: the square root of twice its energy without contact [J^0.5]."""
     q, v = state[:, :MASSES_PER_CELL].ravel(), state[:, MASSES_PER_CELL:].ravel()
     stiffness: Table = chain.stiffness_matrix
     return math.sqrt(float(np.sum(chain.masses * v**2) + q @ stiffness @ q))

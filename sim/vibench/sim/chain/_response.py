@@ -31,26 +31,26 @@ class ChainResponse:
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """Time before the end over which the largest values are taken."""
+    """Length of the window at the end of the run, over which largest values are taken [s]."""
     line_periods: int
-    """Number of whole drive periods in the window, over which the lines at the drive frequency are taken."""
+    """Number of whole drive periods at the end of the window, over which lines are taken."""
     largest_m: Floats
-    """Largest abs of x and p = y - z of every cell over the window, shape (cells, 2)."""
+    """Largest abs(x) and abs(p), p = y - z, of every cell in the window, shape (cells, 2)."""
     lines_m: Complex
     """Components of x, y, z and p at the drive frequency, q = Re(line exp(i (omega t + phase))),
     shape (cells, 4).
     """
     impacts: NDArray[np.int64]
-    """Contacts of each cell that began within the window, shape (cells,)."""
+    """Number of contacts that began in the window, for every cell, shape (cells,)."""
     impacts_before: NDArray[np.int64]
-    """Contacts that began before the window."""
+    """Number of contacts that began before the window, for every cell, shape (cells,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6), to start the next run."""
+    """x, y, z, vx, vy, vz of every cell at the end, as the start of another run, shape (cells, 6)."""
     outcome: Outcome
 
     @property
     def response_i(self) -> Floats:
-        """Largest abs of x and p of every cell over the drive amplitude, shape (cells, 2)."""
+        """Largest abs(x) and abs(p) of every cell over the drive amplitude, shape (cells, 2)."""
         return self.largest_m / self.drive.amplitude_m
 
     @property
@@ -69,18 +69,18 @@ def chain_response(
     *,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> ChainResponse:
-    """Integrate a chain and return the response of every mass at the end.
+    """Integrate a chain and return the response of every mass at the end of the run.
 
-    The defaults are those of `vibench.sim.steady_response`, which is also used for a single cell. A long
-    chain settles more slowly than a cell. Raises ValueError when the drive has no amplitude, the window is
-    longer than the run or shorter than one period, or the run would take hours.
+    The defaults are those of `vibench.sim.steady_response`, which integrates a single cell. A long chain
+    settles more slowly than a single cell. Raises ValueError when the drive amplitude is zero, the window is
+    longer than the run or shorter than one drive period, or the run would take hours.
 
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
-        As in `vibench.sim.chain.integrate_chain`; ``window_s`` is the observed end of the run [s].
-    initial_state
-        Shape (cells, 6); at rest when None.
+        As in `vibench.sim.chain.integrate_chain`; ``window_s`` is the observed part at the end of the run
+    [s]. initial_state
+        Initial state of every cell, shape (cells, 6); None for rest.
     """
     accuracy = chosen(Accuracy, accuracy)
     if chain.size == 1:
@@ -127,9 +127,9 @@ def chain_response(
 
 
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
-    """Return the response of a specimen as that of a chain of one cell.
+    """Return the response of a specimen as the response of a chain of one cell.
 
-    The line of z follows from the equation of motion of m0, times exp(-i omega t) and integrated by parts.
+    The line of z follows from the equation of motion of m0 times exp(-i omega t), integrated by parts.
     """
     drive = one.drive
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
@@ -158,22 +158,22 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
 
 
 def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:
-    """Return the components of all motions at the drive frequency, shape (cells, 4), from the forces.
+    """Return the components of x, y, z and p at the drive frequency from the forces, shape (cells, 4).
 
-    M q'' + C q' + K q = f - F, multiplied by exp(-i omega t) and integrated by parts over whole periods, is
-    (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of q, with Q,
-    f, F the integrals.
+    M q'' + C q' + K q = f - F is multiplied by exp(-i omega t) and integrated by parts over whole periods.
+    The result is (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of
+    q, where Q, f and F now are the integrals.
 
     Parameters
     ----------
     chain, drive
         Chain, and its drive.
     forces
-        Integral of the force in each cell times exp(-i omega t), shape (cells,) [N s].
+        Integral of the contact force of each cell times exp(-i omega t), shape (cells,) [N s].
     change
-        Change of the state times exp(-i omega t) from start to end of the lines, shape (cells, 6).
+        Change of the state over the time of integration, times exp(-i omega t), shape (cells, 6).
     line_s
-        Length of the lines [s].
+        Time of integration [s].
     """
     omega = 2.0 * math.pi * drive.frequency_hz
     first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix
@@ -190,19 +190,19 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 
 
 def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> Floats:
-    """Return the energy of every cell: masses, springs with the link to the previous cell, and stops.
+    """Return the energy of every cell, shape (..., cells) [J].
 
-    Returns an array of shape (..., cells) [J]. Without damping and with the base at rest, the sum over
-    cells is constant. A Hunt-Crossley contact stores the energy of its Hertz spring.
+    It includes masses, springs with the link to the previous cell, and stops; a Hunt-Crossley contact stores
+    the energy of its Hertz spring. Without damping and with the base at rest, the sum over cells is constant.
 
     Parameters
     ----------
     chain
-        The cells.
+        Chain of cells.
     states
-        x, y, z, vx, vy, vz of every cell [m, m/s], absolute, shape (..., cells, 6).
+        x, y, z, vx, vy, vz of every cell in the inertial frame, shape (..., cells, 6) [m, m/s].
     base_m
-        Displacement of the base at the same instants [m], shape (...).
+        Displacement of the base at the same times, shape (...) [m].
     """
     motion = np.asarray(states, dtype=np.float64)
     x, y, z = (motion[..., k] for k in range(MASSES_PER_CELL))
@@ -225,7 +225,7 @@ class MeanEnergies(NamedTuple):
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:
-    """Average `chain_energies` over evenly spaced `states`, shape (n, cells, 6) [m, m/s]."""
+    """Return the mean of `chain_energies` over evenly spaced `states`, shape (n, cells, 6) [m, m/s]."""
     found = [block_mean(row) for row in chain_energies(chain, states, base_m).T]
     return MeanEnergies(
         np.array([each.mean for each in found]), np.array([each.standard_error for each in found])
@@ -233,7 +233,7 @@ def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> M
 
 
 def _in_stops(cell: Specimen, p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the integral of a cell's contact force from 0 to p [J]."""
+    """Return the potential energy of the contact force of a cell at p, shape of ``p`` [J]."""
     match cell.contact:
         case PowerLaw(reference=reference, terms=terms):
             part = p / reference

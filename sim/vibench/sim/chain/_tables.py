@@ -1,4 +1,4 @@
-"""Tables for a run of a chain: structures of the cells, and windows. SI units."""
+"""Tables for a run of a chain: engine structures of the cells, and window lengths. SI units."""
 
 import math
 from collections.abc import Iterator
@@ -18,42 +18,42 @@ from ..specimen.state import Table, Vector
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2
-"""Longest window times the fastest rate of chain and drive [rad]: the tenth integral of a force is then
+"""Longest window times the fastest rate of chain and drive [rad]; the tenth integral of a force is then
 1.4e-12 of the first."""
 COLLISION_TURN = 0.4
-"""The same for windows with whole collisions: the tenth integral is 7e-10 of the first."""
+"""The same for windows with whole collisions; the tenth integral is then 7e-10 of the first."""
 WHOLE_COLLISIONS = 1e-7
-"""Smallest tolerance for whole collisions, as in native/collision.hpp."""
+"""Smallest tolerance at which collisions are evaluated as a whole, as in native/collision.hpp."""
 MARKOV_TERMS = 11
 """Number of Taylor coefficients of the chain's response to a unit impulse in a cell."""
 REACH = MARKOV_TERMS
-"""Number of cells on each side that this response reaches within these terms."""
+"""Number of cells on each side that are reached by this response within these terms."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Part of the tolerance below which the effect of one cell's force on another cell's velocity is neglected
-within a window."""
+"""Effect of the force in one cell on the velocity of another within a window that is neglected, over the
+tolerance."""
 MOST_HALVINGS = 20
 KEPT = 2
-"""Number of windows tried before the shortest."""
+"""Number of window lengths tried before the shortest length."""
 
 
 class ChainTables(NamedTuple):
-    """Cells and windows of a chain."""
+    """Engine structures of the cells, and window lengths of a chain."""
 
     kinds: Structure
-    """One `CellKind` of native/structures.hpp for each different cell."""
+    """One `CellKind` of native/structures.hpp for each kind of cell."""
     kind_of: Vector
     """Index of the kind of each cell, shape (cells,)."""
     fastest: float
     """Largest rate of chain and drive [1/s]."""
     windows: Vector
-    """Lengths of windows, the longest first [s]."""
+    """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """Cells at most this far apart may not both be in contact in such a window; shape (windows,)."""
+    """Largest distance of two cells that may not both be in contact in such a window, shape (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
-    """Prepare flight and contact for a chain and a drive."""
+    """Return the tables for a chain, a drive and an accuracy."""
     links = [(cell.stiffnesses[0], cell.dampings[0]) for cell in chain.cells]
     cells = list(zip(chain.cells, [*links[1:], (0.0, 0.0)], strict=True))
     places = {each: place for place, each in enumerate(dict.fromkeys(cells))}
@@ -69,10 +69,10 @@ def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
 
 
 def _fastest(chain: Chain, drive: Drive) -> float:
-    """Return a bound on the rates of all modes and of a harmonic drive [1/s].
+    """Return an upper bound on the rates of all modes and of a harmonic drive [1/s].
 
-    An oscillating mode is as fast as the undamped motion of its shape; an overdamped mode is at most as fast
-    as its damping alone.
+    The rate of an oscillating mode is that of its undamped shape; the rate of an overdamped mode is at most
+    that of its damping alone.
     """
     root = np.sqrt(chain.masses)
     creeping = float(np.linalg.eigvalsh(chain.damping_matrix / np.outer(root, root))[-1])
@@ -81,10 +81,9 @@ def _fastest(chain: Chain, drive: Drive) -> float:
 
 
 def markov_between(chain: Chain) -> Table:
-    """Return Taylor coefficients of p of every cell after a unit impulse in a cell nearby.
+    """Return Taylor coefficients of p of every cell after a unit impulse in a nearby cell.
 
-    Shape (MARKOV_TERMS, 2 REACH + 1, cells): the response to an impulse in an earlier cell, the
-    same, or a later one.
+    Shape (MARKOV_TERMS, 2 REACH + 1, cells). The second axis is the offset from the cell with the impulse.
     """
     path, places = _answers(chain, np.ones((chain.size, COLUMNS))), np.arange(chain.size)
     answers = np.zeros((MARKOV_TERMS, COLUMNS, chain.size))
@@ -97,8 +96,7 @@ def markov_between(chain: Chain) -> Table:
 def _answers(chain: Chain, moves: Table) -> Table:
     """Return Taylor coefficients of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
 
-    Impulses too far apart to affect the same cell share a column. ``moves`` is 0 for fixed
-    cells, else 1.
+    Impulses that cannot affect the same cell share a column. ``moves`` is 0 for fixed cells, otherwise 1.
     """
     places, masses = np.arange(chain.size), chain.masses.reshape(chain.size, MASSES_PER_CELL)
     rates = np.zeros((MASSES_PER_CELL, chain.size, COLUMNS))
@@ -112,7 +110,7 @@ def _answers(chain: Chain, moves: Table) -> Table:
 
 
 def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
-    """Return accelerations without contact and drive, shape (masses of a cell, cells, columns)."""
+    """Return the accelerations without contact and drive, shape (masses of a cell, cells, columns)."""
     masses = chain.masses.reshape(chain.size, MASSES_PER_CELL)
     springs, dampers = (
         np.array(values).T[..., None]
@@ -127,15 +125,15 @@ def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
 
 
 def _stretches(motion: Table) -> tuple[Table, Table, Table]:
-    """Return the elongation of the three links of every cell."""
+    """Return the elongations of the three links of every cell."""
     x, y, z = motion
     return np.diff(x, axis=0, prepend=0.0), y - z, z - x
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Bound the change of dp/dt in other cells within a window after an impulse, over the cell's own change.
+    """Return a bound on dp/dt of other cells in a window after an impulse, over dp/dt of the own cell.
 
-    Shape (REACH + 1,): entry d is the largest for cells d apart; entry 0 is not used.
+    Shape (REACH + 1,): entry d is the largest value for cells at distance d; entry 0 is not used.
     """
     own = between[1, REACH]
     relative = np.max(_answer_within(between, window) / own, axis=1)
@@ -143,7 +141,7 @@ def cross_answers(between: Table, window: float) -> Vector:
 
 
 def _answer_within(coefficients: Table, window: float) -> Table:
-    """Bound the rate within a window of a series; the first axis contains its Taylor coefficients."""
+    """Return a bound on the rate of a series in a window; its Taylor coefficients are on the first axis."""
     orders = range(1, MARKOV_TERMS)
     return np.asarray(
         sum(np.abs(coefficients[k]) * window ** (k - 1) / math.factorial(k - 1) for k in orders)
@@ -151,7 +149,7 @@ def _answer_within(coefficients: Table, window: float) -> Table:
 
 
 def _back_action(chain: Chain, between: Table, window: float) -> float:
-    """Bound the share of an impulse's effect on its own cell's dp/dt that returns through neighbours."""
+    """Return a bound on the relative effect of an impulse on its own cell that returns via its neighbours."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
     alone = _answers(chain, only_itself * 1.0)[:, places, places % COLUMNS]
@@ -160,10 +158,10 @@ def _back_action(chain: Chain, between: Table, window: float) -> float:
 
 
 def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Vector, Vector]:
-    """Choose the windows and the distance of cells that may be in contact in them.
+    """Return the window lengths, and for each the distance within which only one cell may be in contact.
 
-    In the last window even neighbours may be in contact. Each cell is integrated as if its neighbours did not
-    react; the error of this must be negligible in every window.
+    In the shortest window even neighbours may be in contact. Each cell is integrated as if its neighbours did
+    not react, which must cause a negligible error in every window.
     """
     between = markov_between(chain)
     shortened = 1.0
@@ -186,28 +184,28 @@ def _clash(answers: Vector, allowed: float) -> int:
     return max((d for d in range(1, len(answers)) if answers[d] > allowed), default=0)
 
 
-# The force of a moving base on the first m0, k0 U + c0 dU/dt, as polynomials on equal pieces. SI units.
+# Force of the base on the first m0, k0 U + c0 dU/dt, as polynomials on pieces of equal length. SI units.
 #
-# The engine treats harmonic drives exactly. Other drives enter as an additional known force
+# The engine treats harmonic drives exactly. Other drives act as an additional known force
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
-"""The error of a sine through eight Chebyshev points of a piece of `WINDOW_TURN` is 1e-14."""
+"""Terms of a polynomial: eight Chebyshev points describe a sine on `WINDOW_TURN` with an error of 1e-14."""
 ALMOST = 1e-9
-"""Share of a piece that counts as rounding."""
+"""Tolerance for rounding, over the length of a piece."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
 
 BATCH = 1 << 16
-"""Number of pieces of a sweep made at once; bounds the memory of a long sweep."""
+"""Number of pieces of a sweep computed at once; limits the memory for a long sweep."""
 BaseDrive = Sampled | LinearSweep | LogarithmicSweep
-"""Drives that are cut into pieces."""
+"""Drives that are divided into polynomial pieces."""
 
 
 class Pieces(NamedTuple):
     """Force of the base on the first m0 as consecutive polynomials."""
 
     terms: Table
-    """Coefficients of the force on every piece, in powers of the time since its start, shape (pieces,
+    """Coefficients of the force, in powers of the time since the start of each piece, shape (pieces,
     PIECE_TERMS)."""
     start_s: float
     """Start of the first piece [s]."""
@@ -218,7 +216,7 @@ class Pieces(NamedTuple):
 def pieces_between(
     tables: ChainTables, first: Specimen, drive: BaseDrive, start_s: float, end_s: float
 ) -> Iterator[tuple[Pieces, float]]:
-    """Yield the drive's pieces, a batch at a time, and when each batch ends [s]."""
+    """Yield the pieces of the drive in batches, with the end time of each batch [s]."""
     interval, count = _grid(tables, drive)
     begin = min(int(start_s / interval * (1.0 + ALMOST)), count - 1)
     while True:
@@ -237,7 +235,7 @@ def longest_window_s(tables: ChainTables, drive: Drive) -> float:
 
 
 def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:
-    """Return length and number of pieces."""
+    """Return the length [s] and the number of the drive's pieces."""
     match drive:
         case Sampled():
             return 1.0 / drive.sample_rate_hz, len(drive.displacement_m) - 1

@@ -17,42 +17,42 @@ from ._integrate import integrate_chain
 from ._response import ChainResponse, chain_response
 
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
-"""Approximate length [s] and smallest number of the compared windows."""
+"""Approximate length [s] and smallest number of the windows."""
 FEWEST_PAIRS, STUDENT = 8, 2.365
-"""Fewest pairs of windows for an error, and Student's quantile for them in 19 cases of 20."""
+"""Fewest pairs of windows for an error estimate, and Student's quantile of a 95 % interval for them."""
 TOLERANCE_PART = 0.1
-"""Part of a requested error that is allowed for integration."""
+"""Share of the requested error that integration may use."""
 TRIED_S, TRIED_PART = 1e-4, 0.1
-"""Length of the first trial for a slow drive [s], and share of the time for trials."""
+"""Simulated time of the first trial for a slow drive [s], and share of the time limit for trials."""
 LONGEST_S = 60.0
 """Default time limit of refinement [s]."""
 
 
 class TargetedResponse(NamedTuple):
-    """Mean response in the later half of the windows, with errors."""
+    """Mean response over the second half of the windows, with errors."""
 
     response: ChainResponse
     errors: Floats
-    """Relative errors of the transmission of every cell, for 19 cases of 20, shape (cells,)."""
+    """Relative errors (95 %) of the transmissibility of every cell, shape (cells,)."""
     followed_s: float
-    """Total length of all windows."""
+    """Total length of all windows [s]."""
 
 
 def chain_response_to(
     chain: Chain, drive: Harmonic, error: float | None, time_s: float | None
 ) -> TargetedResponse:
-    """Observe windows until their later half determines the lines to the requested error.
+    """Observe windows until their second half gives the lines to the requested error; return the result.
 
-    Raises ValueError when one drive period takes longer than ``time_s``.
+    Raises ValueError when the computation of one drive period takes longer than ``time_s``.
 
     Parameters
     ----------
     chain, drive
         As in `chain_response`; the chain starts from rest.
     error
-        Requested relative error of the transmission of every cell; as small as the time allows when None.
+        Requested relative error of the transmissibility of every cell; None for as small as possible.
     time_s
-        Time from the call to the result [s]; a minute when None.
+        Time from the call to the result [s]; None for one minute.
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
@@ -62,7 +62,7 @@ def chain_response_to(
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Observe more periods; return whether the motion continues and as many more fit in the time."""
+        """Observe more periods; return whether the run reached its end and time is left for as many again."""
         before_s, length_s = time.monotonic(), periods / drive.frequency_hz
         state = seen[-1].final_state if seen else None
         seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
@@ -72,7 +72,7 @@ def chain_response_to(
 
     if most == 1:
         _require_one_period(chain, drive, accuracy, limit_s)
-    # A window may take longer than the available time: begin with one period.
+    # A whole window may take longer than the time limit: begin with one period.
     periods, goes_on = 1, follows(1)
     while goes_on and periods < most:
         periods = min(2 * periods, most)
@@ -96,7 +96,7 @@ def chain_response_to(
 
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Refuse a time that is too short for one drive period, by trials of increasing length."""
+    """Raise ValueError if the time is too short for one drive period, from trials of increasing length."""
     integrate_chain(chain, drive, TRIED_S, accuracy)  # first call, which prepares the engine
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
@@ -117,7 +117,7 @@ def _errors(windows: Sequence[ChainResponse]) -> Floats:
 def error_of_lines(lines: Complex) -> Floats:
     """Return the relative error of the amplitude of the mean of lines of shape (windows, cells).
 
-    It is Student's interval of pairs of windows or, for a settling chain, the difference of both halves.
+    It is the larger of Student's interval over pairs of windows and, for settling, the change between halves.
     """
     count = len(lines) // 2
     if count < FEWEST_PAIRS:
