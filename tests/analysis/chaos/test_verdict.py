@@ -77,7 +77,7 @@ def chaos():
     return points
 
 
-def test_transient_chaos_is_classified_by_the_motion_after_it(chaos):
+def test_a_motion_after_transient_chaos_determines_the_verdict(chaos):
     points = np.vstack((chaos[:900], np.full((2100, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 2100)
@@ -118,19 +118,19 @@ def test_a_motion_that_changes_in_the_last_periods_is_undecided(count, lost):
 
 
 @pytest.mark.thorough
-def test_intermittent_chaos_is_one_motion(chaos):
+def test_intermittent_chaos_is_classified_over_the_whole_record(chaos):
     points = chaos[:1500].copy()
     points[300:450] = points[900:1200] = 0.2
     assert motion_verdict(Points(points, QUIET), DRIVE_HZ).evidence.periods == 1500
 
 
-def test_a_short_record_gives_no_verdict():
+def test_a_short_record_is_classified_as_undecided():
     found = motion_verdict(Points(np.ones((150, 2)), QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
     assert "150 drive periods" in found.why
 
 
-def test_scatter_close_to_the_noise_gives_no_verdict():
+def test_scatter_close_to_the_noise_is_classified_as_undecided():
     rng = np.random.default_rng(3)
     found = motion_verdict(Points(section(rng, 1, 0.3), np.full(2, 0.1)), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
@@ -147,7 +147,7 @@ def test_scatter_close_to_the_noise_gives_no_verdict():
     ],
     ids=["no contact", "impacts that repeat", "chaos"],
 )
-def test_verdicts_from_points_match_the_simulated_specimen(frequency_hz, amplitude_m, kind, period):
+def test_verdicts_from_poincare_points_match_the_simulated_specimen(frequency_hz, amplitude_m, kind, period):
     states = stroboscopic_section(gong2025(), Harmonic(frequency_hz, amplitude_m), 2600)[1100:]
     points = states[:, [0, 3]] / np.array([1.0, 2 * np.pi * frequency_hz])
     size = np.sqrt(np.mean(points**2))
@@ -218,7 +218,7 @@ def known_exponent(name):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["duffing", pytest.param("henon", marks=pytest.mark.slow), "stops"])
-def test_the_exponent_of_points_is_within_its_bound(name):
+def test_the_exponent_estimated_from_points_is_a_lower_bound(name):
     """Of the Duffing oscillator 83.9 +- 2.1 or, in more noise, 66.3 +- 2.3 per second was said for 142.5."""
     points, exponent = known_exponent(name)
     points = points / (np.sqrt(2) * points.std(axis=0))
@@ -233,7 +233,7 @@ def test_the_exponent_of_points_is_within_its_bound(name):
     assert said or name == "stops"
 
 
-def test_scattered_points_have_no_exponent():
+def test_scattered_points_give_no_exponent():
     rng = np.random.default_rng(2)
     found = motion_verdict(Points(rng.standard_normal((600, 2)), QUIET), DRIVE_HZ)
     assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
@@ -254,7 +254,7 @@ def test_noise_behind_a_static_nonlinearity_is_not_chaotic(number):
     assert found.kind is MotionKind.UNDECIDED, found.why
 
 
-def test_a_period_is_the_shortest_and_needs_several_repeats():
+def test_the_shortest_period_is_found_if_it_repeats_several_times():
     points = section(np.random.default_rng(6), 5)
     assert shortest_period(Points(points, QUIET)) == 5
     assert shortest_period(Points(points[:18], QUIET)) is None
@@ -294,7 +294,7 @@ def test_lost_points_are_refused(value, noise, drive_hz, said):
         motion_verdict(Points(value, noise), drive_hz)
 
 
-def test_a_period_must_explain_a_small_scatter():
+def test_a_period_that_leaves_most_of_the_scatter_is_not_reported():
     """A slow transient of 0.3 % of the orbit was "every 10 periods", which left most of its scatter."""
     place, rng = np.arange(700), np.random.default_rng(1)
     moved = 0.0032 * np.exp((0.201j * np.pi - 2e-4) * place)

@@ -54,7 +54,7 @@ def test_the_zero_one_test_separates_chaos_from_period_eight(growth, k):
 
 
 @pytest.mark.parametrize(("stride", "is_oversampled"), [(1, True), (5, True), (20, False)])
-def test_an_oversampled_flow_is_detected(lorenz, stride, is_oversampled):
+def test_the_zero_one_test_detects_an_oversampled_flow(lorenz, stride, is_oversampled):
     found = zero_one(lorenz[::stride][:2000])
     assert found.is_oversampled is is_oversampled
     assert (found.k > 0.9) is not is_oversampled
@@ -70,21 +70,21 @@ def test_the_zero_one_test_is_invariant_to_shift_and_scale():
     [(logistic(4.0, 3000), 1, np.log(2)), (henon(5000), 2, 0.41922)],
     ids=["logistic", "henon"],
 )
-def test_neighbours_diverge_at_the_rate_of_the_exponent(series, delays, exponent):
+def test_neighbours_of_a_map_diverge_at_the_lyapunov_exponent(series, delays, exponent):
     found = divergence(delay_vectors(series, delays), steps=25)
     assert found.is_resolved
     assert found.exponent == pytest.approx(exponent, rel=0.03)
     assert abs(found.exponent - exponent) < 3 * found.sd_exponent
 
 
-def test_neighbours_of_a_flow_diverge_at_the_rate_of_the_exponent(lorenz):
+def test_neighbours_of_a_flow_diverge_at_the_lyapunov_exponent(lorenz):
     points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
     found = divergence(points, steps=400, apart=100)
     # 400 s of this flow have an exponent of their own, some per cent from that of all time.
     assert found.exponent / 0.01 == pytest.approx(0.9056, rel=0.08)
 
 
-def test_no_exponent_is_found_when_noise_reaches_saturation():
+def test_noise_as_large_as_the_attractor_gives_no_exponent():
     noise = np.random.default_rng(0).standard_normal((2000, 3))
     assert not divergence(noise, steps=8).is_resolved
     clean, noisy = henon(3000), henon(3000) + 0.2 * np.random.default_rng(1).standard_normal(3000)
@@ -92,7 +92,7 @@ def test_no_exponent_is_found_when_noise_reaches_saturation():
     assert not divergence(delay_vectors(noisy, 2), steps=20, noise=0.2).is_resolved
 
 
-def test_noisy_henon_is_nonlinear_and_an_autoregression_is_not():
+def test_the_surrogate_test_separates_a_noisy_henon_map_from_linear_noise():
     rng = np.random.default_rng(2)
     series = henon(2000)
     noisy = series + 0.1 * series.std() * rng.standard_normal(2000)
@@ -101,7 +101,7 @@ def test_noisy_henon_is_nonlinear_and_an_autoregression_is_not():
 
 
 @pytest.mark.thorough
-def test_linear_noise_is_rejected_no_more_often_than_the_test_states():
+def test_the_surrogate_test_rejects_linear_noise_at_its_stated_rate():
     rejected = sum(
         surrogate_test(autoregression(np.random.default_rng(seed), 400), seed=seed).rejects_linear_noise
         for seed in range(60)
@@ -117,7 +117,7 @@ def test_a_series_with_wrong_surrogate_spectra_is_undecided():
     assert not found.rejects_linear_noise
 
 
-def test_a_surrogate_has_the_values_and_the_spectrum_but_not_the_order():
+def test_a_surrogate_keeps_values_and_spectrum_and_changes_the_order():
     series = henon(1000)
     made, error = surrogate(series, np.random.default_rng(4))
     assert np.array_equal(np.sort(made), np.sort(series))
@@ -125,7 +125,7 @@ def test_a_surrogate_has_the_values_and_the_spectrum_but_not_the_order():
     assert abs(np.corrcoef(made, series)[0, 1]) < 0.2
 
 
-def test_a_neighbour_is_the_nearest_point_that_is_not_near_in_time():
+def test_neighbours_close_in_time_are_excluded_from_the_search():
     rng = np.random.default_rng(5)
     points = rng.standard_normal((300, 2))
     found = nearest_neighbours(points, apart=10, last=280, floor=0.05)
