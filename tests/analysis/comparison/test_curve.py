@@ -82,7 +82,7 @@ def test_a_downward_sweep_is_reversed():
     assert turned.magnitude[2] == mode(frequency_hz).magnitude[0]
 
 
-def test_a_known_point_of_the_exported_svg_is_at_its_coordinates(tmp_path):
+def test_an_exported_svg_places_a_known_point_at_its_coordinates(tmp_path):
     """The corner of a curve of three points, measured against the ends of the same curve."""
     frequency_hz = np.array([100.0, 300.0, 900.0])
     curve = Curve(
@@ -120,7 +120,7 @@ def test_tables_have_units_and_one_file_per_curve(tmp_path):
     assert len(text) == 1 + curves[0].frequency_hz.size
 
 
-def test_a_band_reduced_to_few_columns_covers_the_whole_band():
+def test_an_uncertainty_band_reduced_to_few_columns_covers_the_whole_band():
     curve = mode(np.arange(50.0, 600.0, 0.1), sd=0.05)
     frequency_hz, low, high = curve.band(100)
     assert frequency_hz.size == low.size == high.size == 100
@@ -161,12 +161,12 @@ def test_chaotic_scatter_gives_no_modes_beside_a_resonance(depth):
     ("modes_hz", "damping"),
     [((95, 260, 268), 0.005), ((95, 266, 500), 0.03), ((100, 120, 140), 0.01), ((94, 264, 500), 0.002)],
 )
-def test_modes_that_can_be_distinguished_are_listed(modes_hz, damping):
+def test_separate_modes_are_listed_as_peaks(modes_hz, damping):
     found = curve_peaks(respond(np.arange(40.0, 700.0, 0.1), modes_hz, damping))
     assert [each.frequency_hz for each in found] == pytest.approx(modes_hz, rel=0.01)
 
 
-def test_a_figure_gives_one_colour_to_a_recording_and_one_dash_to_a_kind():
+def test_colour_marks_the_recording_and_dash_the_kind_of_curve():
     frequency_hz = np.arange(60.0, 400.0)
     curves = [
         replace(respond(frequency_hz, (95.0,)), source=source, origin=origin, response=response)
@@ -181,7 +181,7 @@ def test_a_figure_gives_one_colour_to_a_recording_and_one_dash_to_a_kind():
     assert len(dashes) == 6
 
 
-def test_file_names_are_not_drawn_as_mathematics(tmp_path):
+def test_dollar_signs_in_file_names_are_not_drawn_as_mathematics(tmp_path):
     frequency_hz = np.array([100.0, 300.0, 900.0])
     named = ("a$x_{$<b>\x1b[2J", CurveOrigin.MEASURED, CurveKind.RESPONSE_I)
     curve = Curve(*named, frequency_hz, np.array([1.0, 100.0, 10.0]), np.full(3, np.nan))

@@ -20,7 +20,7 @@ def compared(streamed_file):
     return compare_recording(streamed_file(), FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
-def test_a_transmission_is_passed_between_processes_with_its_spread(compared):
+def test_a_transmission_curve_keeps_its_bounds_between_processes(compared):
     (curve,) = pickle.loads(pickle.dumps(compared)).curves
     assert (curve.origin, curve.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSIBILITY)
     assert np.median(curve.magnitude) == pytest.approx(2.0, rel=0.01)
@@ -29,13 +29,13 @@ def test_a_transmission_is_passed_between_processes_with_its_spread(compared):
     assert "drive" in curve.note
 
 
-def test_the_whole_result_is_kept_for_reports(compared):
+def test_a_comparison_keeps_the_whole_result_for_reports(compared):
     result, failures = kept_result(compared)
     assert result.analysis.facts.name == compared.name == "streamed"
     assert failures == ()
 
 
-def test_the_requested_quantities_are_estimated(streamed_file):
+def test_a_comparison_uses_the_requested_estimator(streamed_file):
     found = compare_recording(
         streamed_file(), FrequencyResponseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
     )
