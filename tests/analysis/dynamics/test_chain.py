@@ -36,7 +36,7 @@ def test_a_swept_chain_reports_its_simulated_motion(swept):
     assert np.all(run.energy_error_j > 0.0)
 
 
-def test_the_figure_shades_the_gaps_and_its_tables_hold_what_is_drawn(swept):
+def test_the_chain_figure_shades_band_gaps_and_tabulates_its_curves(swept):
     drawn = chain_figure(swept)
     waves, across, cells = drawn.tables
     assert len(across.column("transmission")) == 3 * len(swept.runs[0].over_hz)
@@ -46,7 +46,7 @@ def test_the_figure_shades_the_gaps_and_its_tables_hold_what_is_drawn(swept):
     assert drawn.png.startswith(b"\x89PNG")
 
 
-def test_a_recorded_base_motion_drives_a_chain_and_is_reported_where_it_is_coherent(noise_file):
+def test_a_chain_driven_by_recorded_noise_has_the_linear_transmission(noise_file):
     found = chain_answer(
         ChainRequest(lengths=(2,), drive="recorded", recording=str(noise_file()), duration_s=60.0)
     )
@@ -59,7 +59,7 @@ def test_a_recorded_base_motion_drives_a_chain_and_is_reported_where_it_is_coher
     assert chain_figure(found).svg
 
 
-def test_alternating_cells_repeat_and_changes_apply_to_all():
+def test_alternating_cells_repeat_and_changed_values_apply_to_every_cell():
     others = (SpecimenTable.model_validate("heavy"), SpecimenTable.model_validate("asymmetric"))
     request = ChainRequest(others=others, lengths=(5,), gap_m=30e-6)
     chain = request.chain(5)

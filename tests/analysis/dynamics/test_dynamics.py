@@ -55,7 +55,7 @@ def line(frequency_hz, size, multiplier, events=(), periods=1):
         (BranchMethod.BALANCE, "No harmonic balance of at most 64 harmonics was found"),
     ],
 )
-def test_an_empty_result_is_explained_by_its_method(method, said):
+def test_an_empty_branch_diagram_is_explained_by_its_method(method, said):
     """A balance finds none among stops that knock, where shooting finds motions; "none" alone was said."""
     none = BranchDiagram(BranchRequest(start=100.0, stop=120.0, method=method, harmonics=64), (), 1.0)
     assert none.cost_sentence.startswith(said)
@@ -108,7 +108,7 @@ def test_a_range_includes_its_ends_if_the_step_fits():
 
 
 @pytest.mark.thorough
-def test_a_file_holds_everything_and_nothing_is_overwritten(computed, tmp_path):
+def test_a_branch_file_round_trips_and_is_never_overwritten(computed, tmp_path):
     path = write_diagram(computed, tmp_path / "b.h5")
     again = read_diagram(path)
     assert again.request == computed.request
@@ -125,7 +125,7 @@ def test_a_file_holds_everything_and_nothing_is_overwritten(computed, tmp_path):
     assert path.read_bytes() == before
 
 
-def test_a_foreign_file_is_not_read_as_branches(tmp_path):
+def test_a_file_without_branches_is_refused(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         file["a"] = 1
     (tmp_path / "y.h5").write_text("no HDF5")
@@ -138,7 +138,7 @@ def test_a_foreign_file_is_not_read_as_branches(tmp_path):
         read_diagram(tmp_path)
 
 
-def test_the_document_is_json_with_every_point(computed):
+def test_the_json_document_contains_every_branch_point(computed):
     found = json.loads(json.dumps(computed.to_dict(), allow_nan=False))
     assert sum(len(each["points"]) for each in found["branches"]) == computed.points
     point = found["branches"][0]["points"][0]
@@ -161,7 +161,7 @@ def test_stable_and_unstable_parts_are_separate_curves():
     assert BranchDiagram(along, (FOLDED,), 1.0).curves() == ()
 
 
-def test_a_recorded_level_is_the_median_in_each_bin_and_ascends():
+def test_a_recorded_level_is_the_median_per_bin_in_ascending_frequency():
     rng = np.random.default_rng(3)
     frequency = np.concatenate([np.linspace(50.0, 300.0, 4000), np.linspace(300.0, 50.0, 4000)])
     level = 1e-6 * (1.0 + 100.0 / frequency) * (1.0 + 0.01 * rng.standard_normal(8000))
@@ -242,7 +242,7 @@ def test_a_phase_resonance_is_drawn_with_its_tracked_points():
     assert first.get_lines()[0].get_ydata() == pytest.approx(found.frequency_hz)
 
 
-def test_a_spectrum_has_the_right_sum_and_is_stored(tmp_path):
+def test_the_sum_of_an_exponent_spectrum_matches_the_damping(tmp_path):
     request = SpectrumRequest(start=255.0, stop=260.0, step=5.0, duration_s=1.5, settle_s=0.5)
     found = exponent_spectrum(request)
     assert found.largest_sum_difference < 1e-6

@@ -37,7 +37,7 @@ def diagram(level):
     return diagram_of(BranchRequest(recorded_level=level, start=low, stop=high, places=2, starts=0))
 
 
-def test_the_level_matches_every_step(level, stepped_file):
+def test_the_recorded_level_matches_every_frequency_step(level, stepped_file):
     (result,) = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT).results
     found = result.analysis.response
     assert [each[0] for each in level] == sorted(each[0] for each in level)
@@ -67,7 +67,7 @@ def test_a_report_overlays_branches_and_states_level_differences(diagram, steppe
 
 
 @pytest.mark.thorough
-def test_like_takes_range_and_level_of_the_recording(stepped_file, level, tmp_path):
+def test_the_like_option_uses_frequency_range_and_level_of_the_recording(stepped_file, level, tmp_path):
     options = ("--places", "2", "--starts", "0", "--json", "--out", str(tmp_path / "like"))
     result = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), *options])
     assert result.exit_code == 0, result.output
@@ -83,7 +83,7 @@ def test_like_takes_range_and_level_of_the_recording(stepped_file, level, tmp_pa
 
 
 @pytest.mark.thorough
-def test_an_analysis_uses_saved_branches(diagram, stepped_file, tmp_path):
+def test_an_analysis_draws_branches_from_a_saved_file(diagram, stepped_file, tmp_path):
     kept = write_diagram(diagram, tmp_path / "b.h5")
     arguments = [
         "analyse",
