@@ -97,7 +97,7 @@ def test_licences_may_be_given_by_common_names(folder, tmp_path, address, name):
     assert described(tmp_path / "crate.zip")[address]["name"] == name
 
 
-def test_the_organisation_publishes_and_every_author_belongs_to_it(folder, tmp_path):
+def test_a_crate_names_the_organisation_as_publisher_and_affiliation(folder, tmp_path):
     pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE, ("A", "B"), organisation="Institute"), {})
     graph = described(tmp_path / "crate.zip")
     assert graph["./"]["publisher"] == {"@id": "#organisation"}
@@ -105,7 +105,7 @@ def test_the_organisation_publishes_and_every_author_belongs_to_it(folder, tmp_p
     assert [graph[f"#author-{number}"]["affiliation"]["@id"] for number in (1, 2)] == ["#organisation"] * 2
 
 
-def test_a_reader_of_crates_finds_every_file(crate, tmp_path):
+def test_the_rocrate_library_finds_every_file_of_a_crate(crate, tmp_path):
     rocrate = pytest.importorskip("rocrate.rocrate", reason="pip install vibench[test] brings rocrate")
     with ZipFile(crate) as archive:
         archive.extractall(tmp_path / "unpacked")

@@ -80,7 +80,7 @@ def folder(known_file, tmp_path):
 
 
 @pytest.mark.parametrize("authors", [("Ada L.",), ("Ada L.", "Grace H.")])
-def test_a_crate_is_as_the_standard_requires_and_recommends(validate, folder, tmp_path, authors):
+def test_a_crate_meets_requirements_and_recommendations_of_the_standard(validate, folder, tmp_path, authors):
     facts = CrateFacts(
         "https://creativecommons.org/licenses/by/4.0/",
         authors,
@@ -92,7 +92,7 @@ def test_a_crate_is_as_the_standard_requires_and_recommends(validate, folder, tm
     assert code == 0, said
 
 
-def test_without_authors_a_crate_is_as_the_standard_requires(validate, folder, tmp_path):
+def test_a_crate_without_authors_meets_the_requirements_of_the_standard(validate, folder, tmp_path):
     (folder / "broken.h5").unlink()
     (folder / "report" / "results and bounds.csv").unlink()
     pack_folder(folder, tmp_path / "crate.zip", CrateFacts("https://example.org/our-licence"), {})

@@ -44,7 +44,7 @@ def test_an_excerpt_keeps_the_times_of_the_recording(known, known_values, tmp_pa
     assert json.loads(facts.read_text("utf-8"))["first_sample"] == 51_200
 
 
-def test_metadata_without_place_in_csv_is_written_beside_it(known, tmp_path):
+def test_metadata_of_a_csv_export_is_written_to_a_json_file_beside_it(known, tmp_path):
     _, facts = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
     said = json.loads(facts.read_text("utf-8"))
     assert facts.name == "a.csv.facts.json"
@@ -90,7 +90,7 @@ def test_a_matlab_file_holds_a_struct_for_each_channel(known, known_values, tmp_
     assert json.loads(found["recording"]["plan_json"])["name"] == "known"
 
 
-def test_segments_in_a_matlab_file_are_indices_of_its_own_arrays(known, tmp_path):
+def test_segments_in_a_matlab_file_index_the_exported_arrays(known, tmp_path):
     export_samples(excerpt(known, from_s=1.0), Format.MAT, tmp_path / "a.mat")
     found = loadmat(tmp_path / "a.mat", squeeze_me=True, simplify_cells=True)
     segments = found["recording"]["segments"]
@@ -119,7 +119,7 @@ def test_a_rate_that_wav_cannot_state_is_refused(known, tmp_path):
 
 
 @pytest.mark.parametrize(("to", "hours", "said"), [(Format.MAT, 1, "2 GiB"), (Format.WAV, 6, "4 GiB")])
-def test_data_beyond_the_format_is_refused_before_writing(known, tmp_path, to, hours, said):
+def test_data_that_exceeds_a_format_is_refused_before_writing(known, tmp_path, to, hours, said):
     samples = round(hours * 3600 * RATE_HZ)
     with pytest.raises(InvalidRequest, match=said):
         export_samples(excerpt(replace(known, samples=samples)), to, tmp_path / "a")

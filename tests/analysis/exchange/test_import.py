@@ -115,7 +115,7 @@ def test_a_file_in_volts_is_scaled_by_the_sensitivity_of_the_sensor(tmp_path):
         import_recording(tmp_path / "a.h5", scaled, tmp_path / "second.h5")
 
 
-def test_non_numeric_values_are_lost_samples(tmp_path):
+def test_non_finite_values_are_imported_as_lost_samples(tmp_path):
     wanted = signals()
     wanted[0, 55_000:55_003] = np.nan
     wanted[1, 10] = np.inf
@@ -148,7 +148,7 @@ def test_non_numeric_values_are_lost_samples(tmp_path):
         ("knots", "", "as a number of 'm s-1' per 'knots'"),
     ],
 )
-def test_a_unit_in_the_file_gives_the_scale_or_refuses_another(tmp_path, said, more, factor):
+def test_a_unit_in_the_file_sets_the_scale_or_is_refused_if_unsuitable(tmp_path, said, more, factor):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["u"], file["v"] = signals()
         file["v"].attrs["units"] = said
@@ -279,7 +279,7 @@ def test_universal_files_written_by_pyuff_are_read(tmp_path, binary, single):
     np.testing.assert_allclose(values, wanted, rtol=digits, atol=2 * np.abs(wanted).max() * ROUNDING)
 
 
-def test_binary_samples_of_single_precision_and_the_other_byte_order_are_read(known, known_values, tmp_path):
+def test_single_precision_big_endian_binary_samples_are_read(known, known_values, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     lines = path.read_bytes().split(b"\n", 19)
     kind, numbers = lines[7], lines[14]
@@ -314,7 +314,7 @@ def test_units_may_contain_non_ascii_characters(known, tmp_path, unit):
         assert source.channels[0].unit == "m/s²"
 
 
-def test_samples_that_look_like_a_delimiter_are_read(known, tmp_path):
+def test_binary_samples_that_look_like_a_delimiter_are_read(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("drive_voltage",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     raw = path.read_bytes()
     at = raw.rindex(b"    -1\n") - 8 * 100
@@ -329,7 +329,7 @@ def test_samples_that_look_like_a_delimiter_are_read(known, tmp_path):
     )
 
 
-def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_file, tmp_path):
+def test_an_imported_dwell_gives_the_results_of_the_exported_recording(dwell_file, tmp_path):
     with open_recording(dwell_file()) as recording:
         original = analyse(recording)
         path, _ = export_samples(excerpt(recording), Format.UFF, tmp_path / "dwell.uff")
@@ -355,7 +355,7 @@ def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_fil
     assert found.facts.whole_stretches == found.facts.planned_stretches == 1
 
 
-def test_imported_noise_gives_the_transmission_of_the_recording_it_came_from(noise_file, tmp_path):
+def test_imported_noise_gives_the_transmission_of_the_exported_recording(noise_file, tmp_path):
     with open_recording(noise_file()) as recording:
         original = analyse(recording)
         path, *_ = export_samples(excerpt(recording), Format.MAT, tmp_path / "noise.mat")
@@ -445,7 +445,7 @@ def test_an_unsuitable_mapping_is_refused_without_leftovers(tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.h5", "map.toml"]
 
 
-def test_a_rate_far_from_the_files_own_is_refused(tmp_path):
+def test_a_sampling_rate_far_from_the_rate_in_the_file_is_refused(tmp_path):
     wavfile.write(tmp_path / "a.wav", 44_100, signals()[0].astype(np.float32))
     with pytest.raises(InvalidRequest, match="says 44100 samples/s, and the mapping 8000"):
         import_recording(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")), tmp_path / "b.h5")
@@ -573,7 +573,7 @@ def hdf5_bytes(kept):
         ),
     ],
 )
-def test_file_errors_are_stated_once_in_plain_words(known, tmp_path, name, content, said):
+def test_file_errors_name_the_file_and_are_stated_once(known, tmp_path, name, content, said):
     (tmp_path / name).write_bytes(uff_bytes(known, **content) if isinstance(content, dict) else content)
     with pytest.raises(UnusableData, match=said) as refused, opened_source(tmp_path / name) as source:
         source.read(source.channels[0], 0, source.channels[0].samples)
@@ -583,7 +583,7 @@ def test_file_errors_are_stated_once_in_plain_words(known, tmp_path, name, conte
 
 @pytest.mark.parametrize("text", [b"m/s\xb2", "m/s\u00b2".encode()])
 @pytest.mark.parametrize("is_fixed", [True, False])
-def test_a_unit_in_hdf5_may_be_in_either_encoding(tmp_path, text, is_fixed):
+def test_a_unit_in_hdf5_may_be_a_fixed_or_variable_length_string(tmp_path, text, is_fixed):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["v"] = signals()[0]
         kind = h5py.string_dtype("utf-8", len(text) if is_fixed else None)
@@ -616,7 +616,7 @@ def test_zero_bytes_in_a_table_are_explained(tmp_path, encoding):
 @pytest.mark.parametrize(
     "encoding", ["latin-1", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"]
 )
-def test_a_heading_may_be_in_any_usual_encoding(tmp_path, encoding):
+def test_a_csv_heading_may_be_in_any_common_encoding(tmp_path, encoding):
     text = "F\u00fchrung am Fu\u00df\nZeit [s];Fu\u00dfpunkt (\u00b5m)\n0,0;1,5\n0,5;-2\n1,0;3\n"
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
     with opened_source(tmp_path / "a.csv") as source:
@@ -640,20 +640,20 @@ def test_a_heading_may_be_in_any_usual_encoding(tmp_path, encoding):
         ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
     ],
 )
-def test_a_file_with_a_wrong_suffix_gives_one_sentence(tmp_path, name, content, said):
+def test_a_file_with_a_wrong_suffix_gives_a_one_sentence_error(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises((InvalidRequest, UnusableData), match=said), opened_source(tmp_path / name):
         pass
 
 
-def test_an_invalid_tdms_file_gives_one_sentence(tmp_path):
+def test_an_invalid_tdms_file_gives_a_one_sentence_error(tmp_path):
     pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
     (tmp_path / "a.tdms").write_bytes(b"nothing of the kind")
     with pytest.raises(UnusableData, match="is no TDMS file"), opened_source(tmp_path / "a.tdms"):
         pass
 
 
-def test_objects_inside_hdf5_are_never_offered(tmp_path):
+def test_non_numeric_objects_in_hdf5_are_not_offered_as_channels(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["v"] = signals()[0]
         file.create_dataset("pickled", data=np.void(b"\x80\x04K\x01."))
@@ -705,7 +705,7 @@ def test_the_mappings_in_the_manual_are_valid(tmp_path, number, units):
 
 
 @pytest.mark.parametrize(("role", "unit"), [("m0_acceleration", "m s-2"), ("m0_displacement", "m")])
-def test_other_sensors_on_m0_need_no_unit_in_the_mapping(tmp_path, role, unit):
+def test_sensors_on_m0_need_no_unit_in_the_mapping(tmp_path, role, unit):
     meaning = mapping(tmp_path, ("1", "drive_voltage", ""), ("2", role, ""))
     assert meaning.channels[1].kind == (role.removeprefix("m0_"), unit)
 
@@ -836,7 +836,7 @@ def test_a_text_with_fewer_numbers_than_declared_is_refused(known, tmp_path):
         pass
 
 
-def test_a_frequency_response_in_text_is_neither_channel_nor_damage(known, tmp_path):
+def test_a_text_frequency_response_in_a_universal_file_is_ignored(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
     before = path.read_bytes()
     lines = before.split(b"\n")

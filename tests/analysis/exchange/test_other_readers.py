@@ -77,7 +77,7 @@ def test_h5dump_shows_channels_with_unit_scale_and_time_axis(with_result):
     assert re.search(r'ATTRIBUTE "DIMENSION_LIST".*?/time', head, re.DOTALL)
 
 
-def test_h5dump_shows_the_counts(with_result):
+def test_h5dump_shows_the_converter_counts(with_result):
     shown = h5dump("-d", "/drive_voltage", "-s", 69_998, "-c", 4, "-y", "-w", 80, with_result)
     data = re.search(r"DATA \{(.*?)\}", shown, re.DOTALL)[1]
     with open_recording(with_result) as recording:

@@ -41,26 +41,26 @@ def ranges(parts):
     return [(each.start, each.stop) for each in parts]
 
 
-def test_realisations_alternate_with_settling():
+def test_placed_realisations_alternate_with_settling_times():
     parts = place_parts(mapped(NOISE, begins_s=0.5), 1000.0, 10_000)
     assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]
 
 
-def test_the_steps_of_a_sweep_are_one_part():
+def test_the_steps_of_a_sweep_form_one_part():
     (part,) = place_parts(mapped(SWEEP), 1000.0, 30_000)
     assert (part.start, part.stop) == (2000, 22_000)
     assert part.segment.label == "sweep"
 
 
-def test_reported_parts_take_the_plans_labels_in_order():
+def test_parts_given_in_the_mapping_take_the_labels_of_the_plan():
     told = [{"start_s": 1.0, "stop_s": 1.5}, {"start_s": 4.0, "stop_s": 4.5}]
     parts = place_parts(mapped(NOISE, parts=told), 1000.0, 10_000)
     assert ranges(parts) == [(1000, 1500), (4000, 4500)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1]
 
 
-def test_parts_behind_the_end_of_the_file_are_left_out():
+def test_parts_after_the_end_of_the_file_are_left_out():
     assert len(place_parts(mapped(NOISE), 1000.0, 3000)) == 2
     (cut,) = place_parts(mapped(NOISE, parts=[{"start_s": 1, "stop_s": 1e308}]), 1000.0, 3000)
     assert cut.start == 1000 < 3000 < cut.stop

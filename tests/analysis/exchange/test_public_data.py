@@ -77,7 +77,7 @@ def test_a_published_mode_is_found(analysed, name, frequency_hz, damping_ratio, 
         (2450, 2850, 2617.0, 0.2180e-6, 0.0453),
     ],
 )
-def test_the_response_to_a_blow_has_the_published_peaks(
+def test_the_response_to_a_hammer_hit_has_the_published_peaks(
     analysed, low_hz, high_hz, line_hz, height, damping_ratio
 ):
     """Its authors read the extremes of real and imaginary part; so does this test, from our estimate."""
@@ -108,7 +108,7 @@ def test_the_samples_of_a_real_universal_file_have_the_levels_that_pyuff_reads(i
     assert found == pytest.approx([0.0790084, 0.3185365, 0.0792455, 0.1308404], abs=6e-8)
 
 
-def test_the_untested_mapping_reads_the_layout_of_its_loader(tmp_path):
+def test_the_f16_mapping_reads_the_documented_file_layout(tmp_path):
     untried = load_toml(MAPPINGS / "f16_sweep.toml", ImportMapping)
     known = np.random.default_rng(1).standard_normal((3, 108_477))
     content = {"Force": known[:1], "Voltage": known[:1], "Acceleration": known, "Fs": 400.0}

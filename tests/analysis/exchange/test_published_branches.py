@@ -23,7 +23,7 @@ def cycles():
     return {each.name.removeprefix("CBC_"): each for each in found}
 
 
-def test_stable_motions_have_the_frequency_and_amplitude_that_their_authors_state(cycles):
+def test_published_stable_motions_have_the_stated_frequency_and_amplitude(cycles):
     for speed in STABLE:
         found = cycles[f"stable_v{speed}"]
         assert found.frequency_hz == pytest.approx(found.stated_hz, abs=0.006)
@@ -31,7 +31,7 @@ def test_stable_motions_have_the_frequency_and_amplitude_that_their_authors_stat
         assert found.invasive < 0.025
 
 
-def test_unstable_motions_lie_below_the_stable_ones_and_fall_as_the_wind_rises(cycles):
+def test_published_unstable_amplitudes_are_lower_and_fall_with_wind_speed(cycles):
     stable, unstable = (
         [cycles[f"{kind}_v{each}"] for each in speeds]
         for kind, speeds in (("stable", STABLE), ("unstable", UNSTABLE))
@@ -42,7 +42,7 @@ def test_unstable_motions_lie_below_the_stable_ones_and_fall_as_the_wind_rises(c
     assert means == sorted(means, reverse=True)
 
 
-def test_published_unstable_motions_exceed_the_authors_criterion_of_invasiveness(cycles):
+def test_published_unstable_motions_exceed_the_stated_invasiveness_limit(cycles):
     """Their search ended by amplitudes before the samples were kept: a target that was changed once more."""
     for speed in UNSTABLE:
         found = cycles[f"unstable_v{speed}"]
@@ -52,7 +52,7 @@ def test_published_unstable_motions_exceed_the_authors_criterion_of_invasiveness
 
 
 @pytest.mark.parametrize("name", ["stable_v16_5", "unstable_v16_5"])
-def test_imported_lines_match_least_squares_of_the_file(cycles, name):
+def test_imported_harmonics_match_a_least_squares_fit_to_the_file(cycles, name):
     heave, target = 0.18 * loadmat(FOLDER / f"CBC_{name}.mat")["data"][:2].astype(float)
     found = cycles[name]
     assert found.largest_m == pytest.approx(heave.max() - heave.mean(), rel=1e-6)

@@ -96,7 +96,7 @@ def test_the_report_has_one_figure_over_the_points(results, tmp_path):
         assert np.all(read[f"relative_half_width_{at}"] < 0.2)
 
 
-def test_a_later_attempt_replaces_the_earlier_and_repetitions_are_separate_scans(results):
+def test_the_latest_attempt_counts_and_repetitions_form_separate_scans(results):
     analyses = [each.analysis for each in results.noise]
     assert all(isinstance(each, NoiseAnalysis) for each in analyses)
 
@@ -128,7 +128,7 @@ def test_one_point_is_exported_with_its_node(folder, tmp_path):
     assert first["id1"].strip() == "m2 displacement over base displacement"
 
 
-def test_comparisons_and_fits_use_the_points_on_m0_alone(folder, results):
+def test_comparisons_and_fits_use_only_scan_points_on_m0(folder, results):
     with pytest.raises(
         UnusableData, match=r"noise-m2.h5 is a point of a scan on m2, and comparisons show m0"
     ):

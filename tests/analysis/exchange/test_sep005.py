@@ -8,7 +8,7 @@ from vibench.analysis.exchange import excerpt, sep005
 model = pytest.importorskip("sdypy_sep005.sep005", reason="pip install vibench[test] brings sdypy-sep005")
 
 
-def test_sdypy_takes_every_channel_with_its_values(known, known_values):
+def test_sdypy_accepts_every_channel_with_its_values(known, known_values):
     channels = sep005(excerpt(known))
     assert [each["name"] for each in channels] == list(known.roles)
     for each in channels:
@@ -18,6 +18,6 @@ def test_sdypy_takes_every_channel_with_its_values(known, known_values):
     assert [each.get("quantity") for each in channels] == [None, "v"]
 
 
-def test_an_excerpt_begins_later(known):
+def test_an_excerpt_has_a_later_start_time_stamp(known):
     whole, part = (sep005(excerpt(known, (), start))[0]["start_timestamp"] for start in (None, 1.0))
     assert np.datetime64(part.split("+")[0]) - np.datetime64(whole.split("+")[0]) == np.timedelta64(1, "s")

@@ -70,14 +70,14 @@ FORMS = (
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("start", ["2026-02-28 23:59:59.6Z", "2026-03-04 11:59:59Z"])
-def test_dates_and_times_of_day_in_any_form_place_samples(tmp_path, form, start):
+def test_dates_and_times_in_any_format_determine_sample_positions(tmp_path, form, start):
     kept = np.delete(np.arange(TIMES.size), slice(1500, 1537))
     clock = [(datetime.fromisoformat(start) + timedelta(seconds=TIMES[k])).strftime(form) for k in kept]
     head = "Date;Time;u;a;v" if ";" in form else "Time;u;a;v"
     is_right(imported(text(tmp_path / "a.csv", head, (clock, *signal(TIMES[kept])), ";")), lost=37)
 
 
-def test_a_record_continued_a_day_later_is_not_read_as_one(tmp_path):
+def test_a_record_continued_on_the_next_day_is_refused(tmp_path):
     clock = [f"0{1 + k // 2000}.03.2026 12:00:{TIMES[k]:09.6f}" for k in range(TIMES.size)]
     with pytest.raises(InvalidRequest, match="intervals and"):
         imported(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";"))
@@ -101,7 +101,7 @@ UNITS = (
 
 
 @pytest.mark.parametrize("head", UNITS)
-def test_units_in_names_and_in_any_row_of_the_heading_give_scales(tmp_path, head):
+def test_units_in_channel_names_or_heading_rows_set_the_scales(tmp_path, head):
     volts, base, velocity = signal(TIMES)
     columns = (TIMES, 1e3 * volts, base / G, 1e3 * velocity)
     is_right(imported(text(tmp_path / "a.csv", head, columns), "234"))
@@ -113,7 +113,7 @@ def test_a_row_of_units_with_empty_cells_is_refused(tmp_path, head, between):
         imported(text(tmp_path / "a.csv", head, (TIMES, *signal(TIMES)), between))
 
 
-def test_a_start_for_each_column_of_labview_aligns_channels(tmp_path):
+def test_different_start_times_of_labview_columns_align_the_channels(tmp_path):
     volts, base, _ = signal(TIMES)
     velocity = signal(TIMES + LATE / RATE_HZ)[2]
     head = f"X0;0;0;{LATE / RATE_HZ:.9f}\nDelta_X;{1 / RATE_HZ};{1 / RATE_HZ};{1 / RATE_HZ}\nu;a;v"
@@ -164,7 +164,7 @@ def hdf5(path, columns, **facts):
     return path
 
 
-def test_doubtful_scales_and_times_of_hdf5_are_refused_and_missing_values_are_lost(tmp_path):
+def test_ambiguous_scales_and_times_in_hdf5_are_refused(tmp_path):
     columns = dict(zip("uav", signal(TIMES), strict=True))
     names = ("/u", "/a", "/v")
     with pytest.raises(InvalidRequest, match=r"says gain = 0\.01 for /u"):
@@ -177,7 +177,7 @@ def test_doubtful_scales_and_times_of_hdf5_are_refused_and_missing_values_are_lo
     is_right(imported(hdf5(tmp_path / "c.h5", columns, missing_value=-999.0), names), lost=10)
 
 
-def test_motion_of_a_universal_file_without_labels_is_in_its_stated_length(tmp_path):
+def test_unlabelled_motion_in_a_universal_file_uses_its_length_unit(tmp_path):
     pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
     path = tmp_path / "a.uff"
     length = f"{1e3:25.16E}".replace("E", "D")
@@ -239,13 +239,13 @@ def with_facts(tmp_path, suffix, values, facts):
 
 @pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("word", ["unit", "EU", "engineering_unit", "PhysicalUnit", "y_units", "Einheit"])
-def test_a_unit_under_any_usual_name_is_applied(tmp_path, suffix, word):
+def test_a_unit_attribute_of_any_common_name_is_applied(tmp_path, suffix, word):
     volts, acceleration, velocity = signal(TIMES)
     units = [{word: unit} for unit in ("V", "g", "mm/s")]
     is_right(with_facts(tmp_path, suffix, (volts, acceleration / G, 1000 * velocity), units)())
 
 
-def test_a_unit_of_one_variable_is_not_applied_to_others(tmp_path):
+def test_the_unit_of_one_variable_is_not_applied_to_another(tmp_path):
     values = dict(zip("uav", signal(TIMES), strict=True)) | {"a": signal(TIMES)[1] / G, "a_unit": "g"}
     savemat(tmp_path / "a.mat", values)
     is_right(imported(tmp_path / "a.mat"))
@@ -253,7 +253,7 @@ def test_a_unit_of_one_variable_is_not_applied_to_others(tmp_path):
 
 @pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("name", ["wf_xunit_string", "x_unit"])
-def test_an_increment_has_the_unit_of_its_axis(tmp_path, suffix, name):
+def test_a_time_increment_is_read_in_its_stated_unit(tmp_path, suffix, name):
     in_ms, in_hz = ([{"wf_increment": 1e3 / RATE_HZ, name: unit}] * 3 for unit in ("ms", "Hz"))
     is_right(with_facts(tmp_path, suffix, signal(TIMES), in_ms)())
     with pytest.raises(InvalidRequest, match=r"axis in 'Hz' instead of times.*time = \"even\""):
@@ -296,7 +296,7 @@ def test_counts_need_a_scale(tmp_path, suffix):
     np.testing.assert_allclose(samples, signal(TIMES), atol=0.006)
 
 
-def test_units_behind_the_functions_of_a_universal_file_apply_to_them(tmp_path):
+def test_units_at_the_end_of_a_universal_file_apply_to_its_functions(tmp_path):
     pyuff = pytest.importorskip("pyuff")
     file = pyuff.UFF(str(tmp_path / "a.uff"))
     axis = {"abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": 1 / RATE_HZ}

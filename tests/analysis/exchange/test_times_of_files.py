@@ -190,7 +190,7 @@ COLUMN_FAULTS = ("sound", "gap", "drop", "repeat", "swap", "restart", "drift", "
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [43])
 @pytest.mark.parametrize("fault", COLUMN_FAULTS)
-def test_any_evenly_rising_column_can_be_the_time(tmp_path, fault, seed):
+def test_any_evenly_increasing_column_can_be_the_time_axis(tmp_path, fault, seed):
     rng = np.random.default_rng(seed)
     scales = {**dict.fromkeys(HEADINGS, 1.0), **UNITS_OF_TIME, **dict.fromkeys(COUNTS, RATE_HZ), None: 1.0}
     # Each fault under a third of the headings, each heading with a third of the faults.
@@ -242,7 +242,7 @@ def late_mat(path, first, second, fact):
         *((".mat", fact) for fact in ("x_values.start_value", ".Tstart", ".start")),
     ],
 )
-def test_starts_and_rates_beside_channels_are_read(tmp_path, suffix, fact):
+def test_start_times_and_rates_stored_beside_channels_are_read(tmp_path, suffix, fact):
     times = np.arange(SAMPLES) / RATE_HZ
     path = tmp_path / f"a{suffix}"
     write_late = late_hdf5 if suffix == ".h5" else late_mat
@@ -264,7 +264,7 @@ def test_starts_and_rates_beside_channels_are_read(tmp_path, suffix, fact):
         import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "wrong.h5")
 
 
-def test_a_mapping_overrides_file_times_with_a_report(tmp_path):
+def test_a_mapping_may_override_file_times_and_the_recording_notes_it(tmp_path):
     path = write("csv", tmp_path, "drift", np.random.default_rng(0))
     content = {**mapped("csv", RATE_HZ).model_dump(), "time": "even"}
     with open_recording(
@@ -337,7 +337,7 @@ def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, no
     ("heading", "order"),
     [*product(["time [s]", "Zeit", "t (s)", "t"], ["falling", "shuffled"]), ("time [s]", "not a number")],
 )
-def test_times_that_do_not_rise_are_refused(tmp_path, order, heading):
+def test_times_that_do_not_increase_are_refused(tmp_path, order, heading):
     times = np.arange(SAMPLES) / RATE_HZ
     shown = {
         "falling": times[::-1],
@@ -351,7 +351,7 @@ def test_times_that_do_not_rise_are_refused(tmp_path, order, heading):
 
 
 @pytest.mark.parametrize("heading", ["t", "T", "Temps"])
-def test_another_quantity_under_a_short_name_is_no_time(tmp_path, heading):
+def test_a_column_named_t_with_another_quantity_is_not_read_as_time(tmp_path, heading):
     rng = np.random.default_rng(4)
     torque, warmth = rng.standard_normal(SAMPLES), np.round(np.linspace(20.0, 21.0, SAMPLES), 2)
     other = torque if heading == "t" else warmth + 0.01 * rng.integers(-1, 2, SAMPLES)
@@ -368,7 +368,7 @@ def test_another_quantity_under_a_short_name_is_no_time(tmp_path, heading):
     ("rate_hz", "digits"),
     [(1024, 3), (980, 3), (4900, 4), (5120, 4), (9600, 4), (9980, 4), (51_200, 5), (96_000, 5)],
 )
-def test_rounded_times_are_no_lost_samples(tmp_path, rate_hz, digits, first):
+def test_rounded_times_are_not_counted_as_lost_samples(tmp_path, rate_hz, digits, first):
     """One interval in 20 or fewer differs from the others, by one unit of the last digit."""
     times = np.arange(6000) / rate_hz
     rows = (
@@ -423,13 +423,13 @@ def test_samples_between_segments_of_a_tdms_file_count_as_lost(tmp_path, fact, a
     ],
     ids=["another rate", "between samples", "backward", "another day"],
 )
-def test_segments_of_a_tdms_file_that_fit_no_axis_are_refused(tmp_path, more):
+def test_tdms_segments_without_a_consistent_time_axis_are_refused(tmp_path, more):
     restarted_tdms(tmp_path / "a.tdms", more, 7001)
     with pytest.raises(InvalidRequest, match=r"samples/s|starts again|go back|intervals and"):
         import_recording(tmp_path / "a.tdms", mapped("tdms", RATE_HZ), tmp_path / "made.h5")
 
 
-def test_further_samples_of_a_wav_or_mat_file_are_refused(tmp_path):
+def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
     path = write("wav", tmp_path, "sound", np.random.default_rng(0))
     content = path.read_bytes()
     path.write_bytes(content + b"data" + (64).to_bytes(4, "little") + bytes(64))

@@ -69,7 +69,7 @@ def test_pyuff_reads_every_line_and_both_axes(known, tmp_path, lines, is_even, i
     assert read["id1"].strip() == "m0 velocity over base acceleration"
 
 
-def test_records_are_as_wide_as_the_definition_states(known, tmp_path):
+def test_universal_file_records_have_the_defined_width(known, tmp_path):
     hz = np.array([1.0, 2.5, 7.25])
     path, _ = export_functions(
         excerpt(known), [function(hz, np.array([1 + 2j, -3j, 5e-7 + 0j]))], Format.UFF, tmp_path / "a.uff"
@@ -85,7 +85,7 @@ def test_records_are_as_wide_as_the_definition_states(known, tmp_path):
     assert (lines[start - 1], lines[-1]) == ("    -1", "    -1")
 
 
-def test_densities_match_the_chosen_channels_and_seconds(known, known_values, tmp_path):
+def test_exported_densities_match_the_chosen_channels_and_time_range(known, known_values, tmp_path):
     chosen = excerpt(known, ["m0_velocity"], 0.2, 1.3)
     functions = spectral_functions(chosen, FrequencyResponseRequest())
     path, _ = export_functions(chosen, functions, Format.UFF, tmp_path / "a.uff")
@@ -133,7 +133,7 @@ def recorded(path, parts):
         ([("", 2.5, VOLTS)], 1.0, "over 2.5 s of the recording"),
     ],
 )
-def test_densities_cover_and_name_the_played_signal(tmp_path, parts, lines_hz, told):
+def test_exported_densities_cover_and_name_the_played_segments(tmp_path, parts, lines_hz, told):
     run = CliRunner().invoke(
         app, ["export", str(recorded(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
     )
@@ -181,7 +181,7 @@ def velocity_of_m0(hz):
 
 
 @pytest.mark.parametrize("spacing_hz", [1.0000175, 0.99998333, 0.25, 1.0666667])
-def test_modal_programs_find_the_modes_whatever_the_band_and_the_clock(known, tmp_path, spacing_hz):
+def test_modal_software_finds_the_modes_for_any_band_and_clock_ratio(known, tmp_path, spacing_hz):
     wanted = gong2025(contact="linear").natural_frequencies_hz
     for number, start_hz in enumerate((10, 25, 37, 60, 73)):
         hz = spacing_hz * np.arange(np.ceil(start_hz / spacing_hz), 605 / spacing_hz)
@@ -203,7 +203,7 @@ def test_modal_programs_find_the_modes_whatever_the_band_and_the_clock(known, tm
         np.testing.assert_allclose(coherence["x"], hz, atol=0.02 * spacing_hz)
 
 
-def test_a_response_with_lines_left_out_keeps_the_frequency_of_each(known, tmp_path):
+def test_a_response_with_omitted_lines_keeps_their_frequencies(known, tmp_path):
     hz = 1.0000175 * np.array([31, 33, 37, 39, 41])
     path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
     read = pyuff.UFF(str(path)).read_sets(1)
