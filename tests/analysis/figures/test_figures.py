@@ -48,7 +48,7 @@ def numbers(path):
     return {heading: np.array([float(row[heading] or "nan") for row in rows]) for heading in rows[0]}
 
 
-def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation(noise_file):
+def test_a_transmission_figure_shows_measurement_and_simulation(noise_file):
     found = result(noise_file())
     drawn = transmission_figure(found.analysis, found.overlay)
     top, phase, strip, difference = drawn.figure.axes
@@ -78,7 +78,7 @@ def test_a_transmission_caption_names_every_resonance_with_its_uncertainty(noise
 
 
 @pytest.mark.thorough
-def test_files_beside_a_figure_hold_its_numbers(noise_file, tmp_path):
+def test_files_saved_with_a_figure_contain_its_numbers(noise_file, tmp_path):
     found = result(noise_file())
     png, svg, table, sines = transmission_figure(found.analysis, found.overlay).save(tmp_path / "figures")
     assert png.read_bytes().startswith(PNG_HEAD)
@@ -96,7 +96,7 @@ def test_the_same_figure_drawn_twice_is_the_same_file(noise_file):
     assert drawn[0] == drawn[1]
 
 
-def test_levels_are_drawn_weak_to_strong(noise_file, tmp_path):
+def test_noise_levels_are_drawn_from_weak_to_strong(noise_file, tmp_path):
     found = result(noise_file(), Simulation.LEFT_OUT).analysis
     drawn = transmission_levels_figure([found, found])
     labels = [each.get_label() for each in drawn.figure.axes[0].get_lines()]
@@ -128,7 +128,7 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     assert f"{found.overlay.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
 
-def test_frequencies_above_a_sweep_lie_within_it(sweep_file):
+def test_frequencies_marked_above_a_sweep_are_within_its_range(sweep_file):
     figure = sweep_figure(result(sweep_file, Simulation.LEFT_OUT).analysis).figure
     (top,) = figure.axes[0].child_axes
     figure.draw_without_rendering()
@@ -138,7 +138,7 @@ def test_frequencies_above_a_sweep_lie_within_it(sweep_file):
     assert not np.isfinite(places[:, 0]).any(), f"{beyond} Hz are drawn at the ends of {low:g} to {high:g} Hz"
 
 
-def test_a_sweep_finding_says_sweep_once(sweep_file):
+def test_a_sweep_finding_states_the_sweep_rate_once(sweep_file):
     found = result(sweep_file, Simulation.LEFT_OUT)
     (finding,) = sweep_findings(found)
     rate = abs(found.analysis.response.sweep_rate_hz_per_s)
@@ -146,7 +146,7 @@ def test_a_sweep_finding_says_sweep_once(sweep_file):
     assert f"The frequency was swept at {rate:.3g} Hz/s." in sweep_figure(found.analysis).caption
 
 
-def test_collisions_throughout_a_sweep_are_one_phrase(sweep_file):
+def test_collisions_throughout_a_sweep_are_reported_in_one_phrase(sweep_file):
     found = result(sweep_file, Simulation.LEFT_OUT).analysis.collisions
     (region,) = found.regions
     whole = replace(region, reaches_start=True, reaches_stop=True)
@@ -164,7 +164,7 @@ def test_dwells_are_drawn_in_rows_by_level_with_responses_in_the_caption(dwell_f
         assert f"Response I {each.analysis.response.response_i:.3g}" in drawn.caption
 
 
-def test_the_largest_column_of_a_spectrum_is_response_ii(dwell_file):
+def test_the_largest_column_of_a_dwell_spectrum_is_response_ii(dwell_file):
     found = result(dwell_file("weak"), Simulation.LEFT_OUT).analysis.response
     frequency_hz, size = spectrum_columns(found)
     # A Hann line between two lines reads up to 15 % low.
@@ -180,7 +180,7 @@ def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
-def test_parts_beyond_the_planned_ones_are_explained_by_feedback(dwell_file):
+def test_more_parts_than_planned_are_explained_by_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]
@@ -221,13 +221,13 @@ def test_every_excitation_can_be_shown_before_it_plays(plan):
     ("largest", "expected"),
     [(5e-6, (1e6, "µm")), (0.02, (1e3, "mm")), (3.0, (1.0, "m")), (1e-12, (1e9, "nm"))],
 )
-def test_quantities_get_a_prefix_for_values_from_one_to_a_thousand(largest, expected):
+def test_unit_prefixes_give_values_between_1_and_1000(largest, expected):
     factor, unit = prefixed(largest, "m")
     assert factor == pytest.approx(expected[0])
     assert unit == expected[1]
 
 
-def test_a_figure_of_steps_is_titled_by_its_kind(stepped_file):
+def test_a_figure_of_frequency_steps_is_titled_by_its_kind_of_excitation(stepped_file):
     found = result(stepped_file).analysis
     plan = SettledSine(amplitude_vpp=2, frequencies_hz=(200, 210), record_s=0.5)
     assert STEPPED_FREQUENCIES.title(plan, found.response).startswith("Settled sine, 2 Vpp")

@@ -34,11 +34,11 @@ def test_magnitude_axes_have_numbers_without_overlap(low, high):
     assert all(below[2] < above[1] for below, above in pairwise(numbers)), numbers
 
 
-def test_less_than_a_decade_has_intermediate_numbers():
+def test_axes_under_a_decade_show_intermediate_numbers():
     assert [text for text, *_ in _numbers(1.5, 3.5)] == ["2", "3"]
     assert {"0.4", "0.6", "1", "2"} <= {text for text, *_ in _numbers(0.3, 3.5)}
     assert {"$4\\cdot10^{-5}$", "$6\\cdot10^{-5}$"} <= {text for text, *_ in _numbers(3e-5, 7e-5)}
 
 
-def test_over_many_decades_only_powers_of_ten_are_reported():
+def test_axes_over_many_decades_show_only_powers_of_ten():
     assert all(np.log10(float(text)) % 1 == 0 for text, *_ in _numbers(0.005, 50))
