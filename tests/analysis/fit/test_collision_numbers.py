@@ -24,7 +24,7 @@ def collided(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(collided):
+def test_unequal_gaps_are_found_although_described_as_equal(collided):
     updated = update_model(collided)
     lower, upper = updated.collisions.gaps
     assert lower.low <= 35e-6 <= lower.high
@@ -43,7 +43,7 @@ def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(colli
 
 
 @pytest.mark.thorough
-def test_a_motion_inconsistent_with_the_masses_gives_no_gap(collided):
+def test_a_motion_that_contradicts_the_masses_gives_no_gap(collided):
     """Motion tells m1 and the springs by their ratio to m0 and m2, which must be right."""
     m0, m1, m2 = TRUE.masses
     found, why = tracked_numbers(collided, replace(TRUE, masses=(1.04 * m0, m1, m2)))

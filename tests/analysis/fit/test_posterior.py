@@ -34,7 +34,7 @@ def cases():
     return found
 
 
-def test_bounds_of_95_percent_hold_and_are_not_too_wide(cases):
+def test_posterior_95_percent_bounds_have_their_coverage_and_useful_width(cases):
     bounds = np.array([np.quantile(each.draws, [0.025, 0.975], axis=0) for _, each in cases])
     held = np.array([(low <= true) & (true <= high) for (true, _), (low, high) in zip(cases, bounds)])  # noqa: B905
     count = held[:, :2].size
@@ -50,7 +50,7 @@ def test_uninformative_statistics_keep_the_prior_width(cases):
     assert np.median(wide) > 0.85 * 2.0
 
 
-def test_only_statistics_of_the_right_model_fit(cases):
+def test_statistics_from_a_wrong_model_do_not_fit(cases):
     assert sum(not each.fits for _, each in cases) <= 3
     runs = Linear(5)
     off = np.linalg.svd(runs.gain[:2])[2][-1]  # what no parameter does
@@ -58,7 +58,7 @@ def test_only_statistics_of_the_right_model_fit(cases):
     assert not posterior(runs, strange, BOX, 5, ROUNDS).fits
 
 
-def test_a_run_of_the_model_is_rarely_refused_by_few_reference_runs():
+def test_a_run_of_the_true_model_is_rarely_rejected_with_few_references():
     """Runs that had a part in what they were held against seemed near: of 80, two in five others were not."""
     refused, runs, statistics = 0, 80, 60
     for seed in range(12):

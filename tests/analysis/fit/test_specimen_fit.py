@@ -166,7 +166,7 @@ def test_frequency_intervals_include_the_converter_clock(true):
         assert found.low <= value <= found.high, name
 
 
-def test_fixed_parameters_keep_the_values_of_the_bench(true):
+def test_parameters_not_fitted_keep_their_described_values(true):
     fit = fit_specimen(measured(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
     assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
     assert fit.specimen.stiffnesses == pytest.approx(true.stiffnesses, rel=1e-12)
@@ -174,7 +174,7 @@ def test_fixed_parameters_keep_the_values_of_the_bench(true):
         fit.value(Parameter.F0)
 
 
-def test_masses_in_series_reproduce_the_transmissibility(true):
+def test_the_response_used_in_the_fit_equals_the_base_transmissibility(true):
     ours = own_response(true, LINES_HZ, np.zeros(0))
     assert ours == pytest.approx(base_transmissibility(true, LINES_HZ)[:, 0], rel=1e-10)
 
@@ -188,7 +188,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("assumption", WRONG)
-def test_one_wrong_assumption_is_refused_and_named(true, assumption):
+def test_one_wrong_assumption_is_rejected_and_named_as_suspect(true, assumption):
     factors = WRONG[assumption]
     other = with_values(true, {each: f * parameter_value(true, each) for each, f in factors.items()})
     gain = 1.01 if assumption is Assumption.SENSITIVITY else 1.0
@@ -228,7 +228,7 @@ def test_sensor_uncertainty_widens_dependent_intervals(true):
 
 
 @pytest.mark.parametrize("averages", [3, 12])
-def test_chi_square_of_a_right_model_is_one_for_few_averages(true, averages):
+def test_reduced_chi_square_of_a_true_model_is_one_with_few_averages(true, averages):
     rng = np.random.default_rng(30 + averages)
     lines_hz = np.arange(60.0, 560.0, 1.0)
     draws = 0.01 * (rng.standard_normal((averages, lines_hz.size, 2)))

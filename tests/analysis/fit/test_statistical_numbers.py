@@ -44,7 +44,7 @@ def holds(number, true):
 
 
 @pytest.mark.thorough
-def test_mean_gap_and_m1_are_determined_and_flat_parameters_are_not(buried):
+def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(buried):
     with open_recording(buried.path) as recording:
         found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)
     told = {each.what: each for each in found}
@@ -93,12 +93,12 @@ def test_a_rig_with_a_wrong_base_response_is_refused_early(buried, tmp_path):
         (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),
     ],
 )
-def test_undetermined_parameters_are_explained_in_a_sentence(buried, specimen, stretch_s, why):
+def test_a_fit_without_usable_statistics_gives_a_reason(buried, specimen, stretch_s, why):
     with open_recording(buried.path) as recording, pytest.raises(AnalysisError, match=why):
         statistical_numbers(recording, specimen, stretch_s, 260.0, rounds=FEW)
 
 
-def test_statistics_are_reproducible_and_side_changes_flip_even_harmonics():
+def test_mirrored_motion_flips_the_even_harmonics_of_its_statistics():
     rate_hz, time_s = 20_000.0, np.arange(40_000) / 20_000.0
     turn = 2 * math.pi * 250.0 * time_s
     base = np.sin(turn) + 1e-3 * np.random.default_rng(1).standard_normal(turn.size)
@@ -117,7 +117,7 @@ def test_statistics_are_reproducible_and_side_changes_flip_even_harmonics():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_fit_determines_parameters_of_an_untrackable_motion(buried):
+def test_statistics_determine_the_gap_of_an_untrackable_motion(buried):
     updated = update_model(analyse_files([buried.path], "buried", Simulation.LEFT_OUT))
     gap = {each.what: each for each in updated.collisions.determined}[Hidden.MEAN_GAP]
     assert holds(gap, 51e-6)
@@ -129,7 +129,7 @@ def test_a_fit_determines_parameters_of_an_untrackable_motion(buried):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1700)
-def test_bounds_hold_on_random_specimens():
+def test_bounds_from_statistics_hold_on_random_specimens():
     """Thirty draws; `--seed` and `--shard` ask for others."""
     place = Path(__file__).parents[3] / "benchmarks" / "posterior_coverage.py"
     told = subprocess.run(

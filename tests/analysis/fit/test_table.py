@@ -35,7 +35,7 @@ def updated(tmp_path_factory):
     return update_model(analyse_files([path], "weak", Simulation.LEFT_OUT))
 
 
-def test_a_right_description_of_a_whole_rig_is_not_refused(updated):
+def test_a_correct_description_of_a_rig_fits_its_recordings(updated):
     assert updated.fits
     assert updated.linear.reduced_chi_square < updated.linear.limit
     assert updated.table.mass_kg == pytest.approx(TRUE_KG, abs=3.3 * updated.table.sd_kg)
@@ -44,7 +44,7 @@ def test_a_right_description_of_a_whole_rig_is_not_refused(updated):
     assert updated.not_determined[0].endswith("the contact law are not determined: no recording collides.")
 
 
-def test_a_table_that_is_a_tenth_heavier_than_described_is_named(updated):
+def test_a_table_10_percent_heavier_than_described_is_named_as_suspect(updated):
     heavier = replace(updated, table=replace(updated.table, described_kg=TRUE_KG / 1.1))
     assert not heavier.fits
     (suspect,) = heavier.suspects

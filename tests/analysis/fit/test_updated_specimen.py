@@ -80,7 +80,7 @@ def updated(measured):
     return update_model(measured)
 
 
-def test_true_parameters_lie_within_intervals_that_exclude_the_description(updated):
+def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(updated):
     assert [each.parameter for each in updated.values] == [*LINEAR, Parameter.GAP]
     for each in updated.values:
         truth = parameter_value(TRUE, each.parameter)
@@ -104,14 +104,14 @@ def test_the_report_shows_fitted_and_described_values(measured, updated):
     ]
 
 
-def test_the_intervals_are_useful(updated):
+def test_fitted_intervals_are_narrow_enough_to_be_useful(updated):
     relative = {each.parameter: (each.high - each.low) / each.value for each in updated.values}
     assert relative[Parameter.DAMPING_TIME] < 0.1
     assert max(relative[each] for each in LINEAR[1:]) < 0.01
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_onset_is_the_first_impact(recorded, measured):
+def test_the_onset_frequency_is_that_of_the_first_impact(recorded, measured):
     (onset,) = onsets(measured.sweeps[0].analysis, TRUE)
     assert onset.frequency_hz == pytest.approx(recorded[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
@@ -159,7 +159,7 @@ def test_the_lag_of_a_swept_response_is_predicted_by_its_rate():
     assert np.max(np.abs(lagging / seen - 1)) < 0.5 * np.max(np.abs(steady / seen - 1))
 
 
-def test_without_a_sweep_the_gap_is_not_fitted_and_the_reason_given(measured):
+def test_without_a_sweep_the_gap_is_not_fitted_and_a_reason_is_given(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m
@@ -169,7 +169,7 @@ def test_without_a_sweep_the_gap_is_not_fitted_and_the_reason_given(measured):
     assert math.isnan(only_sweep.reduced_chi_square)
 
 
-def test_missing_data_for_a_fit_give_one_sentence(measured):
+def test_missing_data_for_a_fit_give_a_one_sentence_error(measured):
     with pytest.raises(NotEnoughData, match="no result"):
         update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep enters"):
