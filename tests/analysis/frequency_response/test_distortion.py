@@ -65,7 +65,7 @@ def analysed(tmp_path_factory):
     return played
 
 
-def test_driven_lines_come_from_the_plan_not_the_noisy_drive(analysed):
+def test_driven_lines_are_taken_from_the_plan_despite_drive_noise(analysed):
     quiet, noisy = (analysed(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
     driven = np.rint(noisy.response.frequency_response.frequency_hz / REPETITION_HZ)
     np.testing.assert_array_equal(driven, quiet.excitation.excited_lines)
@@ -74,7 +74,7 @@ def test_driven_lines_come_from_the_plan_not_the_noisy_drive(analysed):
     assert not set(driven) & set(noisy.response.periodic.detection.order)
 
 
-def test_a_square_distorts_even_lines_and_a_cube_odd_lines(analysed):
+def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analysed):
     square = distortion(analysed(lambda velocity: 0.05 * velocity**2).response.periodic)
     cube = distortion(analysed(lambda velocity: 0.02 * velocity**3).response.periodic)
     noise = square.detection_noise_m_per_s
@@ -130,11 +130,11 @@ def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drif
         lambda v: v * (np.abs(v) > 2.0),
     ],
 )
-def test_no_false_drift_is_reported(analysed, distorted):
+def test_distortion_is_not_reported_as_drift(analysed, distorted):
     assert "Drift" not in [each.what for each in analysed(distorted).checks]
 
 
-def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):
+def test_the_distortion_figure_shows_all_lines_and_its_caption_the_levels(analysed):
     analysis = analysed(lambda velocity: 0.05 * velocity**2)
     periodic = analysis.response.periodic
     drawn = distortion_figure(analysis, periodic)
@@ -148,7 +148,7 @@ def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):
     assert f"{1e6 * distortion(periodic).even_m_per_s:.3g} µm/s on even lines" in drawn.caption
 
 
-def test_one_realisation_reports_that_distortion_is_unknown(analysed):
+def test_distortion_is_reported_as_unknown_for_one_realisation(analysed):
     periodic = analysed(np.zeros_like, realisations=1).response.periodic
     assert distortion(periodic).distortion_share is None
     assert "one realisation cannot show distortion" in distortion_caption(periodic)

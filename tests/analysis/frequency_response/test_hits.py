@@ -60,7 +60,7 @@ def imported(folder, force, velocity):
 MAPPING["measurement"]["excitation"]["duration_s"] = 1.0
 
 
-def test_a_single_hit_has_resonances_without_bounds(tmp_path):
+def test_a_single_hammer_hit_gives_resonances_without_bounds(tmp_path):
     """It had bounds from the segments without a hit, which did not hold."""
     (result,) = analyse_files([imported(tmp_path, *hammered(1, 1))], "hits", Simulation.LEFT_OUT).results
     found = result.analysis.response
@@ -78,7 +78,7 @@ def test_a_single_hit_has_resonances_without_bounds(tmp_path):
 
 
 @pytest.mark.parametrize("seed", [2, 3])
-def test_the_damping_of_the_window_is_taken_out(tmp_path, seed):
+def test_the_damping_of_an_exponential_window_is_subtracted(tmp_path, seed):
     """Segments end before the response does: an exponential window adds twice the damping of mode 1."""
     request = FrequencyResponseRequest(segment_s=0.3)
     found = analyse(imported(tmp_path, *hammered(6, seed)), request).response

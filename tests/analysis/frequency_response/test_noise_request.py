@@ -50,7 +50,7 @@ def test_an_estimator_biased_by_noise_gives_a_remark(streamed_noise, tmp_path, e
 
 
 @pytest.mark.parametrize("window", list(Window))
-def test_the_resolution_requested_is_the_noise_bandwidth_of_a_line(streamed_file, window):
+def test_the_requested_resolution_is_the_noise_bandwidth_of_a_line(streamed_file, window):
     found = response(streamed_file(), resolution_hz=3.0, window=window).frequency_response
     assert found.resolution_hz == pytest.approx(3.0, rel=1e-3)
     assert found.settings.window == window.value
@@ -69,7 +69,7 @@ def test_the_requested_averages_are_reached_and_hardly_exceeded(streamed_file, a
     window=st.sampled_from(Window),
     overlap=st.floats(0, 0.8),
 )
-def test_the_longest_segment_leaves_the_averages_requested(samples, averages, window, overlap):
+def test_the_longest_segment_still_gives_the_requested_averages(samples, averages, window, overlap):
     segment = longest_segment(samples, averages, window, overlap)
     if segment < 32:
         return
@@ -137,14 +137,14 @@ def test_an_invalid_noise_request_names_the_allowed_values(asked, said):
         ({"segment_s": 1e308}, "inf s"),
     ],
 )
-def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(streamed_file, asked, length):
+def test_a_resolution_too_fine_for_the_record_is_refused(streamed_file, asked, length):
     with pytest.raises(
         NotEnoughData, match=f"20 s of noise were recorded, less than two segments of the {length}"
     ):
         response(streamed_file(), **asked)
 
 
-def test_a_view_converts_displacements_to_recorded_quantities(streamed_file):
+def test_a_displacement_ratio_converts_to_the_named_quantities(streamed_file):
     found = response(streamed_file()).frequency_response
     view = quantities_named("velocity/acceleration", MagnitudeScale.DECIBEL)
     shown = view.shown(found)

@@ -66,7 +66,7 @@ def poles():
 
 
 @pytest.mark.parametrize("estimator", ["frequency_response", "h1", "h2"])
-def test_the_bounds_of_weak_noise_hold_the_closed_form_at_95_of_100_lines(responses, estimator):
+def test_bounds_of_weak_noise_contain_the_exact_curve_at_95_percent_of_lines(responses, estimator):
     found = getattr(responses[WEAK_VPP], estimator)
     truth = exact(found.frequency_hz)
     size = np.abs(truth)
@@ -99,12 +99,12 @@ def test_strong_noise_shows_the_two_terminal_resonances(responses):
     assert np.median(responses[STRONG_VPP].frequency_response.coherence) < 0.9
 
 
-def test_the_level_is_the_planned_rms_value_through_the_rigs_model(responses):
+def test_the_base_level_of_noise_is_proportional_to_its_setting(responses):
     weak, strong = (responses[each].base_level.rms_acceleration for each in (WEAK_VPP, STRONG_VPP))
     assert strong / weak == pytest.approx(STRONG_VPP / WEAK_VPP, rel=0.05)
 
 
-def test_noise_that_does_not_repeat_has_no_periodic_part(responses):
+def test_streamed_noise_has_no_periodic_response(responses):
     assert all(each.periodic is None for each in responses.values())
 
 

@@ -47,7 +47,7 @@ def linear_realisation(rng, orders, period_samples, samples, delay_samples=0.0):
 
 @settings(max_examples=12, deadline=None)
 @given(offset_ppm=st.floats(-90, 90), period=st.floats(700, 1500), periods=st.integers(2, 6))
-def test_lines_are_exact_for_any_clock_ratio_and_period(offset_ppm, period, periods):
+def test_periodic_lines_are_exact_for_any_clock_ratio_and_period(offset_ppm, period, periods):
     true_period = period * (1 + offset_ppm * 1e-6)
     orders = np.arange(3, int(0.3 * period), 7)
     rng = np.random.default_rng(1)
@@ -62,7 +62,7 @@ def test_lines_are_exact_for_any_clock_ratio_and_period(offset_ppm, period, peri
     assert result.repetitions[0].period_samples == pytest.approx(true_period, rel=1e-10)
 
 
-def test_the_measured_period_scatters_as_stated():
+def test_the_measured_repetition_period_scatters_as_stated():
     from vibench.analysis.frequency_response.periodic import measured_repetition
 
     rng = np.random.default_rng(2)
@@ -128,7 +128,7 @@ def test_transmission_bounds_have_their_stated_coverage(count):
 
 
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
-def test_a_static_cube_is_approximated_by_the_closed_form(sigma):
+def test_the_linear_gain_of_a_cubic_nonlinearity_matches_the_closed_form(sigma):
     """u + 0.1 u^3 driven by noise of variance s^2 looks like the gain 1 + 0.3 s^2."""
     rng = np.random.default_rng(4)
     orders = np.arange(1, 201)
@@ -164,7 +164,7 @@ def test_bounds_of_one_realisation_are_marked_as_noise_only():
     assert result.distortion_variance is None
 
 
-def test_less_than_two_periods_or_a_silent_or_aperiodic_drive_is_refused():
+def test_a_drive_that_is_short_silent_or_aperiodic_is_refused():
     rng = np.random.default_rng(8)
     short = rng.standard_normal(700)
     with pytest.raises(NotEnoughData, match="at least 2"):

@@ -94,7 +94,7 @@ def test_the_three_modes_match_the_eigenvalues():
 
 
 @pytest.mark.thorough
-def test_the_stated_spreads_match_the_scatter():
+def test_the_stated_uncertainties_of_a_resonance_match_the_scatter():
     rng = np.random.default_rng(1)
     frequency_hz = np.arange(200, 330, 1.0)
     clean = single(frequency_hz, 266.0, 0.02)
@@ -115,7 +115,7 @@ def test_the_stated_spreads_match_the_scatter():
     assert np.mean([each.reduced_chi_square for each in found]) == pytest.approx(1, abs=0.1)
 
 
-def test_a_resonance_in_noise_is_found_with_a_resolution_verdict():
+def test_a_resonance_in_noise_is_found_and_checked_for_resolution():
     rate, natural = 5120.0, 2 * np.pi * 260
     section = signal.bilinear([natural**2], [1, 2 * 0.02 * natural, natural**2], fs=rate)
     x, extra = np.random.default_rng(2).standard_normal((2, 600_000))
@@ -152,7 +152,7 @@ def _z(found, natural_hz, damping):
 
 
 @pytest.mark.thorough
-def test_a_mode_narrower_than_a_line_is_not_reported_wider():
+def test_a_mode_narrower_than_a_line_keeps_its_damping_within_bounds():
     modes = [(95.0, 0.0012), (266.0, 0.0033)]
     errors = []
     for seed in range(2):
@@ -189,7 +189,7 @@ def test_close_modes_are_separated(apart_hz, shares):
 @pytest.mark.parametrize(
     ("shares", "seed", "draw"), [((1.0, -0.7), 77, 0), ((1.0, -0.7), 77, 3), ((1.0, 0.6, 1.0), 777, 2)]
 )
-def test_bounds_of_close_modes_include_a_hidden_mode(shares, seed, draw):
+def test_bounds_of_close_modes_hold(shares, seed, draw):
     coverage = runpy.run_path(str(Path(__file__).parents[3] / "benchmarks" / "resonance_coverage.py"))
     (number, scene) = next(
         (number, scene)
@@ -202,7 +202,7 @@ def test_bounds_of_close_modes_include_a_hidden_mode(shares, seed, draw):
 
 
 @pytest.mark.thorough
-def test_a_fit_that_does_not_describe_the_lines_gives_its_chi_square():
+def test_a_resonance_fit_that_misses_the_lines_reports_its_chi_square():
     lines = _streamed(np.random.default_rng(5), [(200.0, 0.01)], 0.01)
     # A seventh of the magnitude on alternate pairs of lines: no sum of three modes does that.
     pairs = 1 + 0.15 * (-1.0) ** (np.arange(lines.value.size) // 2)
@@ -211,7 +211,7 @@ def test_a_fit_that_does_not_describe_the_lines_gives_its_chi_square():
     assert f"reduced chi² = {each.reduced_chi_square:.3g}" in each.remark
 
 
-def test_noise_has_no_resonance():
+def test_noise_alone_gives_no_resonance():
     x, y = np.random.default_rng(3).standard_normal((2, 100_000))
     assert resonances(transmissibility(x, y, 5120.0, segment_samples=2048), low_hz=50, high_hz=2000) == ()
     flat = transmissibility(x, x + 0.5 * y, 5120.0, segment_samples=2048)
@@ -245,7 +245,7 @@ def test_frequency_and_damping_of_every_mode_are_within_bounds():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("accelerometer", [0.3, 0.003])
-def test_bounds_of_every_mode_hold_where_two_realisations_show_the_noise(accelerometer):
+def test_bounds_of_every_mode_hold_with_two_realisations_of_noise(accelerometer):
     """The base moves a third of what it does elsewhere where the first mode pulls at it, one line wide."""
     rate, points, realisations = 4096.0, 2048, 2
     driven = np.arange(25, 301)
@@ -325,7 +325,7 @@ def test_a_resonance_in_one_realisation_only_is_rejected():
     assert len(scattered_resonances([found], [[found], [found], []])) == 1
 
 
-def test_changes_of_the_fit_are_not_taken_for_scatter_of_realisations():
+def test_different_fit_bands_do_not_count_as_scatter_of_realisations():
     """Seven of twelve leave-outs fit all modes together, as the whole does, and five this one alone."""
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 183.2, 0.06)), low_hz=100, high_hz=300)
@@ -337,7 +337,7 @@ def test_changes_of_the_fit_are_not_taken_for_scatter_of_realisations():
     assert 1.0 < widened.sd_frequency_hz < 2.0
 
 
-def test_no_bias_of_frequency_or_damping_is_left_without_noise():
+def test_frequency_and_damping_of_modes_are_exact_without_noise():
     frequency_hz = np.arange(50.0, 601.0)
     found = resonances(curve(frequency_hz, specimen(frequency_hz)), low_hz=50, high_hz=600)
     natural_hz, damping = modes()

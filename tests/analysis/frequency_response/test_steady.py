@@ -20,7 +20,7 @@ def told(rng, sizes, freedom):
 
 @pytest.mark.parametrize("sizes", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.3, 0.2, 0.2), (0.0, 0.0, 1.0)])
 @pytest.mark.parametrize("freedom", [2, 8])
-def test_the_scatter_of_each_line_follows_from_its_noises(sizes, freedom):
+def test_the_estimated_scatter_of_each_line_matches_its_noise(sizes, freedom):
     rng, ratios = np.random.default_rng(3), []
     for _ in range(40):
         true, own = told(rng, 1e-6 * np.array(sizes), freedom)
@@ -33,7 +33,7 @@ def test_the_scatter_of_each_line_follows_from_its_noises(sizes, freedom):
     assert np.median(np.std(ratios, axis=0)) < 0.25
 
 
-def test_unknown_lines_do_not_affect_others():
+def test_lines_without_a_value_do_not_affect_other_lines():
     true, own = told(np.random.default_rng(4), np.array([1e-6, 0.0, 0.0]), 4)
     value = RESPONSE.copy()
     value[40], own[90] = np.nan, np.inf
@@ -42,7 +42,7 @@ def test_unknown_lines_do_not_affect_others():
     assert np.nanmax(found / true) < 2.0
 
 
-def test_zero_noise_gives_zero_scatter_and_many_averages_are_unchanged():
+def test_scatter_is_zero_without_noise_and_unchanged_with_many_averages():
     none = np.zeros(RESPONSE.size)
     np.testing.assert_array_equal(steady_relative_sd(none, RESPONSE, POWER, 2), none)
     own = np.random.default_rng(5).random(RESPONSE.size)
@@ -51,7 +51,7 @@ def test_zero_noise_gives_zero_scatter_and_many_averages_are_unchanged():
 
 @pytest.mark.parametrize("freedom", [1e-3, 0.06, 1.9])
 @pytest.mark.parametrize("lines", [2, 5, RESPONSE.size])
-def test_less_than_one_effective_average_has_a_scatter(freedom, lines):
+def test_less_than_one_effective_average_gives_a_finite_scatter(freedom, lines):
     _, own = told(np.random.default_rng(6), np.array([1e-6, 0.0, 0.0]), 2)
     found = steady_relative_sd(own[:lines], RESPONSE[:lines], POWER[:lines], freedom)
     assert np.all(np.isfinite(found) & (found > 0))

@@ -55,14 +55,14 @@ def peak_bytes(duration_s):
     return peak, channels
 
 
-def test_four_times_the_record_needs_no_more_memory():
+def test_a_four_times_longer_record_needs_no_more_memory():
     short, _ = peak_bytes(25.0)
     long, channels = peak_bytes(100.0)
     assert long < 1.1 * short
     assert channels.longest_read < channels.samples / 5
 
 
-def test_progress_reports_every_stage_and_position(streamed_file):
+def test_analysis_progress_reports_every_stage_and_position(streamed_file):
     heard = []
     with open_recording(streamed_file()) as recording:
         analyse(recording, observer=heard.append)

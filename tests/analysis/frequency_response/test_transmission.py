@@ -40,7 +40,7 @@ def test_h1_h2_and_coherence_agree_with_scipy_given_the_same_windows(window, ove
 
 @settings(max_examples=25, deadline=None)
 @given(cuts=st.lists(st.integers(1, 4999), max_size=6), overlap=st.sampled_from([0.0, 0.3, 0.5, 0.75]))
-def test_the_block_size_does_not_change_the_result(cuts, overlap):
+def test_the_block_size_does_not_change_the_transmission(cuts, overlap):
     rows = noise(3, 2, 5000)
     whole = transmissibility(rows[0], rows[1], RATE, segment_samples=128, overlap=overlap)
     sums = FrequencyResponseSums(RATE, segment_samples=128, overlap=overlap)
@@ -54,7 +54,7 @@ def test_the_block_size_does_not_change_the_result(cuts, overlap):
 @pytest.mark.parametrize(
     ("overlap", "n_eff", "spread"), [(0.0, 64, 0.0884), (0.5, 120.4, 0.0645), (0.75, 131.7, 0.0616)]
 )
-def test_the_stated_spread_is_the_scatter_of_repeated_estimates(overlap, n_eff, spread):
+def test_the_stated_uncertainty_is_the_scatter_of_repeated_estimates(overlap, n_eff, spread):
     """H = 1 and a signal-to-noise ratio of 1: coherence 1/2, relative spread 1/sqrt(2 n_eff)."""
     segment, repeats = 64, 600
     rng = np.random.default_rng(4)
@@ -75,7 +75,7 @@ def test_the_stated_spread_is_the_scatter_of_repeated_estimates(overlap, n_eff, 
     assert np.std(coherences, axis=0).mean() == pytest.approx(np.sqrt(1 / n_eff) * 0.5, rel=0.06)
 
 
-def test_independent_noises_pass_the_significance_level_one_time_in_twenty():
+def test_independent_noises_exceed_the_coherence_limit_in_5_percent():
     x, y = noise(5, 2, 32 * 20_002)
     segment = 64
     passed, lines, mean = 0, 0, 0.0
@@ -132,7 +132,7 @@ def test_a_known_delay_is_removed_from_the_phase():
     assert straight.settings.delay_s == 3 / RATE
 
 
-def test_gaps_reduce_segments_but_not_coherence():
+def test_gaps_reduce_the_number_of_segments_but_not_the_coherence():
     x = noise(14, 200_000)
     y = 2 * x
     valid = np.ones(x.size, dtype=bool)
