@@ -29,13 +29,13 @@ def alarms_after(levels, usual=USUAL):
     return next((number for number, each in enumerate(levels, 1) if watch.take(each)), None)
 
 
-def test_deviation_for_half_a_second_triggers_the_alarm():
+def test_a_deviation_of_half_a_second_triggers_the_change_alarm():
     assert alarms_after([OUT] * 20) == 5
     assert alarms_after([math.inf] * 20) == 5
     assert alarms_after(([OUT] * 4 + [WITHIN] * 25) * 10) is None
 
 
-def test_the_alarm_is_given_once():
+def test_the_change_alarm_is_given_once():
     watch = ChangeWatch(USUAL)
     assert sum(watch.take(OUT) for _ in range(100)) == 1
     assert watch.has_changed
@@ -53,7 +53,7 @@ def test_the_false_alarm_rate_is_within_its_bound():
     assert all(often)
 
 
-def test_an_unknown_level_is_learnt_from_two_seconds():
+def test_the_usual_residual_is_learnt_from_two_seconds():
     rng = np.random.default_rng(9)
     watch = ChangeWatch()
     levels = 0.9 + 0.02 * rng.standard_normal(20)

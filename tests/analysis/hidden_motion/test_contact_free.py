@@ -45,7 +45,7 @@ def test_the_impact_loss_is_reported_by_speed(loss_s_per_m):
     assert free_loss(impacts(0.5, loss_s_per_m=loss_s_per_m)) == pytest.approx(loss_s_per_m, abs=0.02)
 
 
-def test_few_impacts_determine_nothing():
+def test_few_impacts_determine_neither_gaps_nor_loss():
     few = impacts(0.5, count=6)
     assert free_gaps(few) == (None, None)
     assert free_loss(few) is None

@@ -77,7 +77,7 @@ def test_a_track_continues_through_vibrometer_drop_outs(world_recording, kind, l
     ("kind", "level_vpp", "largest_rms_m"),
     [(260.0, 1.5, 0.1e-6), ("sweep", 1.5, 0.1e-6), ("noise", 10.0, 0.2e-6)],
 )
-def test_tracked_p_and_its_impacts_match_the_world(world_recording, kind, level_vpp, largest_rms_m):
+def test_tracked_p_and_impacts_match_the_simulation(world_recording, kind, level_vpp, largest_rms_m):
     recorded = world_recording(kind, level_vpp, seed=41)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
@@ -138,7 +138,7 @@ def test_chattering_is_tracked_without_a_contact_model(
 
 
 @pytest.mark.thorough
-def test_motion_is_tracked_at_ten_times_the_noise(world_recording):
+def test_motion_is_tracked_at_ten_times_the_sensor_noise(world_recording):
     recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
@@ -209,7 +209,7 @@ def test_wrong_springs_and_dampers_are_corrected_from_the_motion(world_recording
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("loss_s_per_m", [0.05, 0.3])
-def test_contact_loss_is_not_attributed_to_a_damper(world_recording, loss_s_per_m):
+def test_contact_loss_is_identified_and_not_attributed_to_a_damper(world_recording, loss_s_per_m):
     """Described as Hertz's, its loss of 0.05 s/m was found as a c1 five times its bounds off."""
     hertz = gong2025()
     stops = HuntCrossley(hertz.contact.stops.contact_stiffness, loss_s_per_m)
@@ -225,7 +225,7 @@ def test_contact_loss_is_not_attributed_to_a_damper(world_recording, loss_s_per_
 
 
 @pytest.mark.thorough
-def test_a_motion_that_settles_half_way_is_identified(world_recording):
+def test_parameters_are_identified_from_a_motion_that_settles_half_way(world_recording):
     """Its later impacts are all alike, and a search that looked at its middle began 1.3 um off."""
     recorded = world_recording(257.0, 1.7, duration_s=2.2, seed=31)
     m0, m1, m2 = recorded.specimen.masses
@@ -267,7 +267,7 @@ def test_unconfirmed_parameters_have_no_bounds(world_recording):
 
 
 @pytest.mark.thorough
-def test_two_gaps_and_a_linear_law_are_tracked(world_recording):
+def test_unequal_gaps_and_a_linear_contact_law_are_identified(world_recording):
     specimen = replace(
         gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)
     )
@@ -281,7 +281,7 @@ def test_two_gaps_and_a_linear_law_are_tracked(world_recording):
 
 
 @pytest.mark.thorough
-def test_an_invalid_track_is_reported_and_not_shown(world_recording, described_otherwise):
+def test_an_invalid_track_is_left_out_with_a_reason(world_recording, described_otherwise):
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
     motion = told(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
@@ -332,7 +332,7 @@ def test_the_figures_hold_the_motion_and_its_impacts(world_recording):
 @pytest.mark.parametrize(
     ("further", "confirms"), [("m2_velocity", True), ("m1_velocity", True), ("m2_acceleration", None)]
 )
-def test_another_sensor_never_refutes_a_right_track(world_recording, further, confirms):
+def test_a_second_sensor_does_not_contradict_a_correct_track(world_recording, further, confirms):
     """Collisions on m2 were taken for drop-outs of its vibrometer, and bridging them took minutes."""
     motion = told(world_recording(260.0, 1.5, further=further), numbers=Numbers.AS_DESCRIBED)
     (check,) = motion.mass_checks
@@ -348,7 +348,7 @@ def test_another_sensor_never_refutes_a_right_track(world_recording, further, co
 
 
 @pytest.mark.parametrize(("scale", "late"), [(0.8, 0), (1.0, 40)])
-def test_another_sensor_refutes_a_wrong_amplitude_or_phase(world_recording, scale, late):
+def test_a_second_sensor_with_wrong_amplitude_or_phase_refutes_the_track(world_recording, scale, late):
     """Nothing then has bounds, since either the track or the sensor is wrong."""
     recorded = world_recording(260.0, 1.5, further="m2_velocity")
     with open_recording(recorded.path) as recording:

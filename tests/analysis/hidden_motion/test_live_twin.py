@@ -25,7 +25,7 @@ def dwell(live_world):
     return running, seen, said, running.p()
 
 
-def test_live_p_matches_the_simulated_world(dwell):
+def test_p_of_the_live_twin_matches_the_simulation(dwell):
     _, seen, said, truth = dwell
     assert said == []
     late = [(end, each) for end, each in seen if end > 0.6 * 51_200]
@@ -93,7 +93,7 @@ def test_a_gap_change_of_1_um_is_detected_within_a_second(live_world, dwell, kin
     assert np.sqrt(np.mean(error**2)) < 0.3e-6
 
 
-def test_data_before_a_gap_are_not_shown(live_world):
+def test_the_live_twin_restarts_after_lost_samples(live_world):
     running = live_world(260.0, 1.5, 2.0, seed=73)
     for _ in range(8):
         running.go_on(BLOCK)
@@ -144,7 +144,7 @@ def test_vibrometer_drop_outs_trigger_no_change_alarm(live_world, kind, level_vp
 
 @pytest.mark.slow
 @pytest.mark.timeout(1700)
-def test_hours_without_a_change_trigger_no_alarm(live_world):
+def test_hours_without_a_change_of_the_specimen_trigger_no_alarm(live_world):
     """LIVE_HOURS=H and LIVE_SEED=S in the environment ask for so much rig time, and for other rigs."""
     rng, out, blocks, seed = np.random.default_rng(SEED), 0, 0, SEED
     while blocks < 36_000 * HOURS:
