@@ -13,7 +13,7 @@ def block(peaks, samples=100):
     return values
 
 
-def test_levels_are_fractions_of_full_scale():
+def test_level_meters_show_fractions_of_full_scale():
     meters = LevelMeters(np.array([5.0, 10.0]), RATE)
     square = np.array([[2.5, -2.5] * 50, [1.0, -1.0] * 50], dtype=np.float32)
     first, second = meters.add(square)
@@ -22,7 +22,7 @@ def test_levels_are_fractions_of_full_scale():
     assert first.verdict is LevelVerdict.GOOD
 
 
-def test_a_peak_is_held_for_a_limited_time():
+def test_level_meters_hold_a_peak_for_a_limited_time():
     meters = LevelMeters(np.array([5.0]), RATE)
     meters.add(block([4.9]))
     for _ in range(int(HOLD_S * 10) - 1):

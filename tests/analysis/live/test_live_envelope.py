@@ -19,7 +19,7 @@ def test_an_impact_of_three_samples_is_visible_at_any_position(place):
     assert not high[0].any()
 
 
-def test_columns_are_the_extremes_of_exactly_their_samples():
+def test_each_envelope_column_shows_the_extremes_of_its_own_samples():
     samples = np.random.default_rng(3).standard_normal(10_007)
     low, high = envelope(samples, 333)
     edges = [*column_starts(10_007, 333), 10_007]
@@ -28,7 +28,7 @@ def test_columns_are_the_extremes_of_exactly_their_samples():
         assert high[column] == samples[begin:end].max()
 
 
-def test_lost_samples_only_empty_their_own_columns():
+def test_lost_samples_empty_only_their_own_columns():
     samples = np.arange(40.0)
     samples[5] = np.nan
     samples[10:20] = np.nan
@@ -48,10 +48,10 @@ def test_fewer_samples_than_columns_are_drawn_individually():
     assert np.array_equal(column_starts(3, 10), [0, 1, 2])
 
 
-def test_a_picture_without_columns_is_refused():
+def test_an_envelope_without_columns_is_refused():
     with pytest.raises(InvalidRequest, match="0 columns"):
         envelope(np.zeros(5), 0)
 
 
-def test_both_edges_make_one_line():
+def test_both_edges_of_an_envelope_form_one_zigzag_line():
     assert np.array_equal(zigzag(np.array([[0.0, 1.0]]), np.array([[2.0, 3.0]])), [[0, 2, 1, 3]])

@@ -25,7 +25,7 @@ def test_the_spectrum_matches_welch_for_any_block_size(block):
     assert np.allclose(found.amplitude_density**2, density, rtol=1e-4)
 
 
-def test_old_samples_are_forgotten():
+def test_a_live_spectrum_excludes_old_samples():
     samples = np.zeros((1, 60_000))
     samples[0, :30_000] = np.random.default_rng(2).standard_normal(30_000)
     assert fed(samples, 1000).spectrum().amplitude_density.max() == 0.0
@@ -72,7 +72,7 @@ def test_the_delay_of_the_response_channel_is_corrected():
     assert np.allclose(np.abs(straight.phase_rad), np.pi / 2, atol=0.05)
 
 
-def test_one_segment_has_no_transmission_and_none_no_spectrum():
+def test_one_segment_gives_a_spectrum_but_no_transmission():
     spectra = LiveSpectra(2, RATE, SETTINGS)
     assert spectra.spectrum() is None
     spectra.add(np.ones((2, 1000), dtype=np.float32))

@@ -29,7 +29,7 @@ def view():
     return found
 
 
-def test_lanes_show_the_newest_seconds_in_the_channels_units(view):
+def test_time_histories_show_the_newest_seconds_in_channel_units(view):
     time_histories = view.time_histories(1.0, 800)
     assert time_histories.low.shape == (4, 800)
     assert time_histories.time_s[0] == pytest.approx(1.0)
@@ -47,7 +47,7 @@ def test_responses_grow_as_the_run_continues(view):
     assert np.allclose(history.response_i, 3.0, rtol=5e-3)
 
 
-def test_a_portrait_keeps_its_section(view):
+def test_a_phase_portrait_has_a_poincare_section(view):
     assert view.portrait().drive_hz == pytest.approx(260.0, abs=0.01)
     assert np.allclose(view.section.displacement_m, 3 * A0, rtol=5e-3)
 
@@ -81,7 +81,7 @@ def test_another_sensor_on_m0_shows_the_same_responses(role, power):
     assert found.impacts == 0
 
 
-def test_meters_and_impacts_are_read(view):
+def test_the_live_view_gives_levels_and_impacts(view):
     assert view.levels[0].peak_share == pytest.approx(0.1, rel=0.01)
     assert view.impacts == 0
 
@@ -137,7 +137,7 @@ def test_ramp_and_ringing_before_a_sweep_give_no_points():
     assert everything.response_i.max() > 2.5
 
 
-def test_a_section_excludes_the_lead_in():
+def test_a_poincare_section_excludes_the_lead_in():
     settled = watched_sweep(LEAD_IN_S).section.displacement_m
     assert 0 < settled.size < watched_sweep(0.0).section.displacement_m.size
     assert np.ptp(settled) < 0.1 * A0

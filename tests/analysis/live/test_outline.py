@@ -43,7 +43,7 @@ def test_an_impact_of_three_samples_is_in_the_outline():
     assert abs(struck.mean() - 500) <= 3
 
 
-def test_every_channel_is_outlined_by_its_own_period():
+def test_the_outline_of_each_channel_uses_its_own_period():
     both = np.stack((sine(260.0, 2.0), sine(20.0, 2.0)))
     low, high = outline(both, COLUMNS)
     assert np.array_equal(high[1], envelope(both[1], COLUMNS)[1])
@@ -51,7 +51,7 @@ def test_every_channel_is_outlined_by_its_own_period():
     assert low.shape == high.shape == (2, COLUMNS)
 
 
-def test_lost_samples_and_silence_are_drawn_as_they_are():
+def test_lost_samples_stay_empty_and_silence_stays_zero_in_an_outline():
     lost = np.full(102_400, np.nan, dtype=np.float32)
     silent = np.zeros(102_400, dtype=np.float32)
     assert np.isnan(outline(lost, COLUMNS)[0]).all()

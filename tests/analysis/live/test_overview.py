@@ -30,7 +30,7 @@ def recording(tmp_path_factory):
 
 
 @pytest.mark.parametrize("columns", [10, 100, 1000, 1563, 5000])
-def test_an_impact_of_three_samples_is_in_every_overview(recording, columns):
+def test_an_impact_of_three_samples_is_visible_in_every_overview(recording, columns):
     picture = overview_of(recording).picture(CHANNELS, 0, SAMPLES, columns)
     assert picture.high[2].shape[0] <= columns
     assert np.nanmax(picture.high[2]) == pytest.approx(0.4, rel=1e-5)
@@ -42,7 +42,7 @@ def test_an_impact_of_three_samples_is_in_every_overview(recording, columns):
 @pytest.mark.parametrize(
     ("start", "stop"), [(0, 200_000), (37, 180_001), (149_000, 151_000), (150_000, 150_007)]
 )
-def test_a_picture_holds_the_extremes_of_its_stretch(recording, start, stop):
+def test_an_overview_picture_shows_the_extremes_of_its_range(recording, start, stop):
     overview = overview_of(recording)
     samples = recording.read("m0_velocity", start, stop)
     picture = overview.picture(("m0_velocity",), start, stop, 200)
@@ -65,7 +65,7 @@ def test_lost_samples_leave_a_gap_in_the_picture(recording):
     assert np.isfinite(picture.low).mean() > 0.97
 
 
-def test_a_file_without_an_overview_looks_the_same(recording, tmp_path):
+def test_a_file_without_an_overview_gives_the_same_picture(recording, tmp_path):
     import shutil
 
     import h5py
@@ -89,13 +89,13 @@ def test_a_file_without_an_overview_looks_the_same(recording, tmp_path):
 
 
 @pytest.mark.parametrize(("start", "stop", "columns"), [(5, 5, 10), (0, 100, 0), (SAMPLES, SAMPLES + 5, 10)])
-def test_an_empty_picture_is_refused(recording, start, stop, columns):
+def test_an_overview_picture_of_an_empty_range_is_refused(recording, start, stop, columns):
     with pytest.raises(InvalidRequest, match="were requested"):
         overview_of(recording).picture(CHANNELS, start, stop, columns)
 
 
 @pytest.mark.parametrize("frequency_hz", [4.0, 9.0, 11.5])
-def test_a_steady_sine_has_straight_edges_where_bins_are_shorter_than_its_period(tmp_path, frequency_hz):
+def test_a_steady_sine_has_straight_edges_with_bins_shorter_than_a_period(tmp_path, frequency_hz):
     time_s = np.arange(SAMPLES) / RATE
     motion = synthetic.Motion(np.zeros(SAMPLES), np.cos(time_s))
     plan = Dwell(amplitude_vpp=1.0, frequency_hz=50.0, settle_s=1.0, duration_s=20.0)

@@ -76,6 +76,6 @@ def test_a_range_shorter_than_a_window_is_refused_in_a_sentence(request_):
 
 
 @pytest.mark.parametrize("width_hz", [1.0, 5.0, 50.0])
-def test_lines_have_the_requested_width(request_, width_hz):
+def test_spectrogram_lines_have_the_requested_width(request_, width_hz):
     found = recording_spectrogram(replace(request_, resolution_hz=width_hz))
     assert found.resolution_hz == pytest.approx(width_hz, rel=0.3)

@@ -20,7 +20,7 @@ def test_the_newest_samples_are_contiguous_for_any_block_size(length):
         assert np.array_equal(window.values, expected)
 
 
-def test_a_ring_returns_only_received_samples():
+def test_a_ring_buffer_returns_only_received_samples():
     ring = Ring(1, 100)
     assert ring.newest(10).values.shape == (1, 0)
     ring.add(5, np.ones((1, 3), dtype=np.float32))
@@ -47,13 +47,13 @@ def test_lost_samples_are_nan_and_older_ones_remain():
     assert np.array_equal(values[:, 30:], numbered(30, 5))
 
 
-def test_since_returns_new_samples():
+def test_a_ring_buffer_returns_the_samples_since_a_position():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 45))
     assert np.array_equal(ring.since(40).values, numbered(40, 5))
     assert ring.since(45).values.shape == (2, 0)
 
 
-def test_an_empty_ring_is_refused():
+def test_a_ring_buffer_without_channels_or_samples_is_refused():
     with pytest.raises(InvalidRequest, match="0 channels"):
         Ring(0, 10)

@@ -39,13 +39,13 @@ def test_a_tone_between_lines_is_found(frequency_hz):
     assert tone.amplitude == pytest.approx(0.3, rel=1e-3)
 
 
-def test_noise_is_no_tone():
+def test_noise_is_not_reported_as_a_tone():
     assert drive_tone(np.random.default_rng(1).standard_normal(25_600), RATE) is None
     assert drive_tone(np.zeros(25_600), RATE) is None
 
 
 @pytest.mark.parametrize("frequency_hz", [40.0, 260.0])
-def test_responses_of_a_known_motion_are_found(frequency_hz):
+def test_a_live_point_has_the_responses_of_a_known_motion(frequency_hz):
     count = max(stretch_samples(frequency_hz, RATE), look_samples(RATE)) + 100
     point = sine_point(sine(frequency_hz, count), (0, 1, 2), RATE)
     phase = np.linspace(0, 2 * np.pi, 100_001)
@@ -60,7 +60,7 @@ def test_responses_of_a_known_motion_are_found(frequency_hz):
     assert point.lower == pytest.approx(A0 * omega * slope.min(), rel=2e-3)
 
 
-def test_a_point_of_a_sweep_has_the_frequency_of_its_time():
+def test_a_live_point_of_a_sweep_has_the_frequency_at_its_time():
     time_s = np.arange(int(2 * RATE)) / RATE
     phase = 2 * np.pi * (255.0 * time_s + 0.5 * 2.0 * time_s**2)
     window = RingWindow(0, motion(phase, 2 * np.pi * (255.0 + 2.0 * time_s)).astype(np.float32))
@@ -80,7 +80,7 @@ def held_displacement(start_hz, rate_hz_per_s, level=1.0):
     return RingWindow(0, (level * values).astype(np.float32))
 
 
-def test_no_point_is_made_while_the_drive_is_ramped_down():
+def test_no_live_point_is_drawn_while_the_drive_is_ramped_down():
     time_s = np.arange(int(2 * RATE)) / RATE
     ramp = np.cos(0.5 * np.pi * np.clip(time_s - 1.7, 0.0, 1.0)) ** 2
     assert sine_point(held_displacement(260.0, 0.0), (0, 1, 2), RATE) is not None
@@ -95,7 +95,7 @@ def test_a_sweep_of_constant_displacement_is_not_taken_for_a_ramp(start_hz, rate
     assert point.frequency_hz == pytest.approx(start_hz + rate_hz_per_s * point.time_s, rel=0.01)
 
 
-def test_lost_or_too_few_samples_give_no_point():
+def test_lost_or_too_few_samples_give_no_live_point():
     window = sine(260.0, 60_000)
     assert sine_point(RingWindow(0, window.values[:, :1000]), (0, 1, 2), RATE) is None
     window.values[1, -50] = np.nan
@@ -103,7 +103,7 @@ def test_lost_or_too_few_samples_give_no_point():
 
 
 @pytest.mark.parametrize("rate_hz_per_s", [0.0, 1.0, -3.0])
-def test_periods_begin_where_the_drive_is_largest_in_a_sweep_too(rate_hz_per_s):
+def test_drive_periods_begin_at_the_drive_maximum_even_in_a_sweep(rate_hz_per_s):
     time_s = np.arange(int(0.5 * RATE)) / RATE
     turns = 260.0 * time_s + 0.5 * rate_hz_per_s * time_s**2 + 0.31
     found = drive_turns(np.cos(2 * np.pi * turns), RATE, 260.0 + 0.25 * rate_hz_per_s)
@@ -127,7 +127,7 @@ def test_a_motion_of_the_drives_period_has_one_poincare_point():
     )
 
 
-def test_points_of_overlapping_portraits_are_kept_once_and_none_is_missed():
+def test_overlapping_portraits_give_each_poincare_point_once():
     section, kept = PoincareSection(), []
     count = portrait_samples(260.0, RATE)
     for first in range(0, 30_000, 2560):
@@ -140,7 +140,7 @@ def test_points_of_overlapping_portraits_are_kept_once_and_none_is_missed():
     assert section.displacement_m.size == pytest.approx(28_160 / RATE * 260 + 70 - 40, abs=2)
 
 
-def test_a_section_drops_its_oldest_points():
+def test_a_full_poincare_section_drops_its_oldest_points():
     section = PoincareSection(most=10)
     section.add(portrait(sine(260.0, portrait_samples(260.0, RATE) + 13_000), 0, 2, RATE))
     assert section.displacement_m.size == section.velocity_m_per_s.size == 10
