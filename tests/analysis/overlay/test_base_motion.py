@@ -24,7 +24,7 @@ def motion_of(path):
         return recorded_base_motion(recording, plan_of(recording))
 
 
-def test_the_displacement_matches_the_played_one_within_0_1_percent(dwell_file, dwell_motions):
+def test_base_displacement_matches_the_played_motion_within_0_1_percent(dwell_file, dwell_motions):
     found = motion_of(dwell_file("strong"))
     true = dwell_motions["strong"][0].displacement_m
     assert found.low_hz == 65.0
@@ -54,11 +54,11 @@ def test_a_signal_is_advanced_by_a_fraction_of_a_sample():
         (SteppedSine(amplitude_vpp=1, grid=FrequencyGrid(start_hz=80, stop_hz=90, step_hz=5)), 80),
     ],
 )
-def test_the_lowest_played_frequency_sets_the_band(plan, lowest_hz):
+def test_the_lowest_played_frequency_sets_the_lower_band_edge(plan, lowest_hz):
     assert lowest_frequency_hz(Measurement(name="m", excitation=plan)) == lowest_hz
 
 
-def test_a_run_in_pieces_equals_the_whole_run(dwell_motions):
+def test_a_simulation_in_pieces_equals_the_whole_simulation(dwell_motions):
     base = np.tile(dwell_motions["weak"][0].displacement_m[round(4 * RATE) :], 8)[: round(7 * RATE)]
     base = base * np.clip(np.arange(base.size) / RATE, 0, 1)
     velocity, impacts = shaken(gong2025(), base, RATE, Accuracy.STANDARD)

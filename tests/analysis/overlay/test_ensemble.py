@@ -27,7 +27,7 @@ def curve(rng, draws, points, shift=0.0, scatter=0.1):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 40), (8, 40)])
-def test_an_agreeing_twin_exceeds_its_limit_in_one_percent(draws, points):
+def test_an_agreeing_twin_exceeds_the_limit_in_1_percent_of_cases(draws, points):
     rng = np.random.default_rng(1)
     trials = 3000
     outside = sum(not curve(rng, draws, points).agrees for _ in range(trials))
@@ -36,7 +36,7 @@ def test_an_agreeing_twin_exceeds_its_limit_in_one_percent(draws, points):
 
 
 @pytest.mark.thorough
-def test_random_magnitudes_exceed_their_limit_in_one_percent():
+def test_random_magnitudes_exceed_the_limit_in_1_percent_of_cases():
     rng = np.random.default_rng(8)
     outside = 0
     for _ in range(2000):
@@ -57,7 +57,7 @@ def long_tails(rng, size):
 
 @pytest.mark.parametrize("drawn", [rare_dips, long_tails])
 @pytest.mark.parametrize(("draws", "points"), [(8, 200), (16, 1000)])
-def test_long_tails_exceed_their_limit_in_one_percent(drawn, draws, points):
+def test_long_tailed_values_exceed_the_limit_in_1_percent_of_cases(drawn, draws, points):
     """With the limit of normal values 14 to 100 % lay outside."""
     rng, outside = np.random.default_rng(6), 0
     for _ in range(100):
@@ -67,7 +67,7 @@ def test_long_tails_exceed_their_limit_in_one_percent(drawn, draws, points):
 
 
 @pytest.mark.parametrize("draws", [5, 8, 16, 48, 200])
-def test_limits_from_few_draws_are_exceeded_in_one_percent(draws):
+def test_limits_from_few_draws_are_exceeded_in_1_percent_of_cases(draws):
     """With the quantile of the fitted distribution 4.8, 3.1, 2.0, 1.3 and 1.1 % lay beyond."""
     largest = np.random.default_rng(10).gumbel(3.7, 0.3, (20000, draws + 1))
     beyond = np.mean([each[0] > largest_of_chance(each[1:]) for each in largest])
@@ -75,7 +75,7 @@ def test_limits_from_few_draws_are_exceeded_in_one_percent(draws):
     assert beyond == pytest.approx(0.01, abs=0.0025)
 
 
-def test_one_distant_line_lies_outside_any_draws():
+def test_one_distant_line_is_outside_the_limit_of_the_draws():
     rng = np.random.default_rng(7)
     values = rare_dips(rng, (17, 1000))
     values[0, 500] = 3.0
@@ -84,7 +84,7 @@ def test_one_distant_line_lies_outside_any_draws():
     assert found.limit < 8
 
 
-def test_each_draw_is_ranked_among_the_others():
+def test_the_z_of_each_draw_is_computed_from_the_other_draws():
     found = curve(np.random.default_rng(9), 9, 40)
     by_hand = [
         EnsembleCurve("q", found.frequency_hz, each, np.delete(found.draws, place, axis=0)).z
@@ -93,7 +93,7 @@ def test_each_draw_is_ranked_among_the_others():
     np.testing.assert_allclose(found._z_of_draws, by_hand, rtol=1e-9)
 
 
-def test_the_band_contains_further_draws_at_its_stated_rate():
+def test_the_95_percent_band_contains_95_percent_of_further_draws():
     rng = np.random.default_rng(2)
     held = np.mean([curve(rng, 16, 40).share_in_band for _ in range(400)])
     assert held == pytest.approx(0.95, abs=0.006)
@@ -105,7 +105,7 @@ def test_ranks_of_further_draws_are_uniform():
     assert chisquare(np.bincount(ranks, minlength=10)).pvalue > 0.001
 
 
-def test_a_displaced_measurement_lies_outside():
+def test_a_shifted_measurement_is_outside_the_limit():
     found = curve(np.random.default_rng(4), 16, 40, shift=1.0)
     assert not found.agrees
     assert found.largest_z > z_limit(40) > z_limit(1) == pytest.approx(2.576, abs=1e-3)
@@ -142,7 +142,7 @@ def test_the_interval_of_the_escape_rate_contains_the_true_rate():
     assert 0.94 <= covered / told <= 0.99
 
 
-def test_an_end_shared_by_all_runs_is_not_random():
+def test_no_escape_rate_is_given_for_an_end_common_to_all_runs():
     runs = [Ending("collisions", 0.0, 60.0 + 0.05 * k, ended=True) for k in range(17)]
     assert escape_rate(runs[:1], [(each,) for each in runs[1:]]) is None
     lasting = [Ending("collisions", 0.0, 90.0, ended=False)] * 17
@@ -168,7 +168,7 @@ def test_half_of_the_draws_suffice_for_a_clear_verdict(shift):
 @pytest.mark.parametrize(
     ("requested", "shift", "made"), [(16, 0.0, 8), (16, 2.0, 16), (24, 0.0, 24), (5, 0.0, 5)]
 )
-def test_draws_stop_at_clear_agreement_unless_more_than_usual_are_requested(requested, shift, made):
+def test_draws_stop_at_clear_agreement_unless_more_are_requested(requested, shift, made):
     def estimate(number):
         value = np.exp(0.1 * np.random.default_rng(number).standard_normal(3))
         return Draw(lambda: number, (Quantity("q", FREQUENCY_HZ[:3], value),), (), 100.0, 1.0)

@@ -40,7 +40,7 @@ def played_hz(excitation):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_the_base_is_held_only_if_planned(name):
+def test_the_base_motion_is_held_only_if_planned(name):
     assert (name in HELD_UM) == bool(list(SHIPPED[name].excitation.held_accelerations()))
 
 

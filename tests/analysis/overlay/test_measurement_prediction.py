@@ -16,13 +16,13 @@ QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.t
 RIG = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
 
 
-def test_bands_reach_half_way_to_the_next_point():
+def test_collision_bands_extend_half_way_to_the_next_point():
     frequency_hz = np.array([10.0, 20.0, 30.0, 40.0, 50.0])
     inside = np.array([True, False, True, True, False])
     assert bands_of(frequency_hz, inside) == ((10.0, 15.0), (25.0, 45.0))
 
 
-def test_without_points_inside_there_is_no_band():
+def test_no_colliding_points_give_no_collision_band():
     assert bands_of(np.array([10.0, 20.0]), np.array([False, False])) == ()
 
 

@@ -87,7 +87,7 @@ def test_another_specimen_can_be_overlaid(dwell_file):
     assert overlay.difference.decibel[0] > 1
 
 
-def test_a_prediction_below_the_gap_is_the_linear_one():
+def test_a_prediction_below_the_gap_equals_the_linear_response():
     found = predict(gong2025(), np.array([120.0, 200.0, 330.0]), 1e-7)
     assert not found.is_colliding.any()
     # What is left of the transient from rest.
@@ -95,12 +95,12 @@ def test_a_prediction_below_the_gap_is_the_linear_one():
     np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-4)
 
 
-def test_the_paper_names_three_amplitudes_and_no_other():
+def test_only_the_three_levels_of_the_paper_have_a_paper_amplitude():
     assert [paper_amplitude_m(each) for each in (0.05, 1.5, 10.0)] == [1e-6, 5e-6, 50e-6]
     assert paper_amplitude_m(2.0) is None
 
 
-def test_a_difference_is_in_decibels_and_in_standard_errors_of_both():
+def test_a_difference_is_given_in_decibels_and_in_standard_errors():
     ones = np.ones(2)
     found = logarithmic_difference(ones, (ones * 10, ones * 0.3), (ones, ones * 0.4))
     assert found.decibel == pytest.approx([20.0, 20.0])

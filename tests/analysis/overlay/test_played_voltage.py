@@ -21,7 +21,7 @@ def level(volts, low_hz=240.0, high_hz=290.0):
 
 
 @pytest.mark.parametrize(("played_rms", "own_rms"), [(5e-4, 4e-4), (2e-4, 4e-4), (5e-4, 1e-4)])
-def test_converter_noise_does_not_drive_the_twin(played_rms, own_rms):
+def test_converter_noise_is_removed_from_the_drive_of_the_twin(played_rms, own_rms):
     """With it, and once more for what is not known, a weak dwell lay 2 standard deviations off."""
     rng = np.random.default_rng(5)
     wanted, found, recorded = [], [], []
@@ -50,7 +50,7 @@ def test_draws_keep_the_recorded_drive_within_its_uncertainty():
 
 
 @pytest.mark.parametrize("samples", [7, 1000])
-def test_short_and_noise_free_voltages_are_unchanged(samples):
+def test_short_or_noise_free_voltages_drive_the_twin_unchanged(samples):
     volts = TONE_V[20_000 : 20_000 + samples]
     rng = np.random.default_rng(7)
     np.testing.assert_array_equal(PlayedVoltage(volts, 0.0).drawn(rng), volts)

@@ -14,14 +14,14 @@ def curve(response, amplitude_m=5e-6):
     return SimilarityCurve(FREQUENCY_HZ[: len(response)], np.asarray(response, dtype=float), amplitude_m)
 
 
-def test_a_curve_is_wholly_similar_to_itself_even_where_its_logarithm_is_zero():
+def test_a_curve_has_similarity_1_to_itself_even_at_zero_logarithm():
     itself = curve(np.geomspace(0.1, 10, 101)[:100])
     one = curve(np.ones(100))
     assert similarity(itself, itself).rate == 1
     assert similarity(one, one, LogarithmOf.NORMALISED).rate == 1
 
 
-def test_the_difference_matches_equation_six():
+def test_the_difference_of_curves_matches_equation_6_of_the_paper():
     # 5 um times 2 is 0.01 mm, log -2; times 0.2 is 0.001 mm, log -3: they differ by half.
     found = similarity(curve([2.0, 2.0]), curve([0.2, 2.0]), LogarithmOf.MILLIMETRES)
     assert found.difference == pytest.approx([0.5, 0.0])
@@ -53,14 +53,14 @@ def test_a_wider_threshold_never_finds_fewer_similar_points(first, second, seed)
     )
 
 
-def test_points_without_a_value_are_left_out_and_counted():
+def test_similarity_leaves_out_and_counts_points_without_a_value():
     found = similarity(curve([2.0, np.nan, 2.0, 2.0]), curve([2.0, 2.0, np.nan, 0.2]))
     assert (found.left_out, found.rate) == (2, 0.5)
     with pytest.raises(NotEnoughData, match="no frequency"):
         similarity(curve([np.nan]), curve([1.0]))
 
 
-def test_the_interval_covers_the_rate_of_the_process_that_made_the_points():
+def test_the_similarity_interval_covers_the_true_rate():
     # Independent points: the interval must cover the true rate in about 95 % of draws.
     covered = 0
     for seed in range(200):
@@ -72,7 +72,7 @@ def test_the_interval_covers_the_rate_of_the_process_that_made_the_points():
     assert 0.87 <= covered / 200 <= 0.99
 
 
-def test_clustered_points_widen_the_interval():
+def test_clustered_points_widen_the_similarity_interval():
     rng = np.random.default_rng(4)
     runs = np.repeat(rng.random(10) < 0.6, 10)
     mixed = rng.permutation(runs)

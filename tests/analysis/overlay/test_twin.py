@@ -64,7 +64,7 @@ def test_a_chaotic_dwell_is_consistent_with_its_draws(chaotic):
     assert all(each.compared == 1 and each.agrees for each in chaotic.overlay.ensemble)
 
 
-def test_a_dwell_under_the_base_motion_has_no_rank(recordings, chaotic):
+def test_a_simulation_under_the_recorded_base_is_not_compared_with_draws(recordings, chaotic):
     base = twin_of(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).overlay
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)
     assert all(not each.compared for each in base.ensemble)
@@ -72,19 +72,19 @@ def test_a_dwell_under_the_base_motion_has_no_rank(recordings, chaotic):
     assert base.response.response_ii < chaotic.overlay.quantity("Response II").lower[0]
 
 
-def test_another_gap_lies_outside_the_draws(recordings):
+def test_a_twin_with_a_wrong_gap_disagrees_with_the_measurement(recordings):
     found = twin_of(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6), draws=12).overlay
     assert not found.quantity("Response II").agrees
 
 
-def test_weak_noise_agrees_on_every_line(recordings):
+def test_the_twin_agrees_with_weak_noise_on_every_line(recordings):
     found = twin_of(recordings / "noise.h5").overlay
     assert found.run.draws == 8
     assert found.quantity("transmission").agrees
     assert found.difference.rms_db < 0.05
 
 
-def test_json_and_figures_hold_the_draws(chaotic):
+def test_json_and_figures_show_the_draws(chaotic):
     said = json.loads(json.dumps(result_summary(chaotic)))["simulated"]
     assert said["drive"] == "recorded amplifier voltage"
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]
@@ -124,7 +124,7 @@ def test_noise_of_an_unknown_shaker_uses_the_fitted_shaker(recordings):
     assert found.quantity("transmission").agrees
 
 
-def test_a_dwell_of_an_unknown_shaker_explains_its_base_drive(recordings):
+def test_a_dwell_of_an_unknown_shaker_is_simulated_under_its_base_motion(recordings):
     with open_recording(recordings / "dwell.h5") as recording:
         analysis = analyse(unsaid(recording))
         found = overlay(unsaid(recording), analysis)
