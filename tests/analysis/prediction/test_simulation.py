@@ -42,7 +42,7 @@ def test_one_model_named_twice_is_simulated_once():
     assert SimulationRequest(step_hz=50.0).points == 24
 
 
-def test_the_incremental_result_reaches_the_linear_transmission():
+def test_the_incremental_result_ends_at_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
     progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)
@@ -56,7 +56,7 @@ def test_the_incremental_result_reaches_the_linear_transmission():
     assert trace.name == "model linear, 5 µm, Response II, predicted"
 
 
-def test_the_result_belongs_to_the_named_specimen(tmp_path):
+def test_the_simulation_uses_the_specimen_given_by_name_or_file(tmp_path):
     """A shipped one by its name, one of one's own by its file."""
     file = tmp_path / "own.toml"
     file.write_text(
@@ -88,7 +88,7 @@ def point(model, frequency_hz, response, impacts=0):
     return SimulatedPoint(model, frequency_hz, response, response, impacts, "periodic", -3.5, 1e-6)
 
 
-def test_similarity_uses_the_frequencies_of_both_models():
+def test_similarity_uses_the_frequencies_common_to_both_models():
     progress = SimulationProgress(5e-6, 10, "n")
     progress.add((point("a", 100.0, 2.0), point("a", 200.0, 4.0), point("b", 200.0, 4.0)))
     assert progress.similarity().rate == 1.0
@@ -98,7 +98,7 @@ def test_similarity_uses_the_frequencies_of_both_models():
     assert progress.troubles == ("b at 300 Hz: no",)
 
 
-def test_bands_of_impacts_are_distinguished():
+def test_separate_bands_of_impacts_are_reported_separately():
     progress = SimulationProgress(5e-6, 10, "n")
     progress.add(tuple(point("a", float(f), 1.0, int(f in (30, 40, 60))) for f in range(10, 80, 10)))
     assert progress.collision_bands_hz("a") == ((30.0, 40.0), (60.0, 60.0))
@@ -109,7 +109,7 @@ def is_about(found, stated):
     return found == stated or stated / 5 < found < 5 * stated
 
 
-def test_costs_and_errors_are_about_those_of_the_page_on_accuracy():
+def test_stated_costs_and_errors_match_the_accuracy_page():
     page = (Path(__file__).parents[3] / "docs" / "accuracy.md").read_text()
     sections = {
         "free": "## No contact: hertz, 260 Hz, 1 µm",
@@ -127,7 +127,7 @@ def test_costs_and_errors_are_about_those_of_the_page_on_accuracy():
                 assert is_about(float(row[2]), level.response_i_error)
 
 
-def test_a_stricter_accuracy_is_said_to_cost_more():
+def test_a_higher_accuracy_is_stated_to_cost_more():
     levels = (Accuracy.QUICK, Accuracy.REFERENCE)
     quick, strict = (cost_sentences(SimulationRequest(accuracy=each), 2) for each in levels)
     for accuracy, said in zip(levels, (quick, strict), strict=True):
@@ -137,7 +137,7 @@ def test_a_stricter_accuracy_is_said_to_cost_more():
 
 
 @pytest.mark.thorough
-def test_a_short_request_replaces_a_dropped_long_one():
+def test_a_short_request_completes_after_a_long_request_is_dropped():
     """The real process; the answer to the short request comes whole."""
     first, second, pool = [], [], Pool(1)
     long = SimulationRequest(**{**LINEAR, "step_hz": 0.05})
@@ -154,7 +154,7 @@ def test_a_short_request_replaces_a_dropped_long_one():
     assert second[-1] is None
 
 
-def test_a_requested_error_replaces_accuracy_duration_and_budget():
+def test_a_requested_error_overrides_accuracy_and_duration():
     request = SimulationRequest(**LINEAR, error="1 %", time_s="2 s", accuracy="quick", duration_s=4.0)
     assert request.study.target is not None
     assert (request.study.error, request.study.time_s, request.study.accuracy) == (0.01, 2.0, "standard")
