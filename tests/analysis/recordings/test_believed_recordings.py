@@ -39,7 +39,7 @@ def packed_wave(path):
         file.attrs.modify("samples", np.int64(CHUNK * CHUNKS))
 
 
-def test_a_small_file_that_declares_huge_data_is_refused(dwell_file, tmp_path):
+def test_a_small_file_that_declares_a_huge_data_size_is_refused(dwell_file, tmp_path):
     path = tmp_path / "packed.h5"
     path.write_bytes(Path(dwell_file("weak")).read_bytes())
     packed_wave(path)

@@ -40,7 +40,7 @@ def darkened(velocity, at, samples, level):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_dropout_is_found_and_bridged(seed):
+def test_a_drop_out_is_found_and_bridged(seed):
     rng = np.random.default_rng((seed, 1))
     velocity = motion(seed)
     begins = np.arange(2_000, 48_000, 9_000) + rng.integers(0, 4_000, 6)
@@ -55,7 +55,7 @@ def test_a_dropout_is_found_and_bridged(seed):
 
 @pytest.mark.parametrize("noise", [3e-6, 2e-3, 1e-2])
 @pytest.mark.parametrize("level", ["zero", "last"])
-def test_a_dropout_that_holds_a_value_is_found_in_any_noise(noise, level):
+def test_drop_outs_at_a_constant_value_are_found_in_any_noise(noise, level):
     """Zeros in a sweep with noise were taken for motion: largest Response II 0.923 +- 0.012, not 0.968."""
     dark = motion(11, noise=noise)
     begins = np.arange(2_000, 48_000, 4_000)
@@ -67,7 +67,7 @@ def test_a_dropout_that_holds_a_value_is_found_in_any_noise(noise, level):
 
 @pytest.mark.parametrize("quantum", [1e-5, 3e-4, 3e-3, 1e-2])
 @pytest.mark.parametrize("noise", [0.0, 3e-6, 1e-3])
-def test_a_coarse_channel_and_its_impacts_have_no_dropouts(quantum, noise):
+def test_a_coarsely_quantised_channel_with_impacts_has_no_drop_outs(quantum, noise):
     velocity = motion(12, noise=noise)
     for at in range(1_000, 50_000, 2_500):
         velocity[at:] += 0.05 * (-1) ** (at // 2_500)
@@ -96,7 +96,7 @@ def test_drop_outs_with_too_little_motion_between_them_are_not_bridged():
     assert np.array_equal(bridged(dark, many), dark)
 
 
-def test_a_clipped_peak_is_no_dropout():
+def test_a_clipped_peak_is_not_a_drop_out():
     velocity = 1.2 * np.sin(2 * np.pi * 5 * np.arange(51_200) / RATE_HZ)
     velocity = np.clip(velocity, -1.0, 1.0) + 3e-6 * np.random.default_rng(0).standard_normal(51_200)
     assert found_dropouts(velocity, RATE_HZ) == ()
@@ -106,13 +106,13 @@ def test_a_clipped_peak_is_no_dropout():
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1, 1.0])
-def test_an_impact_changes_the_velocity_for_good_and_is_no_dropout(step):
+def test_a_lasting_velocity_step_of_an_impact_is_not_a_drop_out(step):
     velocity = motion(4)
     velocity[20_000:] += step
     assert found_dropouts(velocity, RATE_HZ) == ()
 
 
-def test_ringing_after_an_impact_is_no_dropout():
+def test_ringing_after_an_impact_is_not_a_drop_out():
     velocity = motion(5)
     after = np.arange(velocity.size - 20_000) / RATE_HZ
     velocity[20_000:] += 0.5 * np.exp(-after / 0.01) * np.sin(2 * np.pi * 4_000 * after)
@@ -124,7 +124,7 @@ def test_ringing_after_an_impact_is_no_dropout():
     [np.zeros(51_200), np.full(51_200, np.nan), motion(6)[:300], np.round(motion(7), 2)],
     ids=["silent", "lost", "short", "coarse"],
 )
-def test_undecidable_signals_report_no_drop_outs(velocity):
+def test_ambiguous_signals_give_no_drop_outs(velocity):
     assert found_dropouts(velocity, RATE_HZ) == ()
 
 
@@ -222,7 +222,7 @@ def test_drop_outs_within_milliseconds_are_all_found(rig, tmp_path, seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", [each for each in shipped_specimens() if each != "two_masses"])
-def test_no_collision_of_a_shipped_specimen_is_a_dropout(rig, tmp_path, name):
+def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(rig, tmp_path, name):
     """Stops on one side, rigid ones and a heavy m1 among them, at ten volts."""
     document = rig.model_dump(mode="json")
     document["specimen"] = {
@@ -242,7 +242,7 @@ def test_no_collision_of_a_shipped_specimen_is_a_dropout(rig, tmp_path, name):
 
 
 @pytest.mark.thorough
-def test_a_part_is_bridged_like_the_whole(rig, tmp_path):
+def test_a_part_of_a_recording_is_bridged_like_the_whole(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measured(rig, plan, tmp_path / "d.h5", 8.0)) as recording:
         whole = BridgedChannel(recording, ROLE).read(0, recording.samples)

@@ -37,7 +37,7 @@ def analysed(path):
 
 @pytest.mark.parametrize("rate_hz", [5120.0, 51200.0])
 @pytest.mark.parametrize("kernel", [integral_kernel, derivative_kernel])
-def test_a_kernel_is_exact_from_5_hz_to_four_tenths_of_the_rate(kernel, rate_hz):
+def test_integral_and_derivative_kernels_are_exact_from_5_hz_to_0_4_of_rate(kernel, rate_hz):
     weights = kernel(rate_hz)
     turn = 2 * np.pi * np.geomspace(5.0, 0.4 * rate_hz, 60)
     lags = np.arange(weights.size) - weights.size // 2
@@ -54,7 +54,7 @@ SENSORS = pytest.mark.parametrize(
 @pytest.mark.thorough
 @SENSORS
 @pytest.mark.parametrize("level", ["weak", "strong"])
-def test_a_dwell_has_the_same_responses(dwell_file, dwell_motions, tmp_path, level, response, made):
+def test_dwell_responses_are_equal_for_any_sensor(dwell_file, dwell_motions, tmp_path, level, response, made):
     motion, velocity, _ = dwell_motions[level]
     plan = dwell_plan({"weak": 0.5e-6, "strong": A0_STRONG}[level])
     path = synthetic.write_recording(
@@ -69,7 +69,7 @@ def test_a_dwell_has_the_same_responses(dwell_file, dwell_motions, tmp_path, lev
 
 @pytest.mark.thorough
 @SENSORS
-def test_noise_has_the_same_resonances(noise_file, noise_motion, tmp_path, response, made):
+def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp_path, response, made):
     base, velocity, parts = noise_motion
     plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
     path = synthetic.write_recording(tmp_path, plan, base, made(velocity), parts, response=response)
@@ -111,7 +111,7 @@ def test_a_clipped_acceleration_marks_all_affected_samples(dwell_motions, tmp_pa
     assert np.flatnonzero(marks)[[0, -1]].tolist() == [16_000 - RATE, 16_002 + RATE]
 
 
-def test_an_acceleration_of_half_a_second_is_refused(dwell_motions, tmp_path):
+def test_an_acceleration_record_of_0_5_s_is_refused(dwell_motions, tmp_path):
     motion, velocity, _ = dwell_motions["weak"]
     path = synthetic.write_recording(
         tmp_path,
