@@ -31,7 +31,7 @@ def benchmark():
     )
 
 
-def test_the_page_begins_with_its_answer(benchmark, page_of):
+def test_the_accuracy_page_begins_with_its_conclusion(benchmark, page_of):
     for page in (PAGE.read_text(encoding="utf-8"), page_of(benchmark)):
         assert page.index("`standard` is the default") < 100 < page.index("| level | promised |")
         assert page.index("## How it was measured") < page.index(
@@ -43,7 +43,7 @@ def headings(text):
     return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
 
 
-def test_the_page_holds_every_level_and_solver_of_every_motion(benchmark, page_of):
+def test_the_accuracy_page_lists_every_level_and_solver_of_every_motion(benchmark, page_of):
     page = page_of(benchmark)
     for each in benchmark.motions:
         assert each.motion.name in page
@@ -51,7 +51,7 @@ def test_the_page_holds_every_level_and_solver_of_every_motion(benchmark, page_o
     assert page.count("| **quick** |") == page.count("; Radau ") == 2
 
 
-def test_the_page_has_the_shares_of_scenes_sensitive_to_the_start(benchmark, page_of):
+def test_the_accuracy_page_lists_shares_of_start_dependent_motions(benchmark, page_of):
     page = page_of(benchmark)
     (lottery,) = benchmark.lotteries
     rows = [line for line in page.splitlines() if line.startswith(f"| {lottery.lottery.name}")]
@@ -61,7 +61,7 @@ def test_the_page_has_the_shares_of_scenes_sensitive_to_the_start(benchmark, pag
     assert "Sensitive dependence" not in without
 
 
-def test_the_page_reports_missed_accuracy(benchmark, page_of):
+def test_the_accuracy_page_reports_a_missed_accuracy(benchmark, page_of):
     assert benchmark.worst_error(Accuracy.QUICK) <= Accuracy.QUICK.promise
     assert "**no**" not in page_of(replace(benchmark, lotteries=()))
 
@@ -77,7 +77,7 @@ def test_transient_errors_are_within_their_stated_bounds(benchmark, page_of):
         assert f"{state}; {each.response_error:.1e} ({each.stated_error:.1e})" in page
 
 
-def test_the_page_names_motions_that_a_higher_level_does_not_improve(benchmark, page_of):
+def test_the_accuracy_page_names_motions_that_a_higher_level_does_not_improve(benchmark, page_of):
     motion = benchmark.motions[0]
     quick, standard, reference = motion.levels
     stuck = replace(motion, levels=(quick, replace(standard, state_error=quick.state_error), reference))

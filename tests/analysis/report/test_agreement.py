@@ -52,7 +52,7 @@ def test_agreement_names_the_compared_quantities(result, failure, agreement, rea
     assert bool(said) is bool(reason)
 
 
-def test_a_report_of_failures_alone_names_each_with_its_reason(tmp_path):
+def test_a_report_with_only_failures_names_each_with_its_reason(tmp_path):
     failed = tuple(AnalysisFailure(f"{each}.h5", FailedStep.ANALYSIS, f"{each} is cut") for each in "ab")
     page = Page(write_report(CampaignResults("x", (), failed), tmp_path / "x.html").read_text("utf-8"))
     assert page.findings == "Two recordings of two gave no result."

@@ -23,7 +23,7 @@ def card(name, text="words"):
 
 
 @pytest.mark.parametrize("number", [0, 1, MOST_OPEN_CARDS, MOST_OPEN_CARDS + 1, 60])
-def test_every_card_has_a_row_and_many_cards_are_folded(number, tmp_path):
+def test_every_result_card_has_a_table_row_and_many_cards_are_folded(number, tmp_path):
     page = Read(written(tmp_path, tuple(card(f"c{each}", "result " * 20) for each in range(number))))
     rows = page.visible.split("what to look at")[1].split("One by one")[0]
     assert rows.count("cannot tell") == number
@@ -40,7 +40,7 @@ def test_text_from_files_is_shown_as_text_in_every_place(tmp_path):
     assert Read(text).visible.count(HOSTILE) >= 9
 
 
-def test_light_dark_and_paper_have_their_own_rules_and_closed_folds_are_not_printed(tmp_path):
+def test_reports_have_dark_and_print_styles_and_closed_folds_are_not_printed(tmp_path):
     style = written(tmp_path, ())
     assert "@media (prefers-color-scheme: dark)" in style
     assert "@page { size: A4" in style

@@ -27,5 +27,5 @@ ODD = {
         ),
     ],
 )
-def test_the_last_check_of_the_bench_is_stated_in_a_line(check, said):
+def test_the_report_states_the_last_bench_check_in_one_line(check, said):
     assert bench_check_text(SimpleNamespace(bench_check=check, started_utc=STARTED)) == said

@@ -55,7 +55,7 @@ def test_a_report_needs_no_other_file_and_no_network(page):
     assert all(each.startswith("#") for each in page.links)
 
 
-def test_a_report_holds_the_results_numbers(page, campaign):
+def test_a_report_contains_the_numbers_of_its_results(page, campaign):
     for found in campaign.noise[0].analysis.response.resonances:
         assert plus_minus(found.frequency_hz, 2 * found.sd_frequency_hz) in page.text
     middle = campaign.noise[0].analysis.response.resonances[0].frequency_hz
@@ -70,7 +70,7 @@ def test_a_report_holds_the_results_numbers(page, campaign):
     assert "Uncertainty, and what it is made of" in page.text
 
 
-def test_the_first_screen_is_findings_figure_and_table_and_cards_follow(page, campaign):
+def test_a_report_begins_with_findings_figure_and_table_before_cards(page, campaign):
     order = ["findings", "figure-1", "cards", "card-1", "figure-2", "further", "details"]
     assert [each for each in page.ids if each in order] == order
     assert page.headings == ["recording", "result", "agreement", "what to look at"]
@@ -87,7 +87,7 @@ def test_a_report_is_short_with_all_folds_closed_and_its_captions_have_three_lin
     assert max(map(len, page.captions)) <= len("Figure 99. . ") + LONGEST_CAPTION
 
 
-def test_folds_hold_the_statistics_checks_and_settings(page, campaign):
+def test_folded_sections_contain_statistics_checks_and_settings(page, campaign):
     facts = (
         "Uncertainty, and what it is made of", "Resonances of the transmission", "Checks", "How it ended",
         "impacts per second", "median difference", "independent averages", "Estimator",
@@ -122,7 +122,7 @@ def test_every_figure_has_one_legend_without_repeated_entries(campaign):
         assert len(entries) == len(set(entries)), each.name
 
 
-def test_important_warnings_are_at_the_top_and_others_at_their_recording(dwell_file, tmp_path):
+def test_important_warnings_are_at_the_top_and_minor_ones_at_their_recording(dwell_file, tmp_path):
     analysis = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT).results[0].analysis
     assert {each.what for each in analysis.checks} >= CHANGE_A_CONCLUSION - {"Copies", "Drop-outs"}
     for what, is_first in (("Overloads", True), ("Calibration", False)):
@@ -134,13 +134,13 @@ def test_important_warnings_are_at_the_top_and_others_at_their_recording(dwell_f
         assert f"Figure 1; not simulated; {what.lower()}" in page.visible
 
 
-def test_a_report_states_how_it_was_measured_and_that_it_was_simulated(page):
+def test_a_report_states_instruments_settings_and_simulated_origin(page):
     for said in ("S-m0_velocity", "serial G-7", "amplifier gain", "6400 samples/s", "0123abc"):
         assert said in page.text
     assert "Some of these recordings come from simulated instruments" in page.text
 
 
-def test_a_recording_without_a_result_is_named_first_beside_the_others(page, campaign):
+def test_a_recording_without_a_result_is_named_first_in_the_report(page, campaign):
     assert [each.name for each in campaign.failures] == ["stopped.h5"]
     assert len(campaign.results) == 4
     assert page.visible.index("cable out") < page.visible.index("One recording of five gave no result.")
@@ -156,7 +156,7 @@ def test_figures_are_saved_beside_the_report_with_their_numbers(written):
     assert names == {".png", ".svg", ".csv"}
 
 
-def test_one_recording_makes_its_own_report(dwell_file, tmp_path):
+def test_a_report_of_one_recording_uses_the_singular(dwell_file, tmp_path):
     results = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT)
     path = write_report(results, tmp_path / "one.html")
     page = Page(path.read_text(encoding="utf-8"))
@@ -180,7 +180,7 @@ def test_recordings_in_a_folder_come_in_the_order_they_were_started(dwell_file, 
     assert failed[0].name == "broken.h5"
 
 
-def test_a_summary_is_json_and_states_the_results(campaign):
+def test_a_campaign_summary_is_json_and_states_the_results(campaign):
     document = json.loads(json.dumps(campaign_summary(campaign), allow_nan=False))
     assert document["failures"][0]["recording"] == "stopped.h5"
     kinds = [each["kind"] for each in document["results"]]
