@@ -34,7 +34,7 @@ def test_a_copy_is_counted_once_and_named(dwells):
     assert len(campaign_summary(found)["results"]) == 1
 
 
-def test_a_copy_with_results_or_links_is_a_copy_too(dwells, tmp_path):
+def test_a_copy_with_added_results_and_a_link_are_counted_as_copies(dwells, tmp_path):
     shutil.copy(dwells / "weak.h5", tmp_path / "a.h5")
     (tmp_path / "b.h5").symlink_to(tmp_path / "a.h5")
     shutil.copy(dwells / "weak.h5", tmp_path / "c.h5")
@@ -43,7 +43,7 @@ def test_a_copy_with_results_or_links_is_a_copy_too(dwells, tmp_path):
     assert len(analysed(tmp_path).results) == 1
 
 
-def test_a_recording_made_again_from_the_same_samples_is_counted_once(dwell_file, tmp_path):
+def test_two_recordings_of_the_same_samples_are_counted_once(dwell_file, tmp_path):
     for name in "ab":
         shutil.copy(dwell_file("weak"), tmp_path / f"{name}.h5")
     found = analysed(tmp_path)
@@ -51,7 +51,7 @@ def test_a_recording_made_again_from_the_same_samples_is_counted_once(dwell_file
     assert any("has the same samples as" in each for each in check_warnings(found))
 
 
-def test_another_recording_under_the_same_identity_is_named_as_doubtful(dwells, dwell_file, tmp_path):
+def test_a_different_recording_with_the_same_identity_gives_a_warning(dwells, dwell_file, tmp_path):
     shutil.copy(dwells / "weak.h5", tmp_path / "a.h5")
     shutil.copy(dwell_file("strong"), tmp_path / "b.h5")
     with h5py.File(tmp_path / "a.h5") as one, h5py.File(tmp_path / "b.h5", "r+") as other:

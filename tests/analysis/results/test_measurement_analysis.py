@@ -33,7 +33,7 @@ def verdict(analysis, what):
     return next(each.verdict for each in analysis.checks if each.what == what)
 
 
-def test_a_recording_is_named_by_path_or_text(dwell_file):
+def test_analyse_accepts_a_recording_as_path_or_text(dwell_file):
     path = dwell_file("weak")
     assert analyse(str(path)).response.response_ii == analyse(path).response.response_ii
 
@@ -59,7 +59,7 @@ def test_a_colliding_dwell_has_a_lower_response_ii_and_fills_the_terminal_bands(
         assert loud.decibel > quiet.decibel + 30
 
 
-def test_noise_gives_the_closed_form_on_every_line_by_all_three_estimators(noise_file):
+def test_all_three_estimators_give_the_closed_form_on_every_line_of_noise(noise_file):
     found = analysed(noise_file())
     assert isinstance(found, NoiseAnalysis)
     estimate = found.response
@@ -103,7 +103,7 @@ def test_a_stopped_dwell_is_analysed_with_a_warning(dwell_file):
     assert verdict(found, "Parts") is Verdict.WARNING
 
 
-def test_a_recording_without_its_dwell_is_reported_with_the_reason(dwell_file):
+def test_a_recording_that_ended_before_its_dwell_is_refused_with_the_reason(dwell_file):
     path = dwell_file("weak", state=RecordingState.FAILED, reason="cable out", samples=round(1 * RATE))
     with pytest.raises(NotEnoughData, match=r"weak\.h5 \(failed: cable out\).*before its dwell began"):
         analysed(path)
@@ -163,7 +163,7 @@ def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
 
 
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
-def test_an_unknown_generator_has_no_minimum_level(dwell_file, generator):
+def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, generator):
     facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
     (found,) = [each for each in measurement_checks(facts) if "level" in each.what]
     assert found.verdict is Verdict.PASSED
