@@ -15,7 +15,7 @@ def tones(positions):
     return np.cos(2 * np.pi * cycles * positions + np.array([[0.3], [1.0], [2.0]]))
 
 
-def test_channels_together_have_the_values_of_the_signals_they_sample():
+def test_jointly_interpolated_channels_match_the_sampled_signals():
     positions = RNG.uniform(REACH, SAMPLES - 1 - REACH, 4000)
     found = interpolate(tones(np.arange(SAMPLES)), positions)
     assert found == pytest.approx(tones(positions), abs=2e-9)

@@ -12,7 +12,7 @@ RATE = 5120.0
 
 
 @given(given_=st.sampled_from(list(Quantity)), wanted=st.sampled_from(list(Quantity)))
-def test_a_conversion_and_its_inverse_change_nothing(given_, wanted):
+def test_a_conversion_and_its_inverse_cancel(given_, wanted):
     frequency_hz = np.array([0.5, 95.0, 266.0, 4000.0])
     both = derivative_factor(frequency_hz, given_, wanted) * derivative_factor(frequency_hz, wanted, given_)
     np.testing.assert_allclose(both, 1, rtol=1e-14)
@@ -78,7 +78,7 @@ def test_amplitude_and_phase_follow_the_factor(frequency_hz, steps):
 
 
 @pytest.mark.parametrize("band", [(0.0, 100.0), (100.0, 50.0), (10.0, 3000.0)])
-def test_a_band_without_meaning_is_refused(band):
+def test_an_invalid_conversion_band_is_refused(band):
     with pytest.raises(InvalidRequest, match="2560 Hz"):
         converted_signal(
             np.zeros(100),
