@@ -53,7 +53,7 @@ def found(amplitude_m, start_hz, stop_hz, spoil=lambda velocity, rng: velocity, 
     ("amplitude_m", "start_hz", "stop_hz"),
     [(5e-6, 225.0, 385.0), (2e-6, 225.0, 385.0), (5e-6, 385.0, 225.0)],
 )
-def test_the_region_reaches_from_the_first_impact_to_the_last(amplitude_m, start_hz, stop_hz):
+def test_the_collision_region_extends_from_first_to_last_impact(amplitude_m, start_hz, stop_hz):
     result, impacts_hz = found(amplitude_m, start_hz, stop_hz)
     assert impacts_hz.size > 1000
     first, last = result.regions[0], result.regions[-1]
@@ -79,7 +79,7 @@ def test_continuous_collisions_give_a_region_over_the_whole_sweep():
     assert region.reaches_stop
 
 
-def test_ten_times_the_noise_does_not_move_the_edges():
+def test_ten_times_the_noise_does_not_move_the_collision_edges():
     def spoil(velocity, rng):
         return velocity + 10 * NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
 
@@ -106,7 +106,7 @@ def test_laser_drop_outs_do_not_change_the_region():
 @pytest.mark.parametrize(
     ("start_hz", "stop_hz", "duration_s"), [(150, 330, 10), (330, 150, 6), (150, 330, 3), (60, 150, 5)]
 )
-def test_ringing_after_steps_of_a_fast_sweep_is_no_collision(tmp_path, start_hz, stop_hz, duration_s):
+def test_ringing_after_steps_of_a_fast_sweep_is_not_a_collision(tmp_path, start_hz, stop_hz, duration_s):
     """m1 stays within half of its gap; "the masses collide from 257 to 304 Hz" was said."""
     plan = SineSweep(
         amplitude_vpp=0.1 if max(start_hz, stop_hz) > 200 else 0.01,
@@ -161,7 +161,7 @@ def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact
 
 
 @pytest.mark.parametrize("is_known", [True, False])
-def test_a_mode_ringing_at_twice_the_drive_is_no_collision(is_known):
+def test_a_mode_ringing_at_twice_the_drive_is_not_a_collision(is_known):
     """Collisions from 46 to 39 Hz were reported of a specimen without stops, whose mode at 82 Hz rang on."""
     specimen = gong2025(damping_time_s=3.5e-6)
     outcome = simulate_and_analyse(
@@ -194,7 +194,7 @@ def test_a_sweep_that_just_reaches_the_gap_is_not_called_free_of_collisions(seed
     assert found.colliding > 0 or found.not_determined_hz
 
 
-def test_ringing_above_the_drive_level_is_no_collision():
+def test_ringing_above_the_drive_level_is_not_a_collision():
     """Collisions from 97 to 118 Hz were reported of a specimen without stops, which rings."""
     specimen = gong2025(damping_time_s=4e-7)
     sweep = FastSweep(specimen, 88.0, 118.0, 8.0, 1e-6, 1)
@@ -202,7 +202,7 @@ def test_ringing_above_the_drive_level_is_no_collision():
 
 
 @pytest.mark.parametrize(("damping_time_s", "is_stated"), [(3e-6, True), (2e-7, False)])
-def test_steady_sines_are_compared_only_where_the_linear_run_matches(damping_time_s, is_stated):
+def test_steady_responses_are_stated_only_where_the_linear_run_matches(damping_time_s, is_stated):
     """32 % too much was stated where the specimen still rang of what was before the recording."""
     specimen = gong2025(damping_time_s=damping_time_s)
     outcome = simulate_and_analyse(FastSweep(specimen, 120.0, 45.0, 4.0, 1e-6, 1), "linear", specimen)

@@ -74,7 +74,7 @@ def test_a_drifting_sensor_does_not_change_the_responses(per_s):
     assert result.drive.amplitude_m == pytest.approx(5e-6, rel=1e-8)
 
 
-def test_other_orders_do_not_leak_into_response_ii():
+def test_no_order_leaks_into_response_ii():
     """The window is not a whole number of subharmonic periods; a one-term estimate would be off by 1e-4."""
     parts = {0.5: 3e-6, 1: 15e-6, 1.5: 2e-6j, 2: 1e-6, 3: -4e-6}
     drive, base, velocity = dwell(3, parts)
@@ -91,7 +91,7 @@ def test_other_orders_do_not_leak_into_response_ii():
     assert result.response_i == pytest.approx(np.max(np.abs(exact)) / 5e-6, rel=2e-6)
 
 
-def test_the_spectrum_and_its_peaks_are_displacements():
+def test_peaks_of_a_dwell_spectrum_are_displacement_amplitudes():
     drive, base, velocity = dwell(6, {1: 10e-6, 201.3 / DRIVE_HZ: 0.5e-6, 436.2 / DRIVE_HZ: 0.2e-6})
     result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=5, towards_hz=(201.0, 435.0))
     line = {each.label: each for each in result.lines}
@@ -141,7 +141,7 @@ def simulated(amplitude_m):
     return np.sin(omega * path.time_s), base, path.states[:, 0], path.states[:, 3], path.impacts.count
 
 
-def test_a_periodic_motion_is_one_point_and_a_half_order_two():
+def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_two():
     for parts, points in (({1: 10e-6j, 2: 3e-6}, 1), ({0.5: 4e-6, 1: 10e-6}, 2)):
         drive, _, velocity = dwell(4, parts)
         section = stroboscope(drive, velocity, RATE, near_hz=260, phase_rad=1.0)

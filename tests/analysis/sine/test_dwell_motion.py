@@ -21,7 +21,7 @@ def test_a_weak_dwell_is_periodic_with_the_drive_and_a_colliding_one_is_not(anal
     assert strong.evidence.spread > 50 * weak.evidence.spread
 
 
-def test_the_section_lies_on_the_orbit_once_a_drive_period(analyses):
+def test_poincare_points_lie_on_the_orbit_once_per_drive_period(analyses):
     section = analyses["weak"].motion.section
     assert np.diff(section.time_s) == pytest.approx(1 / 260.0, rel=1e-4)
     orbit = np.column_stack((section.orbit_displacement_m, section.orbit_velocity_m_per_s / 1634))
@@ -31,7 +31,7 @@ def test_the_section_lies_on_the_orbit_once_a_drive_period(analyses):
     assert max(nearest) < 0.06 * np.max(np.abs(section.orbit_displacement_m))
 
 
-def test_the_portraits_state_the_verdict_and_hold_the_points(analyses):
+def test_the_phase_portraits_state_the_verdict_and_tabulate_the_points(analyses):
     drawn = portraits_figure(list(analyses.values()))
     assert drawn.png.startswith(b"\x89PNG")
     for analysis, each in zip(analyses.values(), drawn.tables, strict=True):

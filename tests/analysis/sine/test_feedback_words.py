@@ -54,7 +54,7 @@ def test_only_bracketed_jumps_are_counted():
     assert list(feedback_sentences([JUMP])) == ["Jumps between 100.94 and 101.25 Hz (down)."]
 
 
-def test_steps_are_counted_by_their_outcome():
+def test_recorded_steps_are_counted_by_kind_of_motion():
     tripled = STEP.model_copy(update={"period": 3})
     chaotic = STEP.model_copy(update={"motion": Steadiness.APERIODIC, "period": 0, "level": Held.OUTSIDE})
     said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
@@ -64,7 +64,7 @@ def test_steps_are_counted_by_their_outcome():
     ]
 
 
-def test_recordings_without_feedback_have_no_feedback_statement():
+def test_recordings_without_feedback_give_no_feedback_sentence():
     assert list(feedback_sentences(())) == []
 
 

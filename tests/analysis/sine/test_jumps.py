@@ -44,7 +44,7 @@ def test_the_bounds_contain_the_jump_and_no_other_jump_is_found(decibel, noise):
         assert found[0].decibel == pytest.approx(decibel, abs=0.7)
 
 
-def test_a_steep_resonance_and_noise_are_no_jumps():
+def test_a_steep_resonance_and_noise_are_not_jumps():
     resonance = 1 / np.abs(1 - (FREQUENCY_HZ / 266) ** 2 + 0.02j * FREQUENCY_HZ / 266)
     noise = np.random.default_rng(1).standard_normal(TIME_S.size)
     assert jumps(TIME_S, FREQUENCY_HZ, resonance * np.exp(0.01 * noise)) == ()
@@ -54,7 +54,7 @@ def test_a_steep_resonance_and_noise_are_no_jumps():
 @pytest.mark.parametrize("step_hz", [0.2, 0.4, 0.6, 1.1, 3.0])
 @pytest.mark.parametrize("ratio", [0.003, 0.017, 0.06])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
-def test_a_resonance_with_few_intervals_is_no_jump(step_hz, ratio, noise):
+def test_a_resonance_with_few_intervals_is_not_a_jump(step_hz, ratio, noise):
     frequency_hz = np.arange(220.0, 310.0, step_hz)
     r = frequency_hz / 266
     resonance = np.abs((1 + 2j * ratio * r) / (1 - r**2 + 2j * ratio * r))
@@ -68,7 +68,7 @@ def test_a_resonance_with_few_intervals_is_no_jump(step_hz, ratio, noise):
 @pytest.mark.parametrize(
     ("start_hz", "stop_hz", "duration_s"), [(220, 310, 8), (50, 600, 20), (600, 50, 60), (80, 110, 20)]
 )
-def test_the_ringing_of_a_linear_specimen_is_no_jump(start_hz, stop_hz, duration_s, error, is_described):
+def test_the_ringing_of_a_linear_specimen_is_not_a_jump(start_hz, stop_hz, duration_s, error, is_described):
     """Its description has modes at other frequencies (1.02), or is missing."""
     specimen, rate, amplitude_m = gong2025(), 8192.0, 1e-8
     run = integrate(
@@ -128,7 +128,7 @@ def hardening():
 
 
 @pytest.mark.thorough
-def test_a_hardening_specimen_jumps_down_where_its_branch_folds_and_later_than_it_jumps_up(hardening):
+def test_a_hardening_specimen_jumps_up_and_down_at_the_folds_of_its_branch(hardening):
     specimen, amplitude_m, (up, down) = hardening
     parts, options = (structure_of(specimen), spring_of(specimen)), BalanceOptions(fewest=1, most=1)
     start = balance(*parts, BAND_HZ[0], amplitude_m, options)

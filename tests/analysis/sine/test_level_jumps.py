@@ -37,7 +37,7 @@ def analysis(tmp_path_factory):
         return analyse(recording)
 
 
-def test_the_specimen_jumps_up_at_a_higher_level_than_it_falls_back_at(analysis):
+def test_the_specimen_jumps_up_at_a_higher_level_than_down(analysis):
     rise, fall = level_jumps(analysis.response)
     assert (rise.direction, rise.before_vpp, rise.after_vpp) == ("up", 0.6, 0.7)
     assert rise.factor > 5

@@ -44,7 +44,7 @@ def told(result, name):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_slow_beat_is_not_periodic_and_its_bound_holds_for_another_record(dwell, seed):
+def test_a_slow_beat_is_not_periodic_and_its_bound_covers_later_records(dwell, seed):
     """30 % at 260.2 Hz was "periodic, Response I 6.373591 +- 0.000023"."""
     rng = np.random.default_rng(seed)
     beat_hz, share = (0.2, 0.3) if seed == 0 else (10 ** rng.uniform(-1.5, 0.5), rng.uniform(0.02, 0.5))
@@ -84,7 +84,7 @@ def test_mains_hum_is_named(dwell):
     assert "mains hum" in verdict.why
 
 
-def test_a_decaying_transient_has_no_long_period(dwell):
+def test_a_decaying_transient_is_not_given_a_long_period(dwell):
     """It was "every 11 periods"."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp((-0.2 + 2j * np.pi * 23.6) * time_s)).analysis.motion
     assert verdict.verdict.period in {None, 1}
@@ -139,7 +139,7 @@ def test_an_unsettled_step_is_reported_or_has_a_valid_bound(tmp_path, seed):
     assert (check.verdict is Verdict.WARNING) == is_changing
 
 
-def test_a_trend_is_a_slow_change_and_random_scatter_is_not():
+def test_a_trend_counts_as_slow_change_and_random_scatter_does_not():
     rng = np.random.default_rng(1)
     found = [
         slow_change(1 + 1e-3 * (rng.standard_normal(10) + 1j * rng.standard_normal(10))) for _ in range(400)
@@ -164,7 +164,7 @@ def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_maximum_caused_by_one_short_fault_has_no_bound(dwell):
+def test_a_maximum_caused_by_one_short_fault_is_given_no_bound(dwell):
     """17.9 +- 2.5 was reported where 3 ms without light were read as motion, and 11.8 is true."""
     result = dwell(lambda time_s: np.where(np.abs(time_s - 11.0) < 0.004, 1.5, 1.0))
     assert result.analysis.motion.verdict.kind is MotionKind.UNDECIDED

@@ -65,7 +65,7 @@ class Recorded:
 
 
 @pytest.mark.parametrize("lost", [(), (8000,), (57_500,), (8000, 57_500)], ids=str)
-def test_lost_samples_beside_a_sweep_do_not_affect_it(lost):
+def test_lost_samples_outside_a_sweep_do_not_affect_its_results(lost):
     time, phase = sweep(8.0, 140, 360)
     speed = np.gradient(phase, time)
     data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
@@ -93,7 +93,7 @@ def bridged_sweep(per_s, seed=1):
 
 
 @pytest.mark.parametrize("per_s", [0.5, 2, 5])
-def test_bridges_over_dropouts_are_no_maxima_of_a_sweep(per_s):
+def test_bridged_drop_outs_do_not_count_as_maxima_of_a_sweep(per_s):
     recorded, plan, fastest = bridged_sweep(per_s)
     found, _ = measured_sweep(recorded, plan)
     assert not found.is_clear.all()
@@ -106,7 +106,7 @@ def test_bridges_over_dropouts_are_no_maxima_of_a_sweep(per_s):
     assert collisions(found).regions == ()
 
 
-def test_a_sweep_with_dropouts_everywhere_is_refused():
+def test_a_sweep_with_drop_outs_everywhere_is_refused():
     recorded, plan, _ = bridged_sweep(60)
     with pytest.raises(UnusableData, match="refocus the laser"):
         measured_sweep(recorded, plan)
@@ -132,7 +132,7 @@ def test_the_first_and_last_intervals_use_samples_outside_the_sweep():
 
 @pytest.mark.parametrize("factor", [1, 2, 5, 6])
 @pytest.mark.parametrize("blocks", [[5000], [1, 2, 3000, 1997], [70, 60, 4870]])
-def test_decimation_keeps_time_and_amplitude_however_the_blocks_fall(factor, blocks):
+def test_decimation_keeps_time_and_amplitude_for_any_block_size(factor, blocks):
     time = np.arange(5000)
     x = np.cos(2 * np.pi * 0.3 / factor * time + 0.4)
     decimator = Decimator(1, factor)
@@ -144,7 +144,7 @@ def test_decimation_keeps_time_and_amplitude_however_the_blocks_fall(factor, blo
     np.testing.assert_allclose(y[inner], x[::factor][inner], atol=3e-5)
 
 
-def test_aliasing_components_are_removed():
+def test_decimation_removes_aliasing_components():
     decimator = Decimator(1, 4)
     x = np.cos(2 * np.pi * 0.18 * np.arange(20_000))[np.newaxis]
     y = np.concatenate((decimator.add(x), decimator.finish()), axis=1)[0]
@@ -166,7 +166,7 @@ def test_recorded_sweep_phase_is_unaffected_by_a_clock_difference():
     assert phase.frequency_hz[at] == pytest.approx(349 + 10e-6 * (150 + 2 * 199), abs=0.01)
 
 
-def test_all_orders_come_apart_although_no_interval_holds_whole_periods():
+def test_all_orders_are_separated_without_whole_periods_per_interval():
     _, phase = sweep(20)
     parts = {0.5: 0.2 - 0.1j, 1.0: 2.0 + 1j, 1.5: 0.05j, 2.0: -0.3 + 0j, 3.0: 0.1 + 0.2j}
     x = 0.7 + sum(np.real(a * np.exp(1j * k * phase)) for k, a in parts.items())
@@ -176,7 +176,7 @@ def test_all_orders_come_apart_although_no_interval_holds_whole_periods():
     assert np.max(tracked.residual_rms) < 1e-9
 
 
-def test_the_stated_spread_of_an_order_is_its_scatter():
+def test_the_stated_uncertainty_of_an_order_is_its_scatter():
     rng = np.random.default_rng(1)
     time, phase = sweep(60)
     x = np.cos(phase) + 0.3 * rng.standard_normal(time.size)
@@ -188,7 +188,7 @@ def test_the_stated_spread_of_an_order_is_its_scatter():
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_a_linear_motion_has_equal_responses_and_its_envelope(direction):
+def test_a_swept_linear_motion_has_equal_responses_and_its_exact_envelope(direction):
     """x = 3 exp(-0.5 i) U at every frequency, by its velocity and the base's acceleration."""
     ends = (150.0, 350.0) if direction == "up" else (350.0, 150.0)
     time, phase = sweep(20, *ends)
@@ -212,7 +212,7 @@ def test_a_linear_motion_has_equal_responses_and_its_envelope(direction):
     assert result.noise_rms == pytest.approx(np.median(result.velocity.residual_rms), rel=0.2)
 
 
-def test_the_vibrometers_delay_is_removed_from_the_phase():
+def test_the_vibrometer_delay_is_removed_from_the_phase():
     time, phase = sweep(20)
     late = sweep(20)[1]
     omega = np.gradient(phase) * RATE
@@ -238,7 +238,7 @@ def test_the_vibrometers_delay_is_removed_from_the_phase():
 @pytest.mark.parametrize(
     ("quality", "shift_hz", "amplitude"), [(10, 0.02, 1.001), (50, 0.12, 1.000), (250, 0.45, 0.943)]
 )
-def test_a_resonance_passed_at_one_hertz_a_second_shifts_as_theory_states(quality, shift_hz, amplitude):
+def test_a_resonance_swept_at_1_hz_per_s_shifts_as_theory_predicts(quality, shift_hz, amplitude):
     """A 260 Hz resonator, exact step response between samples; the ISO 7626 limit at Q 250 is 0.97 Hz/s."""
     _, phase = sweep(40, 240.0, 280.0)
     natural = 2 * np.pi * 260
@@ -258,7 +258,7 @@ def test_a_resonance_passed_at_one_hertz_a_second_shifts_as_theory_states(qualit
     assert size[top] / steady == pytest.approx(amplitude, abs=0.004)
 
 
-def test_a_sweep_in_blocks_equals_the_sweep_at_once():
+def test_a_sweep_analysed_in_blocks_equals_the_whole_sweep():
     time, phase = sweep(10)
     rows = np.stack((np.sin(phase), np.sin(phase), np.cos(phase)))
     whole = sweep_response(*rows, RATE, low_hz=150, high_hz=350)
@@ -270,7 +270,7 @@ def test_a_sweep_in_blocks_equals_the_sweep_at_once():
     np.testing.assert_array_equal(parts.upper, whole.upper)
 
 
-def test_a_meaningless_sweep_is_refused():
+def test_an_invalid_sweep_analysis_is_refused():
     with pytest.raises(InvalidRequest, match="ascending"):
         SweepSums(RATE, low_hz=350, high_hz=150)
     with pytest.raises(InvalidRequest, match="longer intervals or fewer orders"):

@@ -10,7 +10,7 @@ from vibench.analysis import analyse
 from vibench.analysis.sine.dwell_analysis import terminal_levels
 
 
-def test_a_line_in_the_band_reads_its_own_level_re_the_drives_line(dwell_file):
+def test_a_terminal_level_is_the_line_amplitude_relative_to_the_drive_line(dwell_file):
     with open_recording(dwell_file("weak")) as recording:
         response = analyse(recording).response
     motion = response.displacement

@@ -36,7 +36,7 @@ def lost(number, base):
     return note(number, base, None, frequency_u_hz=None, lock="outside the range")
 
 
-def test_levels_are_in_the_order_of_the_base_and_m0_moves_by_the_response_times_the_base():
+def test_tracked_resonances_are_sorted_by_base_level():
     found = tracked_resonances([note(0, 2.0, 99.0), note(1, 1.0, 100.0, mode_hz=100.5, mode_u_hz=0.1)])
     assert [each.number for each in found] == [1, 0]
     assert [each.frequency_hz for each in found] == [100.0, 99.0]
@@ -56,7 +56,7 @@ def test_a_level_with_a_lost_resonance_is_excluded_from_the_backbone():
     assert tracked_resonances([lost(0, 1.0)]) == ()
 
 
-def test_an_unmet_level_reports_its_periods_and_actual_level():
+def test_a_level_without_resonance_reports_periods_phase_and_frequency():
     missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met", periods=150)
     moved = missed.model_copy(update={"phase_deg": -86.4, "at_hz": 96.351, "motion": Steadiness.UNSETTLED})
     met = note(2, 0.4, 98.6, periods=120)
@@ -68,7 +68,7 @@ def test_an_unmet_level_reports_its_periods_and_actual_level():
     )
 
 
-def test_a_superharmonic_resonance_is_called_so_and_drawn_by_the_harmonic_that_resonates():
+def test_a_superharmonic_resonance_is_named_and_drawn_by_its_harmonic():
     met, unmet = note(0, 8.0, 31.7, harmonic=3, harmonic_m=8e-8), lost(1, 9.0)
     found, not_found = feedback_sentences([met, unmet.model_copy(update={"harmonic": 3})])
     assert found == "Superharmonic 3:1 phase resonance at 31.700 ± 0.060 Hz (8 m/s²)."
@@ -77,7 +77,7 @@ def test_a_superharmonic_resonance_is_called_so_and_drawn_by_the_harmonic_that_r
     assert (drawn.amplitude_m, drawn.is_fundamental) == (8e-8, False)
 
 
-def test_a_subharmonic_resonance_is_called_so_and_drawn_by_its_amplitude():
+def test_a_subharmonic_resonance_is_named_and_drawn_by_its_amplitude():
     met = note(0, 30.0, 192.4, subharmonic=2, harmonic_m=2e-6)
     (found,) = feedback_sentences([met])
     assert found == "Subharmonic 1:2 phase resonance at 192.400 ± 0.060 Hz (30 m/s²)."
@@ -97,11 +97,11 @@ def test_a_subharmonic_resonance_is_called_so_and_drawn_by_its_amplitude():
         (100.05, "neither softening nor hardening is seen."),
     ],
 )
-def test_a_mode_is_said_to_soften_or_harden_only_past_the_uncertainty(strong_hz, said):
+def test_softening_or_hardening_is_stated_only_beyond_the_uncertainty(strong_hz, said):
     sentence = backbone_sentence(tracked_resonances([note(0, 0.5, 100.0), note(1, 2.0, strong_hz)]))
     assert sentence.startswith("From 0.5 to 2 m/s² the phase resonance moves by ")
     assert sentence.endswith(said)
 
 
-def test_one_level_shows_no_backbone():
+def test_one_level_gives_no_backbone_sentence():
     assert backbone_sentence(tracked_resonances([note(0, 0.5, 100.0)])) == ""
