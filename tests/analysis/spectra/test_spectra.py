@@ -21,7 +21,7 @@ def test_the_density_agrees_with_scipy():
     np.testing.assert_allclose(ours.frequency_hz, frequency)
 
 
-def test_a_sine_on_a_line_holds_half_its_amplitude_squared():
+def test_a_sine_on_a_line_has_half_its_squared_amplitude_as_power():
     x = np.sin(2 * np.pi * 64 * np.arange(8192) / RATE)
     result = spectral_density(x, RATE, segment_samples=1024)
     line = np.argmax(result.density)
@@ -30,7 +30,7 @@ def test_a_sine_on_a_line_holds_half_its_amplitude_squared():
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
-def test_the_bounds_hold_the_density_as_often_as_they_state(overlap):
+def test_density_bounds_contain_the_true_density_in_95_percent(overlap):
     rng = np.random.default_rng(2)
     inside = trials = 0
     for _ in range(300):
@@ -43,7 +43,7 @@ def test_the_bounds_hold_the_density_as_often_as_they_state(overlap):
 
 
 @pytest.mark.parametrize("window", ["hann", "boxcar", "flattop", "blackmanharris"])
-def test_a_sine_of_amplitude_one_reads_one(window):
+def test_a_sine_of_amplitude_1_has_a_spectral_peak_of_1(window):
     x = 3.0 + np.sin(2 * np.pi * 100 * np.arange(int(4 * RATE)) / RATE)
     spectrum = amplitude_spectrum(x[-int(2 * RATE) :], RATE, window=window)
     assert spectrum.amplitude.max() == pytest.approx(1, rel=1e-9)
@@ -51,13 +51,13 @@ def test_a_sine_of_amplitude_one_reads_one(window):
     assert np.angle(spectrum.value[200]) == pytest.approx(-np.pi / 2, abs=1e-6)
 
 
-def test_a_flat_top_reads_a_sine_between_lines_within_a_hundredth_of_a_decibel():
+def test_a_flat_top_window_measures_a_sine_between_lines_within_0_01_db():
     x = np.sin(2 * np.pi * 100.5 * np.arange(2048) / RATE)
     level = amplitude_spectrum(x, RATE, window="flattop").amplitude.max()
     assert 20 * np.log10(level) == pytest.approx(0, abs=0.02)
 
 
-def test_velocity_over_i_omega_is_displacement():
+def test_a_velocity_spectrum_converts_to_displacement():
     x = 2 * np.pi * 100 * np.cos(2 * np.pi * 100 * np.arange(4096) / RATE)
     spectrum = amplitude_spectrum(x, RATE).converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
     assert spectrum.amplitude[200] == pytest.approx(1, rel=1e-9)
@@ -66,14 +66,14 @@ def test_velocity_over_i_omega_is_displacement():
 
 @settings(deadline=None)
 @given(frequency_hz=st.floats(60, 900), phase=st.floats(0, 6.28))
-def test_a_peak_between_lines_is_placed_and_sized(frequency_hz, phase):
+def test_a_peak_between_lines_has_the_right_frequency_and_amplitude(frequency_hz, phase):
     x = 0.7 * np.cos(2 * np.pi * frequency_hz * np.arange(4096) / RATE + phase)
     (peak,) = peaks(amplitude_spectrum(x, RATE), low_hz=50, high_hz=950, count=1)
     assert peak.frequency_hz == pytest.approx(frequency_hz, abs=2e-4)
     assert peak.amplitude == pytest.approx(0.7, rel=1e-3)
 
 
-def test_the_stated_spread_of_a_peak_is_its_scatter():
+def test_the_stated_uncertainty_of_a_peak_is_its_scatter():
     rng = np.random.default_rng(3)
     clean = np.cos(2 * np.pi * 300.3 * np.arange(2048) / RATE)
     found = []
@@ -84,7 +84,7 @@ def test_the_stated_spread_of_a_peak_is_its_scatter():
     assert np.mean([peak.sd_frequency_hz for peak in found]) == pytest.approx(scatter, rel=0.15)
 
 
-def test_noise_alone_has_no_peak_and_a_wrong_request_is_refused():
+def test_noise_alone_gives_no_peak_and_invalid_peak_requests_are_refused():
     spectrum = amplitude_spectrum(np.random.default_rng(4).standard_normal(4096), RATE)
     assert peaks(spectrum, low_hz=100, high_hz=900, count=5) == ()
     with pytest.raises(InvalidRequest, match="no line"):

@@ -31,7 +31,7 @@ def test_the_spectrogram_of_a_chirp_has_its_frequency_at_every_time():
     assert loudest == pytest.approx(100 + 40 * found.time_s, abs=6)
 
 
-def test_a_long_record_makes_no_larger_picture_and_blocks_do_not_matter():
+def test_the_spectrogram_size_is_bounded_and_independent_of_blocks():
     signal = np.random.default_rng(0).standard_normal(800_000)
     whole = picture(signal)
     assert whole.amplitude.shape[1] == MOST_COLUMNS
@@ -40,7 +40,7 @@ def test_a_long_record_makes_no_larger_picture_and_blocks_do_not_matter():
     np.testing.assert_allclose(parts.time_s, whole.time_s)
 
 
-def test_meaningless_requests_are_refused():
+def test_invalid_spectrogram_requests_are_refused():
     with pytest.raises(NotEnoughData, match="segment"):
         picture(np.zeros(100))
     with pytest.raises(InvalidRequest, match="half"):
