@@ -10,7 +10,7 @@ from scipy.special import erf
 from vibench.analysis.tones.sine_fit import noise_lift
 
 
-def test_noise_alone_reaches_four_and_a_half_standard_deviations_in_a_second():
+def test_the_maximum_of_one_second_of_noise_is_4_4_standard_deviations():
     exact, _ = quad(lambda z: 1 - erf(z / np.sqrt(2)) ** 51_200, 0, 8, limit=200)
     assert noise_lift(np.zeros(51_200), 1.0, 51_200).bias == pytest.approx(exact, abs=2e-3)
     assert exact == pytest.approx(4.4, abs=0.05)
@@ -26,7 +26,7 @@ def test_noise_raises_the_maximum_of_a_sine_as_in_repeated_draws(noise_sd):
     )
 
 
-def test_no_noise_no_bias_and_the_unit_does_not_matter():
+def test_zero_noise_gives_no_bias_and_bias_scales_with_the_unit():
     motion = np.random.default_rng(2).standard_normal(500)
     assert noise_lift(motion, 0.0, 500) == (0, 0)
     assert noise_lift(1e-6 * motion, 1e-7, 500).bias == pytest.approx(

@@ -12,7 +12,7 @@ RATE = 4096.0
 
 @settings(deadline=None)
 @given(frequency_hz=st.floats(100, 400), phase=st.floats(-3, 3), count=st.integers(2000, 6000))
-def test_a_sine_is_found_exactly(frequency_hz, phase, count):
+def test_a_noise_free_sine_is_fitted_exactly(frequency_hz, phase, count):
     x = 0.3 + 0.02 * np.cos(2 * np.pi * frequency_hz * np.arange(count) / RATE + phase)
     fit = fit_sine(x, RATE, near_hz=frequency_hz * 1.05)
     assert fit.frequency_hz == pytest.approx(frequency_hz, rel=1e-10)
@@ -20,7 +20,7 @@ def test_a_sine_is_found_exactly(frequency_hz, phase, count):
     assert np.angle(np.exp(1j * (fit.phase_rad - phase))) == pytest.approx(0, abs=1e-8)
 
 
-def test_the_stated_spreads_match_the_scatter():
+def test_the_stated_uncertainties_of_a_sine_fit_match_the_scatter():
     rng = np.random.default_rng(1)
     clean = np.cos(2 * np.pi * 260.3 * np.arange(4096) / RATE + 0.5)
     fits = [fit_sine(clean + 0.3 * rng.standard_normal(4096), RATE, near_hz=260) for _ in range(200)]
@@ -34,6 +34,6 @@ def test_the_stated_spreads_match_the_scatter():
         assert np.mean([getattr(fit, spread) for fit in fits]) == pytest.approx(scatter, rel=0.2)
 
 
-def test_noise_holds_no_sine():
+def test_noise_alone_gives_no_sine():
     with pytest.raises(UnusableData, match="near 260 Hz"):
         fit_sine(np.random.default_rng(2).standard_normal(4096), RATE, near_hz=260)
