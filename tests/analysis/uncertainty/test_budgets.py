@@ -83,7 +83,7 @@ def seen(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
 
 
 @pytest.mark.thorough
-def test_a_budget_matches_propagation_of_distributions(samples, weak):
+def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, weak):
     """JCGM 101:2008: all inputs drawn from their distributions, through the whole analysis."""
     rng = np.random.default_rng(12)
 
@@ -149,7 +149,7 @@ def test_calibration_source_and_date_reach_the_document(weak):
     assert parts["vibrometer calibration"] == pytest.approx(0.006 * document["value"])
 
 
-def test_a_motion_that_never_repeats_has_chance_in_response_i(dwell_file):
+def test_the_response_i_budget_of_an_aperiodic_motion_includes_chance(dwell_file):
     results = analyse_files([dwell_file("strong")], "strong", Simulation.LEFT_OUT)
     (strong,) = results.results
     _, first, second = budgets_of(strong)
@@ -161,7 +161,7 @@ def test_a_motion_that_never_repeats_has_chance_in_response_i(dwell_file):
     assert [each["quantity"] for each in said] == ["base amplitude A0", "Response I", "Response II"]
 
 
-def test_noise_has_a_budget_for_each_resonance_without_a_calibration_in_its_damping(noise_file):
+def test_each_resonance_has_a_budget_with_no_calibration_in_its_damping(noise_file):
     (noise,) = analyse_files([noise_file()], "noise", Simulation.LEFT_OUT).results
     budgets = budgets_of(noise)
     assert len(budgets) == 3 * len(noise.analysis.response.resonances) > 0
@@ -171,7 +171,7 @@ def test_noise_has_a_budget_for_each_resonance_without_a_calibration_in_its_damp
         assert Cause.VIBROMETER in height.not_stated
 
 
-def test_a_statement_needs_its_source():
+def test_a_stated_uncertainty_requires_a_source():
     with pytest.raises(ValueError, match="source"):
         StatedUncertainty(relative=0.01, source="")
     with pytest.raises(ValueError, match="less than 1"):
@@ -180,7 +180,7 @@ def test_a_statement_needs_its_source():
 
 
 @pytest.mark.parametrize("bounded", [False, True])
-def test_the_scatter_of_a_maximum_is_distinguished_from_one_window(bounded):
+def test_the_scatter_of_a_maximum_is_estimated_from_one_window(bounded):
     """Against many windows: of unbounded motion, and of one whose largest value has a bound."""
     rng = np.random.default_rng(5)
     values = rng.beta(2, 3, (400, 2000)) if bounded else rng.exponential(size=(400, 2000))
@@ -260,7 +260,7 @@ def test_a_colliding_sweep_reports_the_scatter_of_its_draws(sweep_file):
         assert Cause.CHANCE in budget.not_stated
 
 
-def test_steps_without_collisions_scatter_by_noise_alone(stepped_file):
+def test_the_uncertainty_of_steps_without_collisions_is_noise_only(stepped_file):
     (steps,) = analyse_files([stepped_file], "steps", Simulation.LEFT_OUT).results
     first, second = budgets_of(steps)
     assert [each.quantity.partition(",")[0] for each in (first, second)] == [

@@ -42,14 +42,14 @@ def test_the_uncertainty_of_noise_matches_its_prediction(tmp_path):
 
 
 @pytest.mark.parametrize("damping_time_s", [1.2e-5, 2.05e-5, 2.9e-5])
-def test_lines_without_noise_in_them_are_fitted(damping_time_s):
+def test_a_prediction_without_noise_on_its_lines_can_be_fitted(damping_time_s):
     """A mode tried in vain got a factor of exactly zero, and the fit raised LinAlgError."""
     specimen = RIG.specimen.model_copy(update={"damping_time_s": damping_time_s})
     rig = RIG.model_copy(update={"specimen": specimen})
     assert len(expected_uncertainty(Measurement(name="weak", excitation=NOISE), rig)) == 9
 
 
-def test_four_times_the_time_halves_the_scatter_and_no_calibration():
+def test_four_times_the_time_halves_the_scatter_but_not_calibration_errors():
     rig = RIG.model_copy(
         update={
             "vibrometer": RIG.vibrometer.model_validate(
@@ -88,7 +88,7 @@ def dwell(at_hz, level_vpp):
     return Measurement(name="dwell", excitation=excitation)
 
 
-def test_a_chaotic_dwell_is_reported_to_be_chance_and_a_quiet_one_noise():
+def test_chance_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_one():
     first, second = expected_uncertainty(dwell(260, 1.5), RIG)
     assert first.cause is second.cause is Cause.CHANCE
     assert first.after(5.0) == first.after(500.0) > 0.01
@@ -96,7 +96,7 @@ def test_a_chaotic_dwell_is_reported_to_be_chance_and_a_quiet_one_noise():
     assert {each.cause for each in expected_uncertainty(dwell(260, 0.05), RIG)} == {Cause.NOISE}
 
 
-def test_response_i_of_a_quiet_dwell_is_not_promised_from_the_sensors_noise_alone():
+def test_response_i_of_a_weak_dwell_has_no_expected_uncertainty():
     """A recording of it has 0.7 % where the sensors' noise, averaged over the window, makes 0.002 %."""
     first, second = expected_uncertainty(dwell(260, 0.05), RIG)
     assert first.after(5.0) is None
@@ -112,7 +112,7 @@ def test_a_rig_without_noise_figures_is_reported():
     assert expected_uncertainty(Measurement(name="up", excitation=sweep), RIG) == ()
 
 
-def test_a_dwell_with_hours_per_period_has_no_expected_uncertainty():
+def test_a_dwell_with_a_period_of_hours_has_no_expected_uncertainty():
     slow = Dwell(amplitude_vpp=1.5, frequency_hz=1e-4, settle_s=0.1, duration_s=1)
     assert expected_uncertainty(Measurement(name="slow", excitation=slow), RIG) == ()
 
@@ -142,7 +142,7 @@ def test_the_uncertainty_of_a_colliding_dwell_matches_its_prediction(tmp_path, a
         assert 0.3 < said[name] / told[name] < 4.0, name
 
 
-def test_a_dwell_with_a_held_base_is_predicted_like_one_with_the_same_setting():
+def test_a_held_dwell_has_the_uncertainty_of_an_open_loop_dwell():
     """The same base by a setting and by feedback: the same promise."""
     by_setting = expected_uncertainty(dwell(260, 0.05), RIG)
     base_m = base_motion(dwell(260, 0.05).excitation, RIG, np.array([260.0])).amplitude_m
@@ -165,7 +165,7 @@ def test_a_start_dependent_motion_has_no_expected_uncertainty():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", shipped_specimens())
-def test_a_dwell_of_every_shipped_specimen_is_reported_or_not_promised(name):
+def test_expected_uncertainty_handles_every_shipped_specimen(name):
     """Stops on one side, rigid ones and none at all included."""
     document = RIG.model_dump(mode="json")
     limit_m = document["specimen"]["amplitude_limit_m"]

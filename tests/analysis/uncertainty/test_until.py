@@ -56,7 +56,7 @@ def test_unpredictable_results_have_no_expected_uncertainty():
 
 
 @pytest.mark.thorough
-def test_time_is_distributed_by_need():
+def test_campaign_time_is_distributed_in_proportion_to_need():
     first = plan(NOISE, Until(resonance_hz=noise_wish(50.0)), "first")
     second = plan(NOISE, Until(resonance_hz=noise_wish(100.0)), "second")
     campaign = Campaign(name="c", measurements=(first, second, plan(QUIET, None, "fixed")))
@@ -83,14 +83,14 @@ def test_an_impossible_distribution_of_time_is_refused_in_one_sentence(until, ti
         within(Campaign(name="c", measurements=(plan(NOISE, until), plan(QUIET, None, "q"))), RIG, time_s)
 
 
-def test_noise_and_chance_are_widened_and_calibrations_are_not():
+def test_stopping_early_widens_noise_and_chance_but_not_calibrations():
     parts = [Contribution(cause, 0.01, "x") for cause in (Cause.NOISE, Cause.CHANCE, Cause.VIBROMETER)]
     budget = Budget("Response I", 2.0, "", (*parts, Contribution(Cause.NOISE, None, "y"))).widened()
     assert [each.relative for each in budget.contributions] == [0.01 * WIDENING, 0.01 * WIDENING, 0.01, None]
 
 
 @pytest.mark.slow
-def test_the_rule_holds_on_gaussian_records():
+def test_the_widened_bounds_of_early_stopping_hold_on_gaussian_records():
     command = [sys.executable, str(ROOT / "benchmarks" / "until_coverage.py"), "--rule"]
     lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     held = {line.split(":")[0]: float(line.split()[2]) for line in lines}
