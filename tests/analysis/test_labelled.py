@@ -52,7 +52,7 @@ def response():
     return transmissibility(base, 2.0 * base, 1024.0, segment_samples=1024)
 
 
-def test_a_response_lies_over_its_frequencies_with_its_bounds(response):
+def test_a_labelled_response_has_frequencies_units_and_bounds(response):
     data = response.to_xarray()
     assert dict(data.sizes) == {"frequency_hz": response.frequency_hz.size}
     assert data["frequency_hz"].attrs["units"] == "Hz"
@@ -63,7 +63,7 @@ def test_a_response_lies_over_its_frequencies_with_its_bounds(response):
     assert data.attrs["settings_estimator"] == response.settings.estimator.value
 
 
-def test_a_dataset_survives_a_file(response, tmp_path):
+def test_a_dataset_round_trips_through_netcdf(response, tmp_path):
     pytest.importorskip("h5netcdf", reason="pip install vibench[exchange] brings h5netcdf")
     data = response.to_xarray().drop_vars("value")  # netCDF has no complex numbers
     data.to_netcdf(tmp_path / "response.nc", engine="h5netcdf")
@@ -88,7 +88,7 @@ class Whole(Labelled):
     nothing: None = None
 
 
-def test_parts_keep_their_names_axes_and_units():
+def test_nested_parts_keep_names_axes_and_units_in_a_dataset():
     part = Part(np.arange(2.0), np.ones(2))
     data = Whole(np.arange(3.0), np.zeros((3, 6)), part, (part, part), "word", 45e-6).to_xarray()
     assert data["states"].dims == ("frequency_hz", "states_2")
@@ -112,7 +112,7 @@ class Modes(Labelled):
     modes: tuple[Mode, ...]
 
 
-def test_parts_of_single_numbers_are_a_table():
+def test_parts_with_scalar_values_become_columns_of_a_dataset():
     first, second = Mode(95.0, "first", 0.5, (1.0, 2.0)), Mode(266.0, "second", None, (3.0, 4.0))
     data = Modes((first, second)).to_xarray()
     np.testing.assert_array_equal(data["modes_frequency_hz"], [95.0, 266.0])
@@ -125,7 +125,7 @@ def test_parts_of_single_numbers_are_a_table():
 
 
 @pytest.mark.parametrize("name", ["numpy.ndarray[tuple[typing.Any, ...]]", "NDArray[numpy.float64]"])
-def test_arrays_are_known_by_the_names_of_old_and_new_numpy(name):
+def test_arrays_are_recognised_by_type_names_of_old_and_new_numpy(name):
     assert holds_array(name)
     assert not holds_array(float)
 
@@ -134,7 +134,7 @@ def test_arrays_are_known_by_the_names_of_old_and_new_numpy(name):
     ("name", "unit"),
     [("x_m_per_s", "m s-1"), ("rate_per_s", "s-1"), ("time_s", "s"), ("n_eff", ""), ("relative_i", "")],
 )
-def test_a_unit_is_the_longest_end_of_a_name(name, unit):
+def test_a_unit_is_read_from_the_longest_suffix_of_a_name(name, unit):
     assert unit_of(name) == unit
 
 
@@ -334,7 +334,7 @@ def test_reported_values_of_a_recording_have_units(request, kind, units):
     assert "" not in [each.attrs.get("units") for each in data.variables.values()]
 
 
-def test_rows_of_several_units_have_them_beside_their_values():
+def test_rows_with_different_units_get_a_column_of_units():
     f0 = FittedValue(Parameter.F0, 95.0, 94.0, 96.0, 0.5, 95.5)
     m0 = dataclasses.replace(f0, parameter=Parameter.M0)
 
@@ -349,7 +349,7 @@ def test_rows_of_several_units_have_them_beside_their_values():
     assert Budget("level", 1.0, "µm", ()).to_xarray()["value"].attrs["units"] == "µm"
 
 
-def test_every_result_with_arrays_has_the_method():
+def test_every_result_with_arrays_can_be_converted_to_a_dataset():
     found = {*results(), *wholes()}
     assert len(found) > 25
     assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []
@@ -375,7 +375,7 @@ def measured(mean_m=2.0):
     return Measured(Spread(np.float64(mean_m), np.nan), np.array([95.0, 266.0]), None, pathlib.Path("here"))
 
 
-def test_a_document_has_all_keys_of_its_class_in_order_with_null_for_unknown():
+def test_a_json_document_has_all_fields_in_order_and_null_for_unknown():
     document = measured().to_dict()
     assert list(document) == ["mean_m", "sd_m", "lowest_hz", "missing_m", "folder"]
     assert json.dumps(document, allow_nan=False) == (
@@ -383,7 +383,7 @@ def test_a_document_has_all_keys_of_its_class_in_order_with_null_for_unknown():
     )
 
 
-def test_rows_of_several_parts_are_concatenated():
+def test_rows_of_several_results_are_concatenated():
     found = rows([measured(), measured(3.0)], "frequency_hz mean_m=part.mean_m size_m=absent.size_m")
     np.testing.assert_array_equal(found["frequency_hz"], [95.0, 266.0, 95.0, 266.0])
     np.testing.assert_array_equal(found["mean_m"], [2.0, 3.0])

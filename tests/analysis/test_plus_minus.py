@@ -28,7 +28,7 @@ from vibench.analysis.tables import plus_minus
         (0.4473, np.inf, "0.4473"),
     ],
 )
-def test_a_value_ends_where_its_uncertainty_does(value, half_width, text):
+def test_a_value_is_rounded_to_the_digits_of_its_uncertainty(value, half_width, text):
     assert plus_minus(value, half_width) == text
 
 
