@@ -154,7 +154,7 @@ def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, chan
     assert said in sentence(changed(good, tmp_path, change))
 
 
-def test_silent_channels_are_named(noise, tmp_path):
+def test_dead_clipped_and_lost_channels_are_named_in_a_sentence(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
     assert "m0_velocity holds the same value throughout" in sentence(dead)

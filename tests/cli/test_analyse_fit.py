@@ -48,7 +48,7 @@ def test_json_contains_fit_intervals_and_undetermined_parameters(vibench_here, f
 
 
 @pytest.mark.thorough
-def test_the_fit_is_printed_in_words(vibench_here, folder, tmp_path):
+def test_a_fit_is_printed_in_words_and_saved_as_a_specimen_file(vibench_here, folder, tmp_path):
     result = vibench_here(
         "analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder
     )

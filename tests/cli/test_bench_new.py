@@ -85,7 +85,7 @@ def test_a_missing_wire_ends_the_procedure(tmp_path, wired):
     assert "Nothing has played" in str(done.exception)
 
 
-def test_a_file_beside_the_target_is_kept(tmp_path):
+def test_a_draft_file_beside_the_new_configuration_is_kept(tmp_path):
     (tmp_path / "lab.toml.draft").write_text("mine")
     configure(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
     assert (tmp_path / "lab.toml.draft").read_text() == "mine"
@@ -114,14 +114,14 @@ def test_a_plain_number_replaces_a_sensitivity_with_unit(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["B\udce9nch", "a\x7fb", "two\nlines"])
-def test_undecodable_input_is_asked_again(tmp_path, name):
+def test_a_question_is_repeated_after_input_that_cannot_be_decoded(tmp_path, name):
     rig, wrong = asked_of_a_person(tmp_path, {"name": [name, "Bénch"]})
     assert rig.name == "Bénch"
     assert "cannot be shown" in wrong[0]
 
 
 @pytest.mark.parametrize("content", [None, b"\xff\xfe", b"operator = ", b"nonsense.key = 3"])
-def test_unreadable_or_unknown_answers_give_one_sentence(tmp_path, content):
+def test_an_answers_file_that_cannot_be_used_gives_a_one_sentence_error(tmp_path, content):
     if content is not None:
         (tmp_path / "answers.toml").write_bytes(content)
     done = new(tmp_path, answers=None)
@@ -163,7 +163,7 @@ def test_ctrl_c_at_a_knob_stops_before_output(monkeypatch):
         confirm_at_terminal(())
 
 
-def test_a_number_too_large_to_compute_with_is_asked_again(tmp_path):
+def test_a_question_is_repeated_after_a_number_too_large_to_use(tmp_path):
     rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": ["1e300", "3"]})
     assert rig.amplifier.gain_db == 3.0
     assert "amplifier.gain_db" in wrong[0]
@@ -197,7 +197,7 @@ def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
     assert "two per cent" not in page
 
 
-def test_the_only_instrument_found_is_proposed_with_driver_and_product(tmp_path):
+def test_a_single_found_instrument_is_the_default_answer(tmp_path):
     only = seen("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
@@ -237,7 +237,7 @@ def asked_of_a_person(tmp_path, given):
     return rig, wrong
 
 
-def test_a_wrong_answer_is_asked_again_at_once(tmp_path):
+def test_a_question_is_repeated_immediately_after_a_wrong_answer(tmp_path):
     rig, wrong = asked_of_a_person(
         tmp_path, {"amplifier.gain_db": ["ten", "700", "12"], "generator.settle_s": ["-1", "0.2"]}
     )
@@ -248,7 +248,7 @@ def test_a_wrong_answer_is_asked_again_at_once(tmp_path):
     assert load_rig(tmp_path / "lab.toml") == rig
 
 
-def test_only_contradictory_answers_are_asked_again(tmp_path):
+def test_only_questions_with_contradictory_answers_are_repeated(tmp_path):
     place = "daq.channels.{}.physical".format
     rig, wrong = asked_of_a_person(
         tmp_path,
@@ -273,7 +273,7 @@ def test_a_broken_third_party_package_does_not_end_the_procedure(tmp_path, monke
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda each: each.key)
 @pytest.mark.parametrize("template", [LAB, VIRTUAL], ids=["lab", "virtual"])
-def test_every_question_has_a_key_in_the_templates(template, question):
+def test_every_question_sets_one_key_of_the_template(template, question):
     text = template.read_text()
     held = value_in(text, question.key)
     answer = {"{": "1.25", '"': "word"}.get(held[:1], "2026-03-04" if held.count("-") == 2 else "0.125")

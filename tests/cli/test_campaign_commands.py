@@ -43,7 +43,7 @@ def test_a_campaign_is_catalogued_and_its_end_notified(vibench, tmp_path):
 
 
 @pytest.mark.thorough
-def test_only_settings_confirmed_at_a_check_apply_to_a_campaign(answered, vibench_here, tmp_path):
+def test_a_campaign_accepts_only_a_knob_sheet_with_its_own_settings(answered, vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
     answered("bench", "check", "--bench", bench, "--knobs", knobs)
@@ -59,7 +59,7 @@ def test_only_settings_confirmed_at_a_check_apply_to_a_campaign(answered, vibenc
 
 
 @pytest.mark.thorough
-def test_a_file_that_is_no_sheet_is_not_replaced_by_one(vibench_here, tmp_path):
+def test_a_knob_sheet_does_not_overwrite_another_kind_of_file(vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     before = plan.read_text()
     refused = vibench_here("bench", "check", "--bench", bench, "--knobs", plan, cwd=tmp_path)

@@ -74,7 +74,7 @@ def test_chain_lengths_and_alternating_cells_can_be_studied():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("frequency", ["220", "200:300"])
-def test_a_lost_run_reports_only_its_ending(frequency, tmp_path):
+def test_a_diverged_chain_run_reports_only_how_it_ended(frequency, tmp_path):
     drive = ("--amplitude", 1e100, "--frequency", frequency)
     options = ("--cells", 2, *drive, "--duration", 0.2, "--settle", 0.1)
     found = answer(*options, "--out", tmp_path / "out")
@@ -85,7 +85,7 @@ def test_a_lost_run_reports_only_its_ending(frequency, tmp_path):
     assert "1 did not reach their end" in run(*options).output
 
 
-def test_a_run_too_short_for_an_error_reports_it_as_unknown():
+def test_a_chain_run_too_short_for_an_error_reports_error_not_known():
     found = run("--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
     assert "error not known" in found.output
     assert not re.search(r"\binf\b", found.output)

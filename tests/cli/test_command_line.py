@@ -50,7 +50,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
 
 
 @pytest.mark.thorough
-def test_campaign_file_and_page_are_reported_as_json(vibench_here, tmp_path):
+def test_measure_export_and_pack_report_their_files_as_json(vibench_here, tmp_path):
     measured = vibench_here("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
     (row,) = json.loads(measured.stdout)["recordings"]
     assert (row["name"], row["outcome"]) == ("dwell", "recorded")
@@ -99,7 +99,7 @@ def test_a_stopped_campaign_still_reports_failed_points(tmp_path):
         ("[[measurements]]", "[[measurements]", "not valid TOML"),
     ],
 )
-def test_a_wrong_campaign_is_refused_in_one_sentence_without_output(refusal, tmp_path, old, new, said):
+def test_a_wrong_campaign_is_refused_in_one_sentence_before_output(refusal, tmp_path, old, new, said):
     assert said in refusal("measure", campaign(tmp_path, QUICK.replace(old, new)), "--out", "recordings")
     assert not list(tmp_path.glob("recordings/*"))
 
@@ -120,7 +120,7 @@ def test_the_instruments_of_the_virtual_rig_are_listed_by_name(answered):
 
 
 @pytest.mark.thorough
-def test_a_recording_that_was_cut_off_is_recovered(vibench, tmp_path):
+def test_a_recording_of_a_killed_program_is_recovered(vibench, tmp_path):
     plan = campaign(tmp_path, QUICK.replace("duration_s = 1.5", "duration_s = 3000"))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     arguments = [sys.executable, "-m", "vibench.cli", "measure", str(plan), "--out", "recordings"]
@@ -254,7 +254,7 @@ def test_a_page_path_that_is_a_folder_is_refused_before_computation(refusal, tmp
         (("--notify", "mail 'me"), "close every quotation mark"),
     ],
 )
-def test_senseless_options_are_refused_before_output(refusal, tmp_path, words, said):
+def test_invalid_notify_options_are_refused_before_output(refusal, tmp_path, words, said):
     assert said in refusal("measure", campaign(tmp_path), "--out", "recordings", *words)
     assert not (tmp_path / "recordings").exists()
 
@@ -276,7 +276,7 @@ def test_names_that_look_like_markup_are_printed_unchanged(vibench_here, tmp_pat
         ("chain", "--cells", "2", "--frequency", "100"),
     ],
 )
-def test_every_command_questions_micrometres_typed_as_metres(vibench_here, tmp_path, words):
+def test_every_command_warns_if_micrometres_were_typed_as_metres(vibench_here, tmp_path, words):
     """What would compute for minutes is refused here, after the doubt, by where its answer was to go."""
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     given = ("--amplitude", "5", "--gap", "45", "--out", "file")
@@ -287,7 +287,7 @@ def test_every_command_questions_micrometres_typed_as_metres(vibench_here, tmp_p
     assert "if 5 micrometres were meant, give 5e-06" in said
 
 
-def test_a_map_questions_micrometres_typed_as_metres(vibench_here, tmp_path):
+def test_a_map_warns_if_micrometres_were_typed_as_metres(vibench_here, tmp_path):
     (tmp_path / "map.toml").write_text("gap_m = 45\namplitude_m = { start = 1, stop = 50, points = 5 }\n")
     said = vibench_here("map", "map.toml", "--out", "map", "--estimate", cwd=tmp_path).stderr
     assert "warning: a gap of 45 m" in said

@@ -49,7 +49,7 @@ def resonances_hz(result):
     return [found["frequency_hz"] for found in result["measured"]["resonances"]]
 
 
-def test_every_measurement_is_a_complete_recording_without_overload(demo, results):
+def test_every_demo_measurement_is_complete_without_overload(demo, results):
     assert set(results) == set(NAMES)
     for name in NAMES:
         with open_recording(demo / "recordings" / f"{name}.h5") as recording:
@@ -58,15 +58,15 @@ def test_every_measurement_is_a_complete_recording_without_overload(demo, result
             assert not recording.gaps
 
 
-def test_weak_noise_shows_the_three_linear_resonances_within_one_percent(results):
+def test_weak_noise_shows_the_three_linear_resonances_within_1_percent(results):
     assert resonances_hz(results["noise_weak"]) == pytest.approx(LINEAR_HZ, rel=0.01)
 
 
-def test_strong_noise_shows_exactly_the_two_terminal_resonances_within_two_percent(results):
+def test_strong_noise_shows_only_two_terminal_resonances_within_2_percent(results):
     assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
 
 
-def test_another_program_reads_the_response_the_coherence_and_the_densities(demo, vibench_here, tmp_path):
+def test_pyuff_reads_response_coherence_and_densities_of_the_demo(demo, vibench_here, tmp_path):
     pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
     path = demo / "recordings" / "noise_weak.h5"
     asked = ("--to", "uff", "--spectra", "--quantity", "velocity/acceleration", "--out", "frf.uff")
@@ -118,7 +118,7 @@ def test_the_linear_transmission_matches_the_closed_form_within_tight_bounds(dem
     assert np.max(measured.half_width) < 0.03
 
 
-def test_every_measurement_is_consistent_with_the_draws_of_its_twin(results):
+def test_every_demo_measurement_agrees_with_its_simulated_draws(results):
     """One in a hundred quantities lies outside its own limit by chance, and some 15 are compared."""
     for name, found in results.items():
         assert found["simulated"]["drive"] == "recorded amplifier voltage", name
@@ -134,7 +134,7 @@ def test_every_measurement_is_consistent_with_the_draws_of_its_twin(results):
     assert escape is None or escape["what"] == "collisions"
 
 
-def test_the_collision_region_begins_where_its_twin_predicts(results):
+def test_the_demo_collision_region_begins_where_the_simulation_predicts(results):
     sweep = results["sweep_moderate"]
     (measured,) = sweep["measured"]["collision_regions"]
     (simulated,) = sweep["simulated"]["collision_regions"]
@@ -144,7 +144,7 @@ def test_the_collision_region_begins_where_its_twin_predicts(results):
         assert found["start"]["frequency_hz"] < 266 < 320 < found["stop"]["frequency_hz"]
 
 
-def test_dwells_grow_lines_towards_the_terminal_resonances_with_level(results):
+def test_peaks_of_demo_dwells_approach_the_terminal_resonances_with_level(results):
     weak, moderate, strong = (
         results[f"dwell_{level}"]["measured"]["terminal_bands"] for level in ("weak", "moderate", "strong")
     )
@@ -157,7 +157,7 @@ def test_dwells_grow_lines_towards_the_terminal_resonances_with_level(results):
     assert abs(upper_strong - TERMINAL_HZ[1]) < abs(upper_moderate - TERMINAL_HZ[1])
 
 
-def test_the_first_screen_states_the_three_findings_of_the_paper(demo, results):
+def test_the_demo_report_begins_with_the_three_findings_of_the_paper(demo, results):
     page = Page((demo / "report.html").read_text(encoding="utf-8"))
     assert len(page.findings.split()) <= 120
     assert len(page.visible.split()) <= 2000
@@ -186,7 +186,7 @@ def test_the_first_screen_states_the_three_findings_of_the_paper(demo, results):
         assert statistic not in page.visible
 
 
-def test_the_report_is_one_file_with_every_figure_inside(demo):
+def test_the_demo_report_is_one_file_that_contains_every_figure(demo):
     page = (demo / "report.html").read_text(encoding="utf-8")
     assert page.count("<figure") >= 6
     assert 'src="http' not in page

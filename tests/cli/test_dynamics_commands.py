@@ -39,13 +39,13 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
     assert "ever overwritten" in refused("branches", *options, "--out", tmp_path / "out")
 
 
-def test_branches_end_when_the_requested_time_is_over():
+def test_the_branch_search_ends_at_the_requested_time():
     found = answer("branches", "--frequency", "50:600", "--amplitude", "5e-6", "--time", "300 ms")
     assert not found["is_complete"]
     assert sum(each["end"] == ArcEnd.OUT_OF_TIME for each in found["branches"]) <= 1
 
 
-def test_branches_along_the_level_are_reported_in_sentences():
+def test_branches_over_amplitude_are_reported_in_sentences():
     result = run("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
     assert result.exit_code == 0, result.output
     assert "1: period 1, mirrored: 1 to 2 µm" in result.output
@@ -115,7 +115,7 @@ def test_an_invalid_number_is_quoted_as_typed(command, value):
 
 
 @pytest.mark.parametrize("command", [("spectrum", *POINT, "--duration"), ("branches", *LINE, "--places")])
-def test_zero_is_quoted_as_typed(command):
+def test_an_invalid_zero_is_quoted_as_typed(command):
     assert f"{command[-1]} was given as 0" in refused(*command, "0")
 
 

@@ -60,7 +60,7 @@ def shown(words):
 
 
 @pytest.mark.parametrize("words", [*NOT_ALLOWED, *NO_NUMBERS], ids=shown)
-def test_a_value_that_is_not_allowed_ends_with_1_in_every_command(vibench_here, tmp_path, words):
+def test_a_value_that_is_not_allowed_exits_1_in_every_command(vibench_here, tmp_path, words):
     ran = vibench_here(*words, cwd=tmp_path)
     assert ran.returncode == 1, ran.stderr
     assert "rror: " in ran.stderr
@@ -68,11 +68,11 @@ def test_a_value_that_is_not_allowed_ends_with_1_in_every_command(vibench_here, 
 
 
 @pytest.mark.parametrize("words", NOT_UNDERSTOOD, ids=shown)
-def test_a_command_line_that_is_not_understood_ends_with_2_in_every_command(vibench_here, tmp_path, words):
+def test_an_incomplete_or_unknown_command_line_exits_2(vibench_here, tmp_path, words):
     assert vibench_here(*words, cwd=tmp_path).returncode == 2
 
 
-def test_an_answer_that_misses_the_requested_error_is_marked_and_succeeds(answered):
+def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(answered):
     assert "needs about" in answered("predict", *SCENE, "--error", "1e-6", "--time", "0.2s")
 
 

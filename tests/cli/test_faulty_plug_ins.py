@@ -167,7 +167,7 @@ def test_invalid_samples_end_check_and_run_with_a_sentence(stranger, does, words
             run_measurement(bench, DWELL, tmp_path / "dwell.h5")
 
 
-def test_missing_samples_are_reported_and_such_a_recording_is_not_played_back(stranger, told, tmp_path):
+def test_missing_samples_are_reported_and_prevent_playback(stranger, told, tmp_path):
     left = [20]
 
     def skips(found, *given):
@@ -200,7 +200,7 @@ def test_a_check_finds_a_converter_that_omits_samples(stranger, tmp_path):
         check_bench(bench, tmp_path)
 
 
-def test_a_stop_that_fails_states_that_the_output_may_be_on(stranger, tmp_path):
+def test_a_failed_stop_warns_that_the_output_may_be_on(stranger, tmp_path):
     path = stranger("generator", OddDriver(AFG1022_MODEL, "stop", raises))
     with pytest.raises(BrokenPromise, match="THE OUTPUT MAY STILL BE ON"), open_bench(path) as bench:
         check_bench(bench, tmp_path)
@@ -233,7 +233,7 @@ def test_a_failure_during_output_ends_silent_with_a_recorded_reason(stranger, tm
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
-def test_a_close_that_fails_after_a_complete_recording_states_that_it_is_complete(
+def test_a_failed_close_after_a_complete_recording_states_that_the_recording_is_complete(
     stranger, kind, inside, told
 ):
     path = stranger(kind, OddDriver(inside, "close", does_then_raises))
@@ -269,7 +269,7 @@ def test_an_impossible_sensor_is_refused(stranger, facts, words):
         pass
 
 
-def test_a_sensor_that_raises_is_reported_by_name(stranger):
+def test_an_exception_in_a_sensor_plug_in_names_the_sensor(stranger):
     path = stranger("sensor", raises)
     with pytest.raises(BrokenPromise, match=r"'odd' of vibench\.sensors broke its promise when it was asked"):
         load_rig(path) and open_bench(path)

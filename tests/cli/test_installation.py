@@ -80,7 +80,7 @@ def test_copies_of_shipped_files_are_complete_and_never_overwrite(answered, refu
     assert changed.read_text(encoding="utf-8") == "changed"
 
 
-def test_every_example_has_its_own_name(answered):
+def test_every_shipped_example_has_a_unique_name(answered):
     for line in answered("examples").splitlines()[:-1]:
         names = line.partition(": ")[2].split(", ")
         assert len(names) == len(set(names)), line
@@ -253,7 +253,7 @@ def installed_mb(name, seen):
     )
 
 
-def test_the_core_takes_less_than_300_megabytes():
+def test_the_core_installation_takes_less_than_300_megabytes():
     assert 200 < installed_mb("vibench", set()) < 300
 
 

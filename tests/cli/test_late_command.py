@@ -13,7 +13,7 @@ HEAVY = {"numpy", "scipy", "matplotlib", "h5py", "pydantic", "pyvisa", "nidaqmx"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_list_shows_the_first_line_of_each_help(name):
+def test_the_command_list_shows_the_first_help_line_of_each_command(name):
     place = COMMANDS[name]
     application = place.load()
     told = application.info.help
@@ -28,12 +28,12 @@ WITHOUT_A_RESULT = {"twin", "stop", "release", "gui", "serve-rig", "bench", "sch
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS.keys() - WITHOUT_A_RESULT))
-def test_a_command_with_a_result_prints_it_as_json(name):
+def test_every_command_with_a_result_has_a_json_option(name):
     command = typer.main.get_command(COMMANDS[name].load())
     assert "--json" in {option for each in command.params for option in each.opts}
 
 
-def test_the_list_of_commands_needs_none_of_the_large_libraries():
+def test_the_command_list_loads_none_of_the_large_libraries():
     loaded = "import vibench.cli.__main__, sys; print(*sys.modules)"
     process = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert HEAVY.isdisjoint(process.stdout.split())
@@ -54,6 +54,6 @@ def test_a_prediction_without_a_file_needs_neither_scipy_nor_h5py(point):
     assert {"scipy", "h5py", "matplotlib"}.isdisjoint(loaded)
 
 
-def test_a_group_reads_its_own_commands(answered):
+def test_a_command_group_loads_its_own_commands(answered):
     assert "vibench bench check [OPTIONS]" in answered("bench", "check", "--help")
     assert isinstance(COMMANDS["bench"].load(), typer.Typer)

@@ -23,7 +23,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_an_option_of_a_field_has_the_docstring_and_the_default_of_the_field(vibench_here, tmp_path, name):
+def test_options_take_help_and_default_from_their_request_fields(vibench_here, tmp_path, name):
     shown = " ".join(vibench_here(name, "--help", cwd=tmp_path).stdout.split())
     command = typer.main.get_command(COMMANDS[name].load())
     fields = {field for field, model in command.callback.fields.items() if model is MODELS[name]}
@@ -48,7 +48,7 @@ def test_every_option_has_a_help(vibench_here, tmp_path, name):
     assert re.findall(r"^  --\S+( \S+)?$\n(?=  --|\n|$)", shown.stdout, flags=re.MULTILINE) == []
 
 
-def test_the_list_of_commands_is_written_without_richs_boxes():
+def test_the_command_list_is_printed_without_the_rich_library():
     """Drawing them took a third of the time from the prompt to the list."""
     program = (
         "import atexit, sys; from vibench.command import main\n"

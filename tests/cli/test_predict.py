@@ -12,7 +12,7 @@ SHORT = ("--duration", 1, "--window", 0.5)
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_prediction_is_the_answer_of_the_engine_for_every_frequency(vibench, tmp_path):
+def test_a_prediction_equals_the_engine_result_at_every_frequency(vibench, tmp_path):
     ran = vibench(
         "predict",
         *("--amplitude", 20e-6, "--frequency", "129:131:1", "--json", *SHORT),
@@ -46,7 +46,7 @@ def test_a_prediction_until_settled_has_kind_and_error(answered):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_requested_exponent_is_given_with_its_error(answered):
+def test_a_requested_lyapunov_exponent_is_given_with_its_error(answered):
     asked = ("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov")
     (point,) = answered("predict", *asked, "--duration", 6, "--window", 1, "--json")["points"]
     assert point["lyapunov_per_s"] > 50
@@ -61,7 +61,7 @@ def test_a_prediction_prints_a_table_and_reasons(answered):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_equal_explanations_are_printed_once(answered):
+def test_points_with_equal_explanations_share_one_line(answered):
     asked = ("--amplitude", 5e-6, "--frequency", "200:244:2", "--duration", 8, "--window", 1)
     told = [line for line in answered("predict", *asked, "--explain").splitlines() if " points, " in line]
     assert [line.split(":")[0] for line in told] == ["11 points, 200 to 220 Hz", "12 points, 222 to 244 Hz"]
@@ -80,7 +80,7 @@ def test_metres_instead_of_micrometres_give_a_warning_beside_the_answer(vibench_
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_failed_point_is_reported_beside_the_answers_of_others(vibench_here, tmp_path):
+def test_a_failed_point_does_not_hide_the_results_of_other_points(vibench_here, tmp_path):
     chatter = ("--model", "rigid:1", "--gap", 1e-9, "--amplitude", 1e-3, "--duration", 0.3, "--window", 0.01)
     ran = vibench_here("predict", *chatter, "--frequency", "100:60100:60000", "--json", cwd=tmp_path)
     assert ran.returncode == 1
@@ -115,7 +115,7 @@ FORGETFUL = ("--amplitude", 5e-6, "--frequency", 242, "--damping-time", 3e-5, "-
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_sensitive_dependence_on_the_start_is_answered_with_motions_and_shares(vibench_here, tmp_path):
+def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_here, tmp_path):
     """Chaos that dies out within tens of seconds: after 36, about half of the starts have settled."""
     asked = ("predict", *FORGETFUL, "--budget", "0.2s", "--explain")
     ran = vibench_here(*asked, "--json", cwd=tmp_path)
@@ -149,7 +149,7 @@ def test_a_requested_error_is_reached_and_stated(answered):
     assert " % reached in " in answered(*asked)
 
 
-def test_a_mean_over_starts_has_one_word_in_table_and_json(answered):
+def test_start_dependence_has_the_same_label_in_table_and_json(answered):
     asked = ("predict", "--amplitude", 5e-6, "--frequency", 260, "--error", "50 %")
     (point,) = answered(*asked, "--json")["points"]
     (row,) = [each for each in answered(*asked).splitlines() if "chaotic" in each]

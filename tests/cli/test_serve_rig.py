@@ -62,7 +62,7 @@ def served():
     assert server.returncode == 0
 
 
-def test_other_programs_set_its_generator_and_read_its_converter(served):
+def test_other_programs_can_use_generator_and_converter_of_the_served_rig(served):
     address = served.split('insecure_channel("')[1].split('"')[0]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     stranger = subprocess.run(
@@ -112,7 +112,7 @@ def test_an_indefinite_length_block_ends_at_the_newline(served):
         assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
 
 
-def test_our_driver_works_over_the_socket(served):
+def test_the_afg1022_driver_works_over_the_socket_of_a_served_rig(served):
     rig = load_rig("virtual_rig")
     (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", served))
     config = rig.generator.model_copy(update={"resource": resource})

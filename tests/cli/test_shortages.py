@@ -40,7 +40,7 @@ def limited(folder, name, most, *arguments):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("most", [8, 12, 16, 20, 24, 32])
-def test_a_measurement_with_few_files_ends_with_a_sentence(tmp_path, most):
+def test_too_few_file_descriptors_end_a_measurement_without_traceback(tmp_path, most):
     (tmp_path / "tiny.toml").write_text(TONE, encoding="utf-8")
     ended = limited(
         tmp_path, "RLIMIT_NOFILE", most, "measure", "tiny.toml", "--out", "out", "--check", "waived"

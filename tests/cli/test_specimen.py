@@ -70,7 +70,7 @@ def every_way_agrees(vibench_here, folder, path):
 
 
 @pytest.mark.timeout(300)
-def test_random_specimens_keep_their_numbers_in_every_command(vibench_here, tmp_path):
+def test_all_commands_agree_on_the_numbers_of_random_specimens(vibench_here, tmp_path):
     rng = np.random.default_rng(1)
     for _ in range(2):
         every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
@@ -89,7 +89,7 @@ def test_all_commands_agree_on_a_specimen_with_one_stop(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("command", [("specimen",), ("chain", "--cells", 1, "--specimen")])
-def test_json_names_the_missing_stop(answered, tmp_path, command):
+def test_json_states_a_missing_stop_as_an_infinite_gap(answered, tmp_path, command):
     document = answered(*command, one_sided(tmp_path), "--json")
     described = document.get("options", {}).get("described", document)
     assert described["gap_m"] == [30e-6, "inf"]
@@ -120,7 +120,7 @@ def test_fifty_random_specimens_pass_the_bench_check_on_the_virtual_rig(tmp_path
     assert refused == []
 
 
-def test_the_list_names_every_specimen_and_every_law(answered):
+def test_the_specimen_list_contains_every_specimen_and_contact_law(answered):
     said = answered("specimen", "--json")
     assert said["specimens"].keys() == shipped_specimens().keys()
     assert {"hertz", "linear", "rigid:0..1"} <= said["contact_laws"].keys()

@@ -60,7 +60,7 @@ def test_stop_takes_less_than_0_1_s_of_processor_time():
     ("words", "told"),
     [(("--level", "off", "--reason", "smoke"), "off smoke"), (("--level=abort",), "abort vibench stop")],
 )
-def test_the_fast_stop_equals_the_complete_command(words, told):
+def test_the_fast_stop_delivers_the_stop_with_its_options(words, told):
     with driving("north") as north:
         said = vibench_stop(*words)
         assert said.returncode == 0
@@ -79,7 +79,7 @@ def test_the_fast_stop_stops_the_named_program():
 @pytest.mark.parametrize(
     ("words", "code"), [(("--level", "loud"), 1), (("--level",), 2), (("--pid", "x"), 1), (("--reason=",), 1)]
 )
-def test_unusual_arguments_are_passed_to_the_complete_command(words, code):
+def test_arguments_that_the_fast_stop_does_not_handle_run_the_full_command(words, code):
     with driving("north") as north:
         told = vibench_stop(*words)
         assert told.returncode == code, told.stderr
@@ -98,7 +98,7 @@ def test_the_fast_stop_gives_advice_about_a_killed_program():
 
 
 @pytest.mark.parametrize("is_killed", [False, True])
-def test_control_characters_in_a_program_name_have_no_effect(is_killed):
+def test_control_characters_in_a_program_name_are_escaped(is_killed):
     with driving("a\x1b[2J\u202e\x9b1m") as hostile:
         if is_killed:
             hostile.kill()

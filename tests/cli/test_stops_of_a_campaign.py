@@ -103,7 +103,7 @@ def states(folder):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("level", ["ramp", pytest.param("off", marks=pytest.mark.thorough)])
-def test_a_stop_while_the_rig_cools_ends_the_campaign(vibench_here, tmp_path, level):
+def test_a_stop_during_a_cooling_pause_ends_the_campaign(vibench_here, tmp_path, level):
     with measuring(tmp_path, first_s=0.2, rest_s=LONG_S) as program:
         until(program, rests)
         told = vibench_here("stop", "--level", level, "--reason", "smoke", cwd=tmp_path)

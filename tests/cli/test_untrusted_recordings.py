@@ -102,7 +102,7 @@ def said_by_all(vibench_here, folder, name="dwell.h5"):
         for each in CHANGES
     ],
 )
-def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, folder, change):
+def test_every_command_refuses_or_warns_about_a_recording_without_its_seal(vibench_here, folder, change):
     with h5py.File(folder / "dwell.h5", "r+") as file:
         del file["seal"]
         CHANGES[change](file)
@@ -139,7 +139,7 @@ def test_a_swapped_recording_is_refused_by_every_command(vibench_here, folder, h
         assert "the campaign's journal for dwell: another recording" in text, (word, text)
 
 
-def test_export_warns_of_a_recording_without_its_seal(vibench_here, folder):
+def test_export_warns_about_a_recording_without_its_seal(vibench_here, folder):
     with h5py.File(folder / "dwell.h5", "r+") as file:
         del file["seal"]
     ended = vibench_here("export", "dwell.h5", "--to", "csv", cwd=folder)

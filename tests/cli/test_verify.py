@@ -208,7 +208,7 @@ def test_recover_follows_external_links_on_request(vibench_here, folder):
     assert vibench_here("verify", "five.h5", cwd=folder).returncode == 0
 
 
-def test_a_finished_recording_under_the_name_of_a_growing_one_is_not_recovered(vibench_here, folder):
+def test_a_finished_recording_named_as_a_part_file_is_not_recovered(vibench_here, folder):
     (folder / "two.h5").rename(folder / "four.h5.part")
     before = (folder / "four.h5.part").read_bytes()
     found = vibench_here("recover", "four.h5.part", cwd=folder)
@@ -217,7 +217,7 @@ def test_a_finished_recording_under_the_name_of_a_growing_one_is_not_recovered(v
     assert (folder / "four.h5.part").read_bytes() == before
 
 
-def test_one_bad_recording_does_not_affect_its_folder(vibench_here, folder):
+def test_bad_recordings_do_not_affect_other_recordings_of_a_folder(vibench_here, folder):
     shutil.copy(folder / "one.h5", folder / "four.h5")
     with h5py.File(folder / "four.h5", "r+") as file:
         del file["seal"]
@@ -241,7 +241,7 @@ def test_one_bad_recording_does_not_affect_its_folder(vibench_here, folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
-def test_an_undecodable_name_is_refused_where_it_would_be_stored(folder, vibench_here):
+def test_a_file_name_that_cannot_be_stored_as_text_is_refused(folder, vibench_here):
     name = os.fsdecode(b"\xff.h5")
     (folder / "one.h5").rename(folder / name)
     told = vibench_here("export", name, "--to", "csv", "--out", "x", cwd=folder)

@@ -20,7 +20,7 @@ def test_a_prediction_reaches_the_engine_within_six_frames(found):
     assert len(found.frames) <= MOST_FRAMES, found.frames
 
 
-def test_a_prediction_calls_and_loads_few_files(found):
+def test_a_prediction_uses_and_loads_few_source_files(found):
     assert 0 < len(found.files) <= MOST_FILES, found.files
     assert len(found.files) < len(found.loaded) <= MOST_LOADED, found.loaded
     assert not any("_queue" in file or "_store" in file for file in found.loaded)

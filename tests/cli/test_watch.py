@@ -98,7 +98,7 @@ def test_a_stop_of_a_stalled_engine_is_kept_and_reported(running, tmp_path):
 
 
 @pytest.mark.thorough
-def test_watching_shows_the_run_and_its_end(running):
+def test_watch_shows_the_run_and_its_end(running):
     arguments = [sys.executable, "-m", "vibench.cli", "watch"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
     with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as observer:
@@ -162,7 +162,7 @@ class TestWithoutAnEngine:
             script.kill()
 
     @pytest.mark.thorough
-    def test_a_script_is_stopped(self, script, vibench_here, tmp_path):
+    def test_a_user_script_is_found_by_watch_and_stopped(self, script, vibench_here, tmp_path):
         listed = json.loads(vibench_here("watch", "--json", cwd=tmp_path).stdout)
         assert listed["engines"] == []
         assert [(each["pid"], each["what"]) for each in listed["programs"]] == [(script.pid, "alone")]
