@@ -135,7 +135,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
     assert hertz[-1] > hertz[turns[0]] > hertz[turns[1]]
 
 
-def test_points_that_lie_within_their_noise_of_each_other_give_no_direction():
+def test_the_step_direction_ignores_points_closer_than_their_noise():
     """Two of a noisy arc lie close to each other, as where a step was halved at a fold."""
     rng = np.random.default_rng(22)
     solver = BranchSolver(LoopSetting(98.0, np.array([1.0 + 0j])), np.array([1.0 + 0j]), 0.0, 1.0, 0.25)
@@ -165,7 +165,7 @@ def model_of(rig):
 
 
 @pytest.mark.thorough
-def test_a_branch_is_started_from_rest_and_its_base_is_a_sine_of_the_level(rig, tmp_path):
+def test_a_branch_starts_from_rest_with_a_sinusoidal_base_of_the_set_level(rig, tmp_path):
     hard = hardening(rig)
     points, notes = followed(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
     branch, _ = model_of(hard)
@@ -179,7 +179,7 @@ def test_a_branch_is_started_from_rest_and_its_base_is_a_sine_of_the_level(rig, 
 
 
 @pytest.mark.thorough
-def test_small_perturbations_show_stability_and_keep_the_point(rig, tmp_path):
+def test_small_perturbations_show_stability_without_leaving_the_point(rig, tmp_path):
     hard = hardening(rig)
     path = tmp_path / "perturbed.h5"
     points, notes = followed(hard, continuation(start_hz=94, most_points=1, perturbation=0.02), path)
@@ -203,7 +203,7 @@ def test_small_perturbations_show_stability_and_keep_the_point(rig, tmp_path):
     assert max(envelope_deviation(each, period) for each in (base, m0)) == pytest.approx(0.02, rel=0.6)
 
 
-def test_a_motion_that_changed_has_no_stability_verdict():
+def test_a_motion_that_changed_during_the_test_gets_no_stability_verdict():
     look = LoopLook(np.array([3e-6 + 0j]), np.array([9e-6 + 0j]), np.array([1e-9]), np.array([1e-9]))
     moved = replace(look, m0_m=1.02 * look.m0_m)
     surely = OpenLoopMultiplier(1.2, 0.01)
@@ -214,14 +214,14 @@ def test_a_motion_that_changed_has_no_stability_verdict():
     assert nothing.multiplier is None
 
 
-def test_a_bench_without_a_controller_reports_it(rig, tmp_path):
+def test_a_bench_without_a_controller_is_refused_with_advice(rig, tmp_path):
     with open_bench(rig) as bench, pytest.raises(ConfigurationError, match=r"add \[controller\]"):
         run_measurement(bench, measurement(continuation()), tmp_path / "none.h5")
 
 
 @pytest.mark.thorough
 @pytest.mark.timeout(400)
-def test_a_latency_at_which_the_loop_fails_is_refused_with_the_number_before_anything_plays(rig, tmp_path):
+def test_a_latency_that_makes_the_loop_unstable_is_refused_before_output(rig, tmp_path):
     with open_bench(hardening(rig, latency_s=1.5e-3)) as bench:
         with pytest.raises(LimitExceeded, match=r"largest multiplier is 1\.\d+ at .* with 1.5 ms of latency"):
             run_measurement(bench, measurement(continuation()), tmp_path / "late.h5")
@@ -240,7 +240,7 @@ def among_stops(**more):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(400)
-def test_motions_near_grazing_are_refused_with_the_loops_multiplier(rig):
+def test_motions_near_grazing_are_refused_with_the_loop_multiplier(rig):
     fast = fast_loop(hardening(rig).model_copy(update={"specimen": rig.specimen}))
     plan = continuation(start_hz=254, low_hz=253.9, high_hz=254.3)
     with pytest.raises(LimitExceeded, match=r"multiplier is 1\d\d at .* hold it from 254 to 254\.2\d? Hz\."):
@@ -259,7 +259,7 @@ def test_a_branch_without_start_or_force_in_the_model_is_refused():
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("rate_hz", [10_240.0, 5120.0])
-def test_motions_with_impacts_are_held_behind_their_fold(tmp_path, rate_hz):
+def test_unstable_motions_with_impacts_are_held_beyond_their_fold(tmp_path, rate_hz):
     """The paper's specimen: begun from above, at least 10 unstable motions, up to a multiplier of 2."""
     stops, plan = among_stops()
     stops = changed(stops, daq={"sample_rate_hz": rate_hz})
@@ -286,7 +286,7 @@ NOISES += ("vibrometer_noise_m_per_s_per_rthz", "converter_noise_v")
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("noise", [1.0, 10.0])
-def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tmp_path, noise):
+def test_a_feedback_law_from_a_wrong_model_holds_a_branch_through_both_folds(rig, tmp_path, noise):
     """Minutes of rig time: at least 15 unstable points, folds within 0.3 Hz, m0 within 2 %."""
     true = hardening(rig, **{each: noise * getattr(rig.virtual, each) for each in NOISES})
     # The host believes in springs that are 10 % stiffer, and in a coil that pushes by 10 % more.

@@ -57,7 +57,7 @@ def branch():
 
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.7 / RATE_HZ, 3.1 / RATE_HZ, 10 / RATE_HZ])
-def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
+def test_the_sampled_plant_model_matches_the_compiled_simulation(latency_s):
     model = plant(latency_s, LINEAR)
     fine = 40
     volts = np.random.default_rng(3).normal(0, 0.05, 300)
@@ -76,7 +76,7 @@ def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
 
 
 @pytest.mark.thorough
-def test_under_a_table_too_heavy_to_move_the_multipliers_match_the_branch():
+def test_multipliers_on_a_very_heavy_table_match_the_branch():
     found = branch()
     points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
     # The table's own multiplier is one: it stays where it is.
@@ -98,7 +98,7 @@ def test_multipliers_match_the_branch_with_contacts_shorter_than_a_sample():
 
 
 @pytest.mark.thorough
-def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
+def test_the_law_stabilises_all_motions_of_a_branch_even_with_a_wrong_model():
     found = branch()
     unstable = np.flatnonzero(~found.is_stable)
     assert unstable.size > 100
@@ -111,7 +111,7 @@ def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_th
             assert loop_multiplier(each, law, *slopes) < 0.99
 
 
-def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
+def test_pd_gains_on_m0_hold_the_branch_and_pd_gains_on_the_base_do_not():
     unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     of_m0, of_base = pd_law(plant(), 1), pd_law(plant(), 0)
     assert of_m0.direct[0, 0] == of_base.direct[0, 1] == 0.0
@@ -190,7 +190,7 @@ def test_the_played_signal_moves_the_base_by_the_transfer_function():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("begin", "ratio"), [("rest", 0.42), ("above", 2.79)])
-def test_a_branch_with_stops_depends_on_the_direction_to_its_level(begin, ratio):
+def test_the_branch_with_stops_depends_on_the_side_from_which_it_starts(begin, ratio):
     branch = impact_branch(gong2025(), 1e-6, 97.5, (97.4, 97.6), begin)
     at = np.argmin(np.abs(branch.frequencies_hz - 97.5))
     assert branch.response_ii[at, 0] == pytest.approx(ratio, rel=0.02)

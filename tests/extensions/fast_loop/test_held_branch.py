@@ -25,7 +25,7 @@ def told(number, stability, multiplier):
 POINTS = [point(number, hertz) for number, hertz in enumerate(HERTZ)]
 
 
-def test_each_point_has_its_notes_in_any_order():
+def test_stability_notes_are_assigned_to_their_points_in_any_order():
     # The third was asked in vain, and the last not at all: the run ended.
     notes = [told(1, Stability.STABLE, 0.96), told(0, Stability.UNSTABLE, 1.1), told(2, Stability.OPEN, None)]
     found = held_branch([*POINTS, *notes])

@@ -95,7 +95,7 @@ def test_frames_match_the_protocol_documents(installed):
     assert frame(6, 3, bytes.fromhex("0c0004030201")).hex(" ") == "48 4c 06 03 06 00 0c 00 04 03 02 01 08 d1"
 
 
-def test_a_law_of_two_gains_is_read_exactly_and_other_laws_are_refused_with_advice(installed):
+def test_a_pd_law_is_recovered_exactly_and_other_laws_are_refused(installed):
     from helic_signals import pd_gains
 
     rng = np.random.default_rng(22)
@@ -119,14 +119,14 @@ def test_a_law_of_two_gains_is_read_exactly_and_other_laws_are_refused_with_advi
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("promise", [name for name in dir(contract) if name.startswith("test_")])
-def test_the_board_keeps_the_contract(found, promise):
+def test_the_controller_board_passes_the_contract_tests(found, promise):
     _, rig = found
     with open_bench(rig, confirm=confirm_simulated) as bench:
         getattr(contract, promise)(bench)
 
 
 @pytest.mark.thorough
-def test_another_version_of_the_protocol_a_missing_gate_and_an_occupied_board_are_refused(found):
+def test_an_incompatible_ungated_or_occupied_board_is_refused(found):
     board, rig = found
     board.version = 4
     with pytest.raises(
@@ -151,7 +151,7 @@ def test_another_version_of_the_protocol_a_missing_gate_and_an_occupied_board_ar
 
 
 @pytest.mark.thorough
-def test_a_connection_that_is_lost_is_reported_and_the_gate_has_closed(played):
+def test_a_lost_connection_is_reported_and_closes_the_safety_gate(played):
     board, bench = played
     board.drop()
     assert board.is_left.wait(10)
@@ -172,7 +172,7 @@ def test_a_stream_that_ends_is_reported_and_silenced(played):
 
 
 @pytest.mark.thorough
-def test_a_refusal_of_the_board_ends_silent_with_its_message(played):
+def test_a_command_refused_by_the_board_silences_it_with_its_message(played):
     board, bench = played
     board.refuses = {"forcing_coeffs": BUSY}
     bench.controller.play(SERIES.model_copy(update={"reference_v": ((0.2, 0.0),)}))
@@ -189,7 +189,7 @@ def test_a_refusal_of_the_board_ends_silent_with_its_message(played):
 
 
 @pytest.mark.thorough
-def test_a_tripped_gate_ends_the_run(found, tmp_path):
+def test_a_tripped_safety_gate_ends_the_run(found, tmp_path):
     board, rig = found
     plan = BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=90, high_hz=118

@@ -25,7 +25,7 @@ while True:
 
 
 @pytest.mark.thorough
-def test_a_controller_whose_host_is_killed_falls_silent_by_itself():
+def test_a_controller_goes_silent_when_its_host_is_killed():
     rig = load_rig("virtual_rig")
     config = ControllerConfig(rate_hz=10_240, latency_s=3e-4, limit_v=2, source="test")
     virtual = VirtualRig(rig.model_copy(update={"controller": config}))

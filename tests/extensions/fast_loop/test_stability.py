@@ -105,13 +105,13 @@ def test_noise_alone_gives_no_stability_verdict():
         assert not low > 1.0
 
 
-def test_bounds_are_two_sided():
+def test_multiplier_bounds_are_two_sided():
     assert OpenLoopMultiplier(1.0, 0.1).bounds == pytest.approx((0.79, 1.21))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_bounds_hold_as_often_as_they_state_and_no_verdict_is_wrong():
+def test_multiplier_bounds_have_their_coverage_and_verdicts_are_right():
     """240 draws of 10 motions with low and high noise: 95 % of the bounds, and no wrong side among them."""
     inside, wrong, draws = 0, 0, 0
     for noise in (1.0, 4.0):

@@ -110,7 +110,7 @@ def test_returned_coefficients_match_the_played_ones(wired):
     assert complex(*block.m0[0]) == pytest.approx(0.25, abs=1e-4)
 
 
-def test_a_law_acts_on_samples_and_its_state(wired):
+def test_a_feedback_law_acts_on_samples_and_its_internal_state(wired):
     feedback = LoopFeedback(step=((0.5,),), inlet=((0.0, 1.0),), output=(2.0,), direct=(0.0, -1.0))
     program = LoopProgram(frequency_hz=100, reference_v=((0.0, 0.0),), feedback=feedback)
     wired.tell("play", program=program)
@@ -129,7 +129,7 @@ def test_changing_the_program_causes_no_jump(wired):
     assert wired.report().state is LoopState.PLAYING
 
 
-def test_the_controller_falls_silent_without_its_host_and_gives_the_reason(wired):
+def test_without_its_host_the_controller_goes_silent_and_states_the_reason(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     wired.run(0.4)
     wired.report()

@@ -73,7 +73,7 @@ def recording(tmp_path):
     return synthetic.write_recording(tmp_path, plan, base, velocity, parts, name="branch")
 
 
-def test_the_package_is_missing_in_the_other_environment_only(run):
+def test_the_fast_loop_package_is_missing_only_in_the_second_environment(run):
     assert vibench_fast_loop.__file__.startswith(str(ROOT))
     assert "No module named 'vibench_fast_loop'" in run("-c", "import vibench_fast_loop").stderr
 
@@ -91,7 +91,7 @@ def test_a_measurement_that_needs_the_missing_package_is_refused(run, given, tmp
 
 
 @pytest.mark.thorough
-def test_an_old_recording_is_reported_by_command_and_report(run, recording, tmp_path):
+def test_a_branch_recording_is_refused_in_one_sentence_without_its_package(run, recording, tmp_path):
     told = run("-m", "vibench.cli", "analyse", recording, "--json")
     assert told.returncode == 1
     assert SENTENCE in " ".join(told.stderr.split())
