@@ -13,7 +13,7 @@ import pytest
 from vibench.gui.background.background import Background, LatestRequest
 
 
-def test_answers_are_computed_in_another_process(context, qtbot):
+def test_results_are_computed_in_another_process(context, qtbot):
     answers, errors = [], []
     context.background.ask(os.getpid, answers.append, errors.append)
     qtbot.waitUntil(lambda: bool(answers or errors), timeout=100_000)
@@ -21,7 +21,7 @@ def test_answers_are_computed_in_another_process(context, qtbot):
     assert answers[0] != os.getpid()
 
 
-def test_errors_keep_their_type_and_dropped_answers_are_not_delivered(context, qtbot):
+def test_background_errors_keep_their_type_and_dropped_results_are_discarded(context, qtbot):
     answers, errors = [], []
     context.background.ask(factorial, answers.append, errors.append, 5).drop()
     context.background.ask(factorial, answers.append, errors.append, -1)
@@ -43,7 +43,7 @@ def background(qapp):
     background.close()
 
 
-def test_a_dead_process_is_reported_and_others_finish_its_queue(background, qtbot):
+def test_a_dead_process_is_reported_and_other_processes_finish_its_queue(background, qtbot):
     answers, errors = [], []
     background.ask(leave, answers.append, errors.append, 0)
     dropped = [background.ask(factorial, answers.append, errors.append, 3) for _ in range(5)]
@@ -83,7 +83,7 @@ def is_being_read(thread):
 
 
 @pytest.mark.timeout(60)
-def test_closing_ends_a_process_that_is_sending_its_answer(background, qtbot, tmp_path):
+def test_closing_ends_a_process_that_is_sending_its_result(background, qtbot, tmp_path):
     """The window waited for ever for the rest of an answer."""
     background.ask(large, lambda _: None, lambda _: None, str(tmp_path / "begun"))
     qtbot.waitUntil((tmp_path / "begun").exists, timeout=100_000)
@@ -106,7 +106,7 @@ def hungry(_number):
     return bytearray(8 << 30)
 
 
-def test_a_request_after_a_dropped_one_is_answered(background, qtbot, qapp):
+def test_a_request_after_a_dropped_request_is_answered(background, qtbot, qapp):
     answers, errors = [], []
     latest = LatestRequest(background, factorial, answers.append, errors.append, 1, qapp)
     for number in (3, 4):
@@ -143,7 +143,7 @@ def test_worker_memory_is_limited(background, qtbot):
     assert re.search(r"needs more than 6 GB of memory", str(errors[0]))
 
 
-def test_a_job_ends_only_after_its_answer_was_delivered(background, qtbot):
+def test_a_job_ends_only_after_its_result_was_delivered(background, qtbot):
     answers, seen = [], []
 
     def take(answer):
