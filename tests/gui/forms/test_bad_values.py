@@ -83,7 +83,7 @@ def type_into(widget, text):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", FORMS)
-def test_the_error_of_a_bad_value_has_the_name_and_unit_of_its_field(qtbot, name):
+def test_the_error_for_a_bad_value_names_its_field_and_unit(qtbot, name):
     form = FORMS[name]()
     qtbot.addWidget(form)
     assert form.value is not None, form.complaint  # a newly chosen kind begins with valid values

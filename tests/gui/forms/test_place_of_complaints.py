@@ -19,7 +19,7 @@ GIVEN = {"start": 60.0, "stop": 62.0}
     ("field", "value", "said"),
     [("specimen", "nothing", "no specimen is called"), ("model", "rubber", "Contact 'rubber' is not known")],
 )
-def test_unknown_specimens_and_laws_show_an_error_at_their_field(qapp, model, field, value, said):
+def test_unknown_specimens_and_contact_laws_show_an_error_at_their_field(qapp, model, field, value, said):
     form = ValidatedForm(model, "scene", HIDDEN)
     if field not in form.form.editors:
         pytest.skip("the models of a simulation are a list")

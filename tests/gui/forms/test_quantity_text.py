@@ -96,7 +96,7 @@ def test_numbers_without_unit_in_a_list_are_in_the_displayed_unit(qtbot):
     assert editor.content() == [7e-6, 3e-3, 4e-3]
 
 
-def test_a_value_a_thousand_times_larger_must_be_confirmed(qtbot, field):
+def test_a_value_1000_times_larger_than_before_must_be_confirmed(qtbot, field):
     edit = field("m", 5e-6)
     assert type_text(qtbot, edit, "7 mm") == 5e-6
     assert "1.4e+03 times" in edit.complaint
