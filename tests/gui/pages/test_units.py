@@ -169,7 +169,7 @@ def test_every_field_of_a_test_shows_and_reads_the_new_unit(qtbot, kind):
     assert form.value == before
 
 
-def test_lists_are_read_in_the_displayed_unit(qtbot):
+def test_lists_of_numbers_are_read_in_the_displayed_unit(qtbot):
     form = form_of_a_kind(qtbot, "resonance_tracking")
     levels = form.form.editors["excitation"].form.editors["accelerations_m_per_s2"]
     UNITS.choose({"m/s²": "g"})
@@ -210,7 +210,7 @@ def test_axis_numbers_are_in_the_unit_of_the_label(full_window):
         ("m/s²", "m/s²", "1 g", 9.80665),
     ],
 )
-def test_a_field_reads_its_own_text_and_any_stated_unit(unit, shown, text, value):
+def test_a_field_accepts_its_displayed_text_and_any_stated_unit(unit, shown, text, value):
     UNITS.choose({unit: shown})
     assert parse_quantity(text, unit) == value
     assert parse_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
@@ -239,7 +239,7 @@ def test_a_value_keeps_its_digits_in_coarser_units(qtbot):
         ("0.25 m/s, -12 mm/s", "0.25 m/s, -0.012 m/s"),
     ],
 )
-def test_sentences_are_converted_to_the_chosen_units_only(sentence, converted):
+def test_quantities_in_sentences_are_converted_to_the_chosen_units_only(sentence, converted):
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
     assert UNITS.convert(sentence) == converted
 

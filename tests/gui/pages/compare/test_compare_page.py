@@ -63,7 +63,7 @@ def texts(table):
     ]
 
 
-def test_curves_are_drawn_as_they_are(overlaid):
+def test_curves_are_drawn_without_changing_their_values(overlaid):
     lines = [each.getOriginalDataset() for each in overlaid.plots.magnitudes.getPlotItem().listDataItems()]
     assert any(np.array_equal(y, mode("one").magnitude) for _, y in lines)
     assert any(np.array_equal(y, mode("half", 0.5, 100.0, 500.0).magnitude) for _, y in lines)
@@ -95,7 +95,7 @@ def test_unticked_curves_are_neither_drawn_nor_listed(overlaid):
     assert len(overlaid.curves.curves) == 2
 
 
-def test_markers_read_every_curve(overlaid):
+def test_markers_read_the_value_of_every_curve(overlaid):
     overlaid._markers.setChecked(True)
     overlaid.plots.markers.put(0, 150.0)
     overlaid.plots.markers.put(1, 300.0)
@@ -123,7 +123,7 @@ def test_invalid_options_are_refused_with_an_explanation(page):
     assert page.panel.options().request.noise_ratio == 2.0
 
 
-def test_curves_follow_the_theme(overlaid):
+def test_comparison_plots_follow_the_colour_theme(overlaid):
     overlaid.retheme(DARK)
     assert overlaid.plots.magnitudes.backgroundBrush().color().name() == DARK.base
 

@@ -151,7 +151,7 @@ def test_control_characters_in_names_have_no_effect(page, folder, wait_for, tmp_
     page._go_to(folder)
 
 
-def test_every_readable_recording_has_a_picture(page):
+def test_every_readable_recording_has_a_thumbnail(page):
     model = page.table.recordings
     pictures = {
         entry.name: model.index(row, 0).data(Qt.ItemDataRole.DecorationRole)
@@ -185,7 +185,7 @@ def test_a_broken_file_shows_the_reason_and_a_remedy(page, opened, folder, qtbot
     assert len(opened("whole.h5").time_histories.plots) == 3
 
 
-def test_keys_zoom_pan_and_show_everything(opened, qtbot):
+def test_keys_zoom_pan_and_reset_the_view(opened, qtbot):
     page = opened("whole.h5")
     qtbot.keyClick(page.time_histories, Qt.Key.Key_Plus)
     low_s, high_s = page.time_histories.view_s
@@ -365,7 +365,7 @@ def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path,
     wait_for(lambda: not shared_context.background.is_busy)
 
 
-def test_a_forged_note_is_not_shown(record, tmp_path):
+def test_the_text_of_a_forged_note_is_not_shown(record, tmp_path):
     path = add_note(record(tmp_path, "forged"), "glue was still wet")
     with h5py.File(path, "r+") as file:
         del file["results/note/settings_json"]
@@ -397,7 +397,7 @@ HINTS = (("broken.h5", "broken.h5"), ("whole.h5", "Reading|Working|Zoom in"), ("
 
 
 @pytest.mark.parametrize(("name", "hint"), HINTS)
-def test_no_hint_asks_for_a_recording_when_one_is_selected(
+def test_no_hint_asks_for_a_recording_when_a_recording_is_selected(
     page, folder, tmp_path, name, hint, begin_recording
 ):
     path = folder / name

@@ -17,7 +17,7 @@ def shaken(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shaken, wait_for):
+def test_p_is_drawn_between_the_stops_in_the_visible_range(shared_context, shaken, wait_for):
     pictures = Pictures(DARK, shared_context.background)
     pictures.resize(900, 600)
     pictures.setCurrentWidget(pictures.hidden_motion)
@@ -39,7 +39,7 @@ def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shake
 
 
 @pytest.mark.thorough
-def test_choosing_another_specimen_identifies_its_gaps(
+def test_choosing_another_specimen_identifies_the_gaps_again(
     shared_context, shaken, wait_for, tmp_path, monkeypatch
 ):
     """With gaps 1 um too small the track is lost; collisions then identify the gaps."""

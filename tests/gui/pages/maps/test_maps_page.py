@@ -88,7 +88,7 @@ def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, wait_f
     assert pages == [SIMULATE]
 
 
-def test_a_level_is_drawn_on_the_map_as_a_line(page):
+def test_a_recorded_level_is_drawn_on_the_map_as_a_line(page):
     page._show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), ()))
     across, up = page.map._levels[0].getOriginalDataset()
     assert across.tolist() == [100.0, 140.0]

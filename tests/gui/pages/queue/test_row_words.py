@@ -12,7 +12,7 @@ from vibench.gui.pages.queue.draft import entry_rows, point_rows, preview_campai
 CAMPAIGNS = Path(__file__).resolve().parents[4] / "campaigns"
 
 
-def test_rows_show_the_base_level_and_the_kind_of_sweep():
+def test_campaign_rows_show_the_base_level_and_the_kind_of_sweep():
     what = {name: said for name, said, *_ in entry_rows(load_campaign(CAMPAIGNS / "smart.toml"))}
     assert what["dwell_260"] == "held dwell, base held at 5 µm, at most 1 Vpp"
     assert what["mode_1"] == "resonance tracking, base held at 0.05 m/s², 0.1 m/s², at most 0.05 Vpp"
@@ -20,12 +20,12 @@ def test_rows_show_the_base_level_and_the_kind_of_sweep():
     assert (what["sweep"], what["branch"]) == ("sine sweep, 1.5 Vpp", "sweep of dwell")
 
 
-def test_rows_count_the_recordings_at_all_points_of_a_scan():
+def test_campaign_rows_count_the_recordings_at_all_points_of_a_scan():
     (row,) = entry_rows(load_campaign(CAMPAIGNS / "scan.toml"))
     assert row[:1] + row[2:3] == ("noise", "4")
 
 
-def test_rows_show_levels_and_existing_recordings(tmp_path):
+def test_campaign_rows_show_levels_and_existing_recordings(tmp_path):
     """After a restart of the window all rows were shown as planned."""
     campaign = load_campaign(CAMPAIGNS / "quick.toml")
     seen = replace(preview_campaign((campaign, None, tmp_path)), complete=frozenset({"dwell"}))
@@ -47,6 +47,6 @@ def test_rows_show_levels_and_existing_recordings(tmp_path):
         ("queued", "", "queued"),
     ],
 )
-def test_a_row_shows_its_state_once(state, reason, said):
+def test_a_campaign_row_shows_its_state_once(state, reason, said):
     row = RowStatus(name="dwell", state=state, reason=reason, file="")
     assert point_rows(None, (row,), EngineState.RUNNING)[0][3] == said

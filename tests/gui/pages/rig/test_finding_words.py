@@ -32,15 +32,15 @@ def finding(number, unit, value="as the check says", uncertainty=None, advice=""
         (0.0, "V", "as the check says"),
     ],
 )
-def test_small_and_large_numbers_have_prefixes(number, unit, text):
+def test_small_and_large_findings_have_unit_prefixes(number, unit, text):
     assert measured_text(finding(number, unit)) == text
 
 
-def test_an_uncertainty_has_the_same_prefix():
+def test_value_and_uncertainty_of_a_finding_share_one_unit_prefix():
     assert measured_text(finding(1.2e-3, "V", uncertainty=4e-5)) == "1.2 ± 0.04 mV"
 
 
-def test_advice_comes_after_the_expected_value():
+def test_advice_follows_the_expected_value_of_a_finding():
     assert (
         expected_text(finding(1.0, "V", advice="look at the cable")) == "0.005 V or less. Look at the cable"
     )

@@ -8,7 +8,7 @@ from vibench.gui.pages.rig.rig_page import KnobSheetForm
 CONFIGS = Path(__file__).resolve().parents[4] / "hardware_configs"
 
 
-def test_the_knob_sheet_needs_every_tick_and_a_name(qtbot):
+def test_the_knob_sheet_requires_every_tick_and_an_operator_name(qtbot):
     rig = load_rig(CONFIGS / "lab_rig.toml")
     form = KnobSheetForm()
     qtbot.addWidget(form)
@@ -26,7 +26,7 @@ def test_the_knob_sheet_needs_every_tick_and_a_name(qtbot):
     assert form.sheet() is None
 
 
-def test_a_simulated_rig_needs_no_confirmation(qtbot):
+def test_a_simulated_rig_needs_no_knob_sheet(qtbot):
     form = KnobSheetForm()
     qtbot.addWidget(form)
     form.show_rig(load_rig(CONFIGS / "virtual_rig.toml"))

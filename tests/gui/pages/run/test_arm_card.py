@@ -71,7 +71,7 @@ def test_start_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qap
     assert card.is_read, "it has been read once"
 
 
-def test_a_new_plan_must_be_read_from_its_beginning(small, qapp):
+def test_a_new_armed_plan_is_shown_from_its_beginning(small, qapp):
     page, status = small
     show(page, status, qapp)
     bar = page._parts.side.verticalScrollBar()

@@ -51,7 +51,7 @@ def is_empty(curve):
     return across is None or not len(across)
 
 
-def test_p_ends_at_the_newest_sample_between_the_stops(picture):
+def test_the_live_plot_of_p_ends_at_the_newest_sample_between_the_stops(picture):
     picture.show_status(status())
     time_s, p = picture.tracked.getData()
     assert time_s[-1] == 0.0
@@ -72,7 +72,7 @@ def test_the_forecast_fades_as_its_error_grows(picture):
     assert ends[:-1] == pytest.approx([0.25 * 44e-6 * (n + 1) / 5 for n in range(4)], rel=0.15)
 
 
-def test_gaps_and_lost_tracks_are_shown(picture):
+def test_a_lost_track_is_shown_as_a_gap_with_its_reason(picture):
     lost = (*P_M[:100], *[None] * 200)
     picture.show_status(
         status(state="lost", sentence="the motion does not fit", p_m=lost, forecast_m=(), forecast_error_m=())
@@ -89,7 +89,7 @@ def test_the_plot_is_empty_without_a_twin(picture):
     assert picture.caption.text() == "The live twin is off."
 
 
-def test_the_switch_shows_and_changes_whether_a_twin_is_on(context, qtbot):
+def test_the_twin_switch_shows_and_changes_its_state(context, qtbot):
     card = WatchCard(context.theme)
     card.show_status(status(), 0)
     assert card.twin.isChecked()
@@ -100,7 +100,7 @@ def test_the_switch_shows_and_changes_whether_a_twin_is_on(context, qtbot):
     assert asked.args == [TwinSwitch.OFF]
 
 
-def test_averages_are_counted_and_the_current_one_can_be_rejected(context, qtbot):
+def test_averages_are_counted_and_the_current_average_can_be_rejected(context, qtbot):
     card = WatchCard(context.theme)
     playing = RunStatus(
         name="noise", number=1, count=1, file="noise.h5", run_state=RunState.RECORDING, segment="realisation",

@@ -122,7 +122,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, wait_for):
+def test_a_chain_is_simulated_and_drawn_over_frequency_cells_and_time(page, wait_for):
     view = page.chain
     start_request(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
     wait_for(lambda: not view.simulator.is_busy, 280.0)
@@ -142,7 +142,7 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, wait_
 
 
 @pytest.mark.thorough
-def test_waves_need_no_run_and_missing_recordings_are_reported(page, wait_for, tmp_path):
+def test_chain_waves_need_no_simulation_and_missing_recordings_are_reported(page, wait_for, tmp_path):
     view = page.chain
     start_request(view, ChainRequest(lengths=(2, 5), drive="none"))
     wait_for(lambda: not view.simulator.is_busy, 100.0)

@@ -119,7 +119,7 @@ def test_exponents_similarity_impacts_and_motion_are_drawn_as_computed(page):
     assert np.array_equal(x, 1e-6 * np.sin(time_s))
 
 
-def test_coexisting_motions_are_dots_and_table_rows_with_their_shares(page):
+def test_coexisting_motions_are_shown_as_dots_and_table_rows_with_shares(page):
     simulate(page, step_hz=100.0)
     page.simulator.cancel()
     motions = tuple(
@@ -178,7 +178,7 @@ def test_plots_follow_the_theme_and_show_units(page):
     assert "µm" in page.plots.motion.up.labelText
 
 
-def test_an_empty_field_omits_its_signal(page):
+def test_an_empty_signal_field_means_no_signal(page):
     page.form.form.show_content({})
     editor = page.form.form.editors["signal_hz"]
     assert page.form.value.signal_hz == 260.0

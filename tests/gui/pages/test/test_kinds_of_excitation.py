@@ -70,7 +70,7 @@ def test_each_kind_remembers_its_own_duration(form):
     assert form.value.name == "dwell"
 
 
-def test_showing_a_named_test_keeps_its_name(form):
+def test_showing_a_saved_test_does_not_change_it(form):
     named = next(each for each in shipped_tests() if each.measurement.excitation.kind == "sine_sweep")
     form.show_value(named.measurement)
     assert form.value == named.measurement
