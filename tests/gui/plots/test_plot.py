@@ -36,7 +36,7 @@ def dark_pixels(plot):
     )
 
 
-def test_the_hint_is_shown_only_while_no_curve_has_points(plot, qapp):
+def test_an_empty_plot_shows_its_hint_until_a_curve_has_points(plot, qapp):
     plot.with_hint("What was measured appears here")
     curve = plot.curve(curve_style(0))
     plot.show()
@@ -172,7 +172,7 @@ def read_at_one(plot):
     return plot.reading.text
 
 
-def test_readings_belong_to_the_current_curve(plot):
+def test_cursor_readings_follow_the_current_curve(plot):
     """The reading stayed when the curve was replaced or removed."""
     curve = plot.curve(curve_style(0), "mass")
     curve.setData([0.0, 1.0], [0.0, 0.004])
@@ -188,7 +188,7 @@ def test_readings_belong_to_the_current_curve(plot):
     assert "other: 1 mm/s" in read_at_one(plot)
 
 
-def test_readings_and_copies_use_the_current_unit_of_the_axis(plot):
+def test_cursor_readings_and_copies_use_the_current_axis_unit(plot):
     """A plot reused for another channel kept the unit of the first channel."""
     plot.curve(curve_style(0), "base").setData([0.0, 1.0], [0.0, 2.0])
     plot.up.show_unit(PlotAxis("Acceleration", "m/s²"))
@@ -273,7 +273,7 @@ def test_outdated_images_are_greyed_out(plot, qapp):
     assert dark_pixels(plot) > 20
 
 
-def test_a_level_keeps_its_value_when_the_axis_becomes_logarithmic(plot):
+def test_a_level_line_keeps_its_value_when_the_axis_becomes_logarithmic(plot):
     zero, high = plot.level(LIMIT, 0.0), plot.level(LIMIT, 100.0)
     plot.turn_scale()
     assert (zero.isVisible(), high.value()) == (False, 2.0)
@@ -287,7 +287,7 @@ def test_a_level_keeps_its_value_when_the_axis_becomes_logarithmic(plot):
     assert plot.level(LIMIT, 10.0).value() == 1.0
 
 
-def test_readings_include_the_bounds_of_the_curve(plot):
+def test_cursor_readings_include_the_bounds_of_the_curve(plot):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0, 2.0], [0.001, 0.004, 0.001])
     shade = LineStyle(lambda theme: theme.traces[0])
     plot.band(shade, "mass").set_data([0.0, 1.0, 2.0], [0.0, 0.003, 0.0], [0.002, 0.006, 0.002])

@@ -53,7 +53,7 @@ def test_stripes_outside_the_view_are_not_drawn(plot, qapp):
     assert red_columns(plot, qapp) == []
 
 
-def test_separated_lines_are_all_visible(plot, qapp):
+def test_separate_vertical_lines_are_all_visible_after_zooming_in(plot, qapp):
     plot.rules(LINE).show_at(0.02 * number for number in range(500))
     assert red_columns(plot, qapp) == []
     plot.setXRange(5.0, 5.1, padding=0.0)
