@@ -44,7 +44,7 @@ def test_every_table_of_the_window_can_be_copied(window):
 
 
 @pytest.mark.parametrize("width", [120, 240, 900])
-def test_the_stretching_column_stays_readable_in_a_narrow_table(qtbot, width):
+def test_the_last_column_stays_readable_in_a_narrow_table(qtbot, width):
     made = ReadTable("Findings", ("finding", "measured", "expected"))
     qtbot.addWidget(made)
     made.resize(width, 200)
