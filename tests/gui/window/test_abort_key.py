@@ -50,7 +50,7 @@ def test_other_keys_do_not_abort(qtbot, abort_signals):
     assert abort_signals == []
 
 
-def test_repeated_presses_all_count(qtbot, abort_signals):
+def test_every_press_of_the_abort_key_sends_an_abort(qtbot, abort_signals):
     field = QLineEdit()
     qtbot.addWidget(field)
     for _ in range(3):

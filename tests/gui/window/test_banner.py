@@ -9,7 +9,7 @@ from vibench.gui.window.banner import Banner, StateIndicator
 READABLE = 4.5
 
 
-def test_a_state_is_shown_by_symbol_and_word_besides_colour(qtbot):
+def test_the_banner_shows_the_state_by_symbol_word_and_colour(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.show_indicator(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
@@ -41,7 +41,7 @@ def test_text_and_accents_have_enough_contrast_on_every_background(theme, contra
     assert contrast(theme.base, theme.accent) >= READABLE
 
 
-def test_the_stop_button_names_its_ramp_and_keeps_its_place(qtbot):
+def test_the_stop_button_states_its_action_and_does_not_move(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.resize(1000, 60)
@@ -55,6 +55,6 @@ def test_the_stop_button_names_its_ramp_and_keeps_its_place(qtbot):
     assert button.geometry() == before
 
 
-def test_the_window_opens_with_the_focus_on_the_next_step(window, qtbot):
+def test_the_window_does_not_open_with_the_focus_on_stop(window, qtbot):
     qtbot.waitUntil(lambda: window.focusWidget() is not None)
     assert window.focusWidget().objectName() != "stop"

@@ -18,7 +18,7 @@ def button(strip, text):
     return next(each for each in strip.findChildren(QPushButton) if each.text() == text)
 
 
-def test_the_strip_shows_event_reaction_and_advice(qtbot):
+def test_the_message_strip_shows_event_reaction_and_advice(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(Notice(NoticeKind.WARNING, "The disk is nearly full.", "Recording goes on.", "Make room."))

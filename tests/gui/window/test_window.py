@@ -16,7 +16,7 @@ def test_every_page_has_a_working_key(lasting_window, qtbot):
         assert lasting_window.page is lasting_window.pages[name], name
 
 
-def test_pages_are_in_the_order_of_the_job(lasting_window):
+def test_pages_are_in_the_order_of_the_work_steps(lasting_window):
     names = list(PAGES)
     assert list(lasting_window.pages) == names
     assert names[:3] == ["Rig", "Test", "Run"]
@@ -58,7 +58,7 @@ def test_banner_and_stop_are_visible_on_every_page(lasting_window, qapp):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
-def test_a_command_without_a_bench_shows_what_to_do(window, order):
+def test_a_command_without_a_bench_shows_the_next_step(window, order):
     getattr(window.user_actions, order)()
     newest = window.strip.notices[-1]
     assert newest.next_step
