@@ -94,7 +94,7 @@ def space_freezes_the_picture_and_opens_nothing(qtbot, bench):
     assert not card.freeze.isChecked()
 
 
-def test_a_newcomer_measures_with_five_keys(bench, qtbot):
+def test_a_measurement_takes_five_key_presses_from_start_to_recording(bench, qtbot):
     """Alt+O opens, Ctrl+Return arms, F5 starts; two more keys show the recording."""
     keys = []
 
@@ -305,7 +305,7 @@ def test_esc_silences_the_drive_from_any_focus(bench, qtbot, place):
         assert recording.samples > 0
 
 
-def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
+def test_a_hold_keeps_the_drive_on_and_a_stop_ramps_it_down(bench, qtbot):
     start_dwell(bench, qtbot, "held")
     bench.user_actions.hold_or_resume()
     reach(qtbot, bench, EngineState.HELD)
@@ -389,7 +389,7 @@ def test_an_error_message_disappears_when_its_request_is_fulfilled(bench, qtbot)
     reach(qtbot, bench, EngineState.READY)
 
 
-def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
+def test_the_cancel_button_is_visible_when_armed_and_disarms(bench, qtbot):
     bench.show_page(RUN)
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.arm_test()

@@ -71,7 +71,7 @@ def test_the_drive_is_silenced_when_the_window_dies_or_freezes(tmp_path, number)
     ],
 )
 @pytest.mark.timeout(900)
-def test_a_busy_computer_does_not_stop_a_drive_but_a_dead_window_does(tmp_path, number, attended_s):
+def test_a_drive_stops_when_the_window_dies_but_not_on_a_busy_computer(tmp_path, number, attended_s):
     """The window's heartbeat thread waited up to 1.6 s for Python's global lock."""
     with (
         measuring_window(tmp_path, Supervision.ATTENDED, tmp_path / "state", VIEWER_PATIENCE_S) as window,
@@ -117,7 +117,7 @@ def silent_after_s(window, number, folder):
 @pytest.mark.thorough
 @sees_locks
 @pytest.mark.timeout(300)
-def test_the_next_window_shows_and_attends_an_unattended_run(window, qtbot, tmp_path):
+def test_a_new_window_shows_and_supervises_an_unattended_run(window, qtbot, tmp_path):
     bridge, left = window.context.bridge, tmp_path / "left"
     with measuring_window(left, Supervision.UNATTENDED, os.environ["VIBENCH_STATE_DIR"]):
         window.look_for_left_campaign()
