@@ -32,7 +32,7 @@ def judge(values_by_damping, *wanted, tried=(DAMPED, VERY_DAMPED)):
     return judgement(made(measure, *wanted, tried=tried), Evidence(no_studies), CASE)
 
 
-def test_a_claim_is_named_by_its_function_and_states_its_docstring():
+def test_a_claim_takes_its_key_and_text_from_its_function():
     @claim("section 3", "Read off.", at_least("peak", "Hz", 95.0), draws=3)
     def first_peak(_reading):
         """The first peak
@@ -42,27 +42,27 @@ def test_a_claim_is_named_by_its_function_and_states_its_docstring():
     assert (first_peak.key, first_peak.says, first_peak.draws) == ("first-peak", "The first peak is high.", 3)
 
 
-def test_a_value_within_its_bounds_holds_without_testing_options():
+def test_a_claim_within_its_bounds_holds_without_testing_options():
     found = judge({2e-5: (95.4,)}, about("peak", "Hz", 95.0, 1.0))
     assert found.verdict is Verdict.HOLDS
     assert [each.case.name for each in found.findings] == [AS_CHOSEN]
 
 
-def test_a_claim_that_holds_under_a_later_option_names_the_first_one_that_upholds_it():
+def test_a_claim_names_the_first_option_under_which_it_holds():
     found = judge({2e-5: (80.0,), 3e-5: (120.0,), 5e-5: (130.0,)}, at_least("exponent", "1/s", 100.0))
     assert found.verdict is Verdict.HOLDS_UNDER
     assert found.met_under.case.name == DAMPED.name
     assert len(found.findings) == 2
 
 
-def test_a_claim_that_no_option_upholds_fails_and_keeps_all_findings():
+def test_a_claim_that_holds_under_no_option_fails_and_keeps_all_findings():
     found = judge({2e-5: (1.0,), 3e-5: (2.0,), 5e-5: (3.0,)}, at_most("share", "%", 0.5))
     assert found.verdict is Verdict.FAILS
     assert found.met_under is None
     assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
 
 
-def test_a_claim_upheld_by_some_starts_holds_for_a_share_without_testing_options():
+def test_a_claim_that_holds_from_some_starts_holds_for_a_share_of_starts():
     last_hz = (310.0, 288.0, 291.0, 330.0)
     sweep = made(lambda r: (last_hz[r.case.draw],), about("last", "Hz", 290.0, 5.0), tried=(DAMPED,), draws=4)
     found = judgement(sweep, Evidence(no_studies), CASE)
@@ -72,7 +72,7 @@ def test_a_claim_upheld_by_some_starts_holds_for_a_share_without_testing_options
     assert verdict_text(found) == "holds for a share of starts: 2 of 4 (15 to 85 %)"
 
 
-def test_a_claim_holds_if_every_start_upholds_it_and_tests_options_if_none_does():
+def test_a_claim_that_holds_from_no_start_is_tested_under_options():
     def measure(reading):
         return (100.0 + reading.case.draw if reading.case.damping_time_s == 3e-5 else 10.0,)
 
@@ -82,26 +82,26 @@ def test_a_claim_holds_if_every_start_upholds_it_and_tests_options_if_none_does(
     assert [len(each.draws) for each in found.findings] == [3, 3]
 
 
-def test_other_starts_are_a_millionth_of_the_gap_from_rest_and_the_same_again():
+def test_random_starts_are_reproducible_and_within_a_millionth_of_the_gap():
     assert CASE.start == (0.0,) * 6
     moved = replace(CASE, draw=3)
     assert 0.0 < max(abs(value) for value in moved.start[:3]) <= 1e-6 * CASE.gap_m
     assert moved.start == replace(CASE, draw=3).start != replace(CASE, draw=4).start
 
 
-def test_one_number_out_of_bounds_is_enough_to_fail():
+def test_a_claim_fails_if_one_number_is_out_of_bounds():
     wanted = (about("first", "Hz", 201.0, 1.0), about("second", "Hz", 435.0, 1.0))
     assert judge({2e-5: (201.5, 435.5)}, *wanted, tried=()).verdict is Verdict.HOLDS
     assert judge({2e-5: (201.5, 437.0)}, *wanted, tried=()).verdict is Verdict.FAILS
 
 
-def test_an_unmeasured_number_meets_no_expectation():
+def test_a_nan_value_meets_no_expectation():
     anything = Expectation("peak", "Hz", -math.inf, math.inf)
     assert judge({2e-5: (math.nan,)}, anything, tried=()).verdict is Verdict.FAILS
 
 
 @given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
-def test_bounds_include_their_ends(low, width, value):
+def test_expectation_bounds_include_their_ends(low, width, value):
     wanted = made(no_studies, Expectation("anything", "", low, low + width))
     assert wanted.is_met_by((low,))
     assert wanted.is_met_by((low + width,))

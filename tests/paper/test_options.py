@@ -27,7 +27,7 @@ def under(*said, **options):
     return case_with(FigureOptions(**options), said)
 
 
-def test_zeta_is_the_damping_ratio_of_every_mass_also_in_studies():
+def test_the_zeta_option_sets_the_damping_ratio_of_every_mass():
     case = under("zeta=0.0165")
     study = case.study(("hertz",), (5e-6,))
     for specimen in (case.specimen(), study.scene((0,) * 6, Rest()).specimen):
@@ -39,7 +39,7 @@ def test_zeta_is_the_damping_ratio_of_every_mass_also_in_studies():
 
 
 @pytest.mark.parametrize("model", ["power:3", "power:47", "power:3@0.05+5@0.15+7@0.8"])
-def test_a_fit_has_the_force_of_the_stops_at_its_indentation(model):
+def test_a_fitted_model_has_the_contact_force_at_the_fitted_indentation(model):
     case = under("fit=0.45e-6")
     fitted, stops = (
         spring_of(case.specimen(each)).force(np.array([45.45e-6]), np.zeros(1))[0]
@@ -53,7 +53,7 @@ def test_a_fit_has_the_force_of_the_stops_at_its_indentation(model):
 
 
 @pytest.mark.thorough
-def test_models_are_compared_up_to_the_frequency_given():
+def test_models_are_compared_up_to_the_requested_frequency():
     short = Case(accuracy=Accuracy.QUICK, duration_s=0.6, window_s=0.25, highest_hz=300.0)
     evidence = Evidence(lambda study: solve_study(study, workers=2))
     low, all_of_it = (
@@ -64,14 +64,14 @@ def test_models_are_compared_up_to_the_frequency_given():
     assert all_of_it < 0.9
 
 
-def test_a_sweep_of_constant_displacement_is_the_linear_sweep_up_or_down():
+def test_the_sweep_option_gives_a_linear_sweep_up_or_down():
     assert sweep_of(CASE)[1] == LinearSweep(150.0, 350.0, 200.0, 5e-6)
     assert sweep_of(under("sweep=down"))[1] == LinearSweep(350.0, 150.0, 200.0, 5e-6)
     assert sweep_of(under("sweep-amplitude=4e-6"))[1].amplitude_m == 4e-6
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 3.0])
-def test_the_amplitude_of_a_sweep_goes_with_the_power_of_frequency_that_is_given(power):
+def test_the_sweep_amplitude_follows_the_requested_power_of_frequency(power):
     even, drive = sweep_of(under(f"sweep-falls={power}"))
     rate_hz = drive.sample_rate_hz
     for at_s in (0.0, 100.0, 199.0):
@@ -82,7 +82,7 @@ def test_the_amplitude_of_a_sweep_goes_with_the_power_of_frequency_that_is_given
 
 
 @pytest.mark.thorough
-def test_exponents_by_ode45_match_its_steps_where_masses_collide():
+def test_the_exponents_option_uses_ode45_only_for_colliding_points():
     case = under("exponents=ode45", duration_s=0.3, window_s=0.1)
     frequency_hz = np.array([30.0, 260.0])
     some = np.ones(2)
@@ -103,7 +103,7 @@ def test_options_for_sum_logarithm_and_gap_are_applied():
     )
 
 
-def test_every_option_takes_its_own_example():
+def test_every_option_accepts_its_own_example():
     for name, option in OPTIONS.items():
         assert parse_option(f"{name}={option.example}").of(CASE).name
 
@@ -133,7 +133,7 @@ def test_an_unknown_word_is_refused_with_the_known_words(said, answer):
         parse_option(said)
 
 
-def test_claims_that_hold_under_every_setting_are_only_counted():
+def test_claims_that_always_hold_have_no_row_in_the_settings_table():
     wanted = at_least("it", "", 1.0)
 
     @claim("", "", wanted)

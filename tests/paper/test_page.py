@@ -58,7 +58,7 @@ def rows(page):
     }
 
 
-def test_verdicts_are_counted_and_written_with_their_values(found):
+def test_the_claims_page_counts_verdicts_and_shows_values(found):
     page = reproduction_document(found)
     assert [found.count(each) for each in Verdict] == [1, 0, 1, 1]
     assert "Of 3 claims 1 hold under the defaults," in page
@@ -73,14 +73,14 @@ def test_the_page_lists_only_options_that_uphold_a_claim(found):
     assert "exponent: 60 1/s" not in page
 
 
-def test_differences_from_the_paper_come_first_with_the_option_that_agrees(found):
+def test_the_claims_page_begins_with_differences_and_agreeing_options(found):
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
     assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary
     assert "- **third**: It is so with third. It holds under none of 1 options tested." in summary
 
 
-def test_an_option_that_some_starts_uphold_is_reported_with_their_number():
+def test_an_option_that_holds_from_some_starts_is_reported_with_their_number():
     """A sweep downwards held for most starts, and the page said that it does not hold."""
 
     def measure(reading):
@@ -104,7 +104,7 @@ def test_the_score_names_the_best_damping_and_the_failed_claims(found):
     assert page.endswith("![A figure](images/it.png)\n")
 
 
-def test_the_report_begins_with_the_count_and_has_a_card_for_each_section(found, tmp_path):
+def test_the_claims_report_begins_with_counts_and_has_a_card_per_section(found, tmp_path):
     score, levels = score_figure(found.scores), score_figure(found.scores)
     path = write_page(reproduction_page(found, levels, score), tmp_path / "report.html")
     page = Page(path.read_text(encoding="utf-8"))
@@ -125,11 +125,11 @@ def test_the_report_begins_with_the_count_and_has_a_card_for_each_section(found,
     assert len(page.visible.split()) <= 2000
 
 
-def test_every_claim_has_its_own_key():
+def test_every_claim_has_a_unique_key():
     assert len({claim.key for claim in CLAIMS}) == len(CLAIMS)
 
 
-def test_the_page_in_docs_has_the_claims_columns_and_bounds_of_this_code():
+def test_the_claims_page_in_docs_matches_the_claims_in_the_code():
     page = PAGE.read_text(encoding="utf-8")
     kept = rows(page)
     assert list(kept) == [claim.key for claim in CLAIMS]
@@ -141,7 +141,7 @@ def test_the_page_in_docs_has_the_claims_columns_and_bounds_of_this_code():
         assert all(f"{wanted.name}: ".replace("|", "&#124;") in row for wanted in each.wanted)
 
 
-def test_the_page_in_docs_scores_the_dampings_of_this_code_and_shows_its_figures():
+def test_the_claims_page_in_docs_has_the_damping_scores_and_figures():
     page = PAGE.read_text(encoding="utf-8")
     scored = re.findall(r"^\| (\S+) s \| \d+ of (\d+) \|", page, re.MULTILINE)
     asked = sum(claim.is_scored for claim in CLAIMS)

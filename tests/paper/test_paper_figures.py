@@ -42,7 +42,7 @@ def numbers(table, heading):
 @pytest.mark.parametrize(
     "number", [1, 2, 3, 5, 7, *(pytest.param(n, marks=pytest.mark.slow) for n in (6, 8, 9, 11))]
 )
-def test_a_figure_comes_in_every_format_with_its_numbers(solved, number, tmp_path):
+def test_a_paper_figure_is_saved_in_every_format_with_its_numbers(solved, number, tmp_path):
     found = drawn(solved, number)
     paths = found.save(tmp_path, list(ImageKind))
     heads = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
@@ -68,7 +68,7 @@ def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solv
 
 
 @pytest.mark.thorough
-def test_figure_3_shades_the_frequencies_that_collide_and_no_others(solved):
+def test_figure_3_shades_only_the_frequencies_with_collisions(solved):
     results = solved(paper_figure(3).studies(SHORT)[0])
     for amplitude_m, table in zip(AMPLITUDES_M, drawn(solved, 3).tables, strict=True):
         curve = responses(results, amplitude=amplitude_m)
@@ -78,7 +78,7 @@ def test_figure_3_shades_the_frequencies_that_collide_and_no_others(solved):
     assert shares[-1] > 0.5
 
 
-def test_shading_reaches_halfway_to_the_neighbours():
+def test_collision_shading_extends_halfway_to_neighbouring_points():
     class Recorder:
         def __init__(self):
             self.spans = []
@@ -108,7 +108,7 @@ def test_figure_7_has_the_papers_rates_at_the_weakest_level(solved):
 
 
 @pytest.mark.thorough
-def test_the_argument_of_the_logarithm_is_an_option(solved):
+def test_the_argument_of_the_logarithm_is_an_option_of_figure_7(solved):
     other = FigureOptions(
         accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED
     )

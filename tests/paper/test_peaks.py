@@ -14,7 +14,7 @@ def resonances(*middles_hz, heights=None):
     return sum(h / (1 + ((GRID - f) / 10.0) ** 2) for f, h in zip(middles_hz, chosen, strict=True))
 
 
-def test_peaks_of_little_damping_are_the_natural_frequencies():
+def test_peaks_with_little_damping_are_at_the_natural_frequencies():
     specimen = gong2025(damping_time_s=1e-7)
     np.testing.assert_allclose(linear_peaks(specimen, 5.0, 605.0), specimen.natural_frequencies_hz, atol=0.02)
     np.testing.assert_allclose(bound_peaks(specimen, 5.0, 605.0), specimen.bound_frequencies_hz, atol=0.02)
@@ -27,13 +27,13 @@ def test_ripples_are_not_peaks_and_missing_points_are_skipped():
     np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
 
 
-def test_the_two_highest_peaks_ascend_and_the_third_is_relative_to_the_second():
+def test_the_two_highest_peaks_are_sorted_and_the_third_height_is_relative():
     first, second, following = two_highest(GRID, resonances(100.0, 300.0, 500.0, heights=(2.0, 9.0, 8.0)))
     assert (first, second) == (300.0, 500.0)
     assert following == pytest.approx(2.0 / 8.0, rel=0.05)
     assert two_highest(GRID, resonances(100.0, 300.0))[2] == 0.0
 
 
-def test_without_peaks_there_is_no_number():
+def test_a_curve_without_peaks_gives_nan():
     assert np.isnan(nearest(np.array([]), (95.0, 266.0))).all()
     assert np.isnan(two_highest(GRID, 1.0 / GRID)).all()

@@ -48,7 +48,7 @@ def test_ode45_has_errors_of_the_size_of_its_tolerances():
     assert errors[2] < 1e-6
 
 
-def test_motions_computed_together_equal_single_ones():
+def test_motions_computed_together_equal_motions_computed_singly():
     starts = np.array([MOVING, 2.0 * MOVING, -MOVING])
     for method in (ode45(), runge_kutta(2e-6)):
         together = textbook_states(gong2025(), DRIVE, method, 5e-4, starts)
@@ -57,7 +57,7 @@ def test_motions_computed_together_equal_single_ones():
             assert state_error(end, textbook_states(gong2025(), DRIVE, method, 5e-4, [start])[0]) < 1e-8
 
 
-def test_a_free_impact_keeps_its_energy_under_ode45_and_not_under_long_steps():
+def test_ode45_conserves_impact_energy_and_long_runge_kutta_steps_do_not():
     kept = [energy_kept(ode45(), each, np.zeros(1))[0] for each in (0.03, 0.1, 0.3)]
     np.testing.assert_allclose(kept, 1.0, atol=0.01)
     mean = energy_kept(runge_kutta(2e-5), 0.03, np.linspace(0, 2e-5, 20)).mean()
@@ -86,7 +86,7 @@ def test_chaos_under_a_tight_tolerance_matches_the_exact_motion():
     assert usual.mean() > 1.3 * exact
 
 
-def test_a_diverging_motion_has_no_number():
+def test_a_diverging_motion_gives_a_nan_exponent():
     drives = [Harmonic(260.0, 5e-6), Harmonic(260.0, 1e-7)]
     found = textbook_exponents(gong2025(), drives, runge_kutta(1e-3), 0.5, 0.1)
     assert math.isnan(found[0])
@@ -100,7 +100,7 @@ def test_an_invalid_step_or_tolerance_is_refused(value):
         ode45(absolute=value)
 
 
-def test_rest_has_no_exponent():
+def test_no_drives_give_no_exponents():
     """As where nothing collides: the page of the paper's claims follows only motions that do."""
     assert textbook_exponents(gong2025(), [], ode45()).shape == (0,)
     assert textbook_exponents(gong2025(), [], runge_kutta(1e-3)).shape == (0,)
