@@ -27,7 +27,7 @@ def runner():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("path", [*found("campaign"), *found("study")], ids=lambda path: path.stem)
-def test_a_broken_toml_file_is_refused_by_name(runner, path):
+def test_a_broken_toml_file_is_refused_with_its_name_in_the_error(runner, path):
     ending = runner.run(toml_files.reading(path.parent.name, path.read_bytes()))
     assert (ending.code, ending.faults, ending.made) == (1, (), ())
     assert ending.err.startswith("error: broken.toml: ")
@@ -35,7 +35,7 @@ def test_a_broken_toml_file_is_refused_by_name(runner, path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("path", found("imports"), ids=lambda path: path.stem)
-def test_a_broken_imported_file_is_refused_by_name(runner, path):
+def test_a_broken_imported_file_is_refused_with_its_name_in_the_error(runner, path):
     case = imported_files.reading(path.suffix, path.read_bytes(), *imported_files.MAKING)
     ending = runner.run(case)
     assert (ending.code, imported_files.faults(case, ending)) == (1, ())
@@ -45,7 +45,7 @@ def test_a_broken_imported_file_is_refused_by_name(runner, path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("suffix", imported_files.WRITERS)
-def test_the_unbroken_files_of_the_attack_can_be_imported(runner, suffix):
+def test_the_valid_files_from_which_mutants_are_made_can_be_imported(runner, suffix):
     ending = runner.run(
         imported_files.reading(suffix, imported_files.good_files()[suffix], *imported_files.MAKING)
     )
@@ -69,7 +69,7 @@ LONG = "x" * 300
     ],
     ids=lambda arguments: arguments[0],
 )
-def test_an_impossible_file_name_gives_one_sentence(runner, arguments):
+def test_an_impossible_file_name_gives_a_one_sentence_error(runner, arguments):
     ending = runner.run(Case(arguments, toml_files.GOOD))
     assert (ending.code, ending.faults) == (1, ())
     assert "is too long" in ending.err

@@ -18,7 +18,7 @@ REFUSED = replace(GOOD, code=1, err="error: what was given is not allowed; give 
 
 
 @pytest.mark.parametrize("ending", [GOOD, REFUSED, replace(GOOD, code=2, err="Usage: vibench ...")])
-def test_results_and_one_sentence_errors_are_no_faults(ending):
+def test_results_and_one_sentence_errors_do_not_count_as_faults(ending):
     assert ending.faults == ()
 
 
@@ -54,7 +54,7 @@ def test_a_mutant_depends_on_its_seed_and_number_only():
     assert mutants(Shard(7, 40, until_s=time.monotonic() - 1)) == {}
 
 
-def test_shards_are_added_up(tmp_path):
+def test_tallies_of_shards_are_added_up(tmp_path):
     first, second = Tally("toml"), Tally("toml")
     first.count(0, took_s=2.0, peak_bytes=5)
     second.count(0, took_s=1.0, peak_bytes=7)
@@ -85,7 +85,7 @@ def test_a_shard_continues_from_its_file(tmp_path):
         tried(7, part=1)
 
 
-def test_an_empty_document_has_mutants():
+def test_an_empty_document_can_be_mutated():
     for number in range(200):
         chance = random.Random(number)
         assert isinstance(mutated_bytes(b"", chance, (b"abc",)), bytes)

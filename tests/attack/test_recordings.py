@@ -24,12 +24,12 @@ def found_again(name, seed, number):
 
 @pytest.mark.parametrize(("name", "seed", "number"), FOUND)
 @pytest.mark.attack
-def test_earlier_findings_are_fixed(name, seed, number):
+def test_faults_found_by_earlier_attacks_stay_fixed(name, seed, number):
     assert found_again(name, seed, number) == ()
 
 
 @pytest.mark.thorough
-def test_good_recordings_of_every_sort_give_numbers(tmp_path):
+def test_valid_recordings_give_reproducible_results(tmp_path):
     for name in ("dwell.h5", "with_result.h5"):
         path = tmp_path / name
         path.write_bytes(good_recordings()[name])
@@ -59,7 +59,7 @@ def test_a_bit_flip_is_detected_or_changes_no_result(count):
 
 @pytest.mark.parametrize("count", [pytest.param(12, marks=pytest.mark.attack)])
 @pytest.mark.timeout(1800)
-def test_a_broken_recording_gives_one_sentence(count):
+def test_a_broken_recording_gives_a_one_sentence_error(count):
     tally = recordings_mutants.attack(Shard(seed=3, count=count))
     assert tally.findings == []
     assert tally.codes["1"] > count / 2
@@ -80,7 +80,7 @@ def test_faults_at_exact_system_calls_lose_or_repeat_no_point(faults):
 
 @pytest.mark.attack
 @pytest.mark.timeout(1800)
-def test_twelve_kills_lose_or_repeat_no_point():
+def test_twelve_kills_of_a_campaign_lose_or_repeat_no_point():
     tally = Tally("kills")
     number = kills = 0
     # Whether a campaign ends before the moment of its kill depends on the machine: so its number varies.
