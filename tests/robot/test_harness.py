@@ -26,7 +26,7 @@ def robot(qtbot):
     return made
 
 
-def test_outdated_numbers_are_found(robot):
+def test_the_robot_finds_numbers_that_do_not_match_the_inputs(robot):
     robot.label.setEnabled(False)
     robot.look()
     assert robot.findings == []
@@ -39,7 +39,7 @@ def test_outdated_numbers_are_found(robot):
     assert "type_value" in found
 
 
-def test_unexpected_errors_of_another_process_are_found(robot, tmp_path):
+def test_the_robot_finds_unexpected_errors_of_another_process(robot, tmp_path):
     with (tmp_path / "stderr").open("w+") as told, (tmp_path / "stderr").open() as robot.errors:
         subprocess.run([sys.executable, "-c", "print(0)"], stderr=told, stdout=told, check=True)
         robot.read_errors()
@@ -49,7 +49,7 @@ def test_unexpected_errors_of_another_process_are_found(robot, tmp_path):
     assert "no attribute 'nothing'" in robot.findings[0]
 
 
-def test_an_exception_is_found_with_its_place(robot):
+def test_the_robot_reports_an_exception_with_its_source_file(robot):
     try:
         robot.nothing  # noqa: B018
     except AttributeError as error:
