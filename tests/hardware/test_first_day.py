@@ -68,14 +68,14 @@ def level(bench):
     return SHARE * bench.rig.generator.amplitude_limit_vpp
 
 
-def test_the_bench_passes_its_check(bench, tmp_path):
+def test_the_real_bench_passes_its_check(bench, tmp_path):
     # Noise floor, offsets, polarity, gain against the knob, clocks, latency, and whether silence is silent.
     result = check_bench(bench, tmp_path)
     failed = [f"{each.name}: {each.value}" for each in result.findings if each.verdict is Verdict.FAIL]
     assert not failed
 
 
-def test_a_stop_is_silence(bench, tmp_path):
+def test_the_drive_is_silent_before_a_dwell(bench, tmp_path):
     excitation = Dwell(amplitude_vpp=level(bench), frequency_hz=160, settle_s=0.5, duration_s=1.0)
     path = measured(bench, excitation, tmp_path)
     with open_recording(path) as recording:
@@ -91,7 +91,7 @@ def test_a_dwell_is_recorded_at_its_frequency(bench, tmp_path):
     assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=300e-6)
 
 
-def test_a_sweep_keeps_to_its_plan(bench, tmp_path):
+def test_a_sweep_is_recorded_as_planned(bench, tmp_path):
     excitation = SineSweep(
         amplitude_vpp=level(bench), start_hz=200, stop_hz=300, duration_s=8, step_s=0.25, settle_s=0.5
     )
@@ -99,7 +99,7 @@ def test_a_sweep_keeps_to_its_plan(bench, tmp_path):
     assert {each.what: each.verdict.value for each in found.checks}["Sweep as planned"] == "passed"
 
 
-def test_noise_is_recorded_whole(bench, tmp_path):
+def test_noise_is_recorded_without_lost_realisations(bench, tmp_path):
     excitation = WhiteNoise(
         amplitude_vpp=level(bench), band_start_hz=50, band_stop_hz=600, repetition_hz=2, periods=4,
         realisations=2, settle_s=1.0,
