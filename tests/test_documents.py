@@ -89,19 +89,19 @@ def test_every_dotted_name_in_a_document_resolves(document):
 
 
 @every_document
-def test_every_path_in_a_document_leads_to_something(document):
+def test_every_path_in_a_document_exists(document):
     named = sorted(set(PATH.findall(text_of(document))))
     return [path for path in named if not list(ROOT.glob(path))]
 
 
 @every_document
-def test_every_link_in_a_document_leads_to_a_file(document):
+def test_every_link_in_a_document_points_to_a_file(document):
     links = sorted(set(LINK.findall(text_of(document))))
     return [link for link in links if not (document.parent / link).exists()]
 
 
 @every_document
-def test_every_import_of_ours_in_the_code_of_a_document_works(document):
+def test_every_vibench_import_in_a_document_works(document):
     missing = []
     for code in CODE.findall(text_of(document)):
         for node in ast.walk(ast.parse(code)):
@@ -186,7 +186,7 @@ def ordered_rooms():
 
 
 @pytest.mark.parametrize(("package", "rooms"), list(ordered_rooms()))
-def test_the_page_on_architecture_lists_packages_in_order_with_their_docstrings(package, rooms):
+def test_the_architecture_page_lists_packages_in_order_with_docstrings(package, rooms):
     _, section = text_of(ROOT / "docs" / "architecture.md").split(f"### `{package}`\n")
     listed = re.findall(r"^\| `(\w+)` \| (.+) \|$", section.split("\n### ")[0].split("\n## ")[0], flags=re.M)
     said = [importlib.util.find_spec(f"{package}.{room}") for room in rooms]

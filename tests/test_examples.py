@@ -28,14 +28,14 @@ def lines_of(script, *arguments):
     return result.stdout.splitlines()
 
 
-def test_at_260_hz_the_specimen_strikes_its_stops_at_5_micrometres_but_not_at_1():
+def test_the_response_example_has_impacts_at_5_um_and_none_at_1_um():
     weak, strong = lines_of("response_and_exponent.py")
     assert re.search(r"^1 µm: Response I [\d.]+, II [\d.]+, 0 impacts .* exponent -[\d.]+ ±", weak)
     assert int(re.search(r"(\d+) impacts", strong)[1]) > 0
 
 
 @pytest.mark.thorough
-def test_branches_break_their_symmetry_and_the_exponents_add_up():
+def test_the_branches_example_finds_symmetry_breaking_and_the_exponent_sum():
     lines = lines_of("branches_and_exponents.py")
     assert sum(line.startswith("period 1, mirrored") for line in lines) == 1
     assert any(line.startswith("  symmetry breaking at 89.57") for line in lines)
@@ -44,7 +44,7 @@ def test_branches_break_their_symmetry_and_the_exponents_add_up():
     assert 4.0 < float(re.search(r"dimension ([\d.]+)", lines[-1])[1]) < 5.0
 
 
-def test_impacts_fill_the_gap_of_a_swept_chain():
+def test_the_chain_example_shows_transmission_in_the_gap_with_impacts():
     gap, weak, strong = lines_of("chain_and_its_gap.py")
     assert gap == "gap of the endless chain: 373.4 to 462.0 Hz"
     within, above = (
@@ -57,7 +57,7 @@ def test_impacts_fill_the_gap_of_a_swept_chain():
     assert above[0] > 100.0 * within[0]
 
 
-def test_a_recording_is_read_without_vibench(tmp_path):
+def test_the_reading_example_reads_a_recording_without_vibench(tmp_path):
     channel = ChannelHeader(
         "m0_velocity", "Dev1/ai0", "velocity", "m s-1", physical_per_volt=0.125, range_v=5.0
     )
@@ -77,7 +77,7 @@ def test_a_recording_is_read_without_vibench(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_a_campaign_on_the_virtual_rig_finds_the_resonances_of_the_specimen(tmp_path):
+def test_the_campaign_example_finds_the_resonances_of_the_specimen(tmp_path):
     lines = lines_of("campaign_on_the_virtual_rig.py", tmp_path / "recordings")
     assert sum(line.endswith(".h5: recorded") for line in lines) == 15
     found = [float(re.search(r"at ([\d.]+)", line)[1]) for line in lines if line.startswith("resonance")]

@@ -101,7 +101,7 @@ def trespasses(room, package, target, names):
     )
 
 
-def test_no_import_reaches_past_a_public_api():
+def test_no_import_bypasses_a_public_api():
     found = [
         f"{path.relative_to(ROOT)}:{line}: {trespass}"
         for portion, _, room, path in sources()
@@ -119,11 +119,11 @@ def test_no_import_reaches_past_a_public_api():
         ("vibench.analysis.sine", "vibench.analysis", "vibench.analysis.live", ["_view"]),
     ],
 )
-def test_a_planted_trespass_is_found(room, package, target, names):
+def test_an_import_that_bypasses_a_public_api_is_found(room, package, target, names):
     assert list(trespasses(room, package, target, names))
 
 
-def test_modules_behind_a_public_api_are_private_and_those_of_inner_packages_are_not():
+def test_only_modules_directly_behind_a_public_api_are_private():
     loose = [
         name
         for _, name, room, path in sources()
@@ -166,7 +166,7 @@ def test_every_public_api_has_a_description_and_all_its_names(room):
         *("vibench.analysis.prediction", "vibench.cli.paper"),
     ],
 )
-def test_the_example_of_a_public_api_runs(face):
+def test_the_docstring_example_of_a_public_api_runs(face):
     result = doctest.testmod(importlib.import_module(face))
     assert result.attempted
     assert result.failed == 0

@@ -40,7 +40,7 @@ NO_VERBS = {"A", "An", "Each", "Every", "If", "It", "No", "The", "There", "What"
         pytest.param(["lint-imports", "--no-cache"], id="imports-point-one-way"),
     ],
 )
-def test_the_house_rules_hold(command):
+def test_linters_and_project_checks_pass(command):
     result = subprocess.run(
         [str(TOOLS / command[0]), *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -48,7 +48,7 @@ def test_the_house_rules_hold(command):
 
 
 @pytest.mark.parametrize("portion", PORTIONS)
-def test_each_portion_of_the_namespace_comes_from_its_own_folder(portion):
+def test_each_namespace_package_is_imported_from_its_own_folder(portion):
     package = importlib.import_module(f"vibench.{portion}")
     assert Path(package.__file__).parent == ROOT / portion / "vibench" / portion
     assert (Path(package.__file__).parent / "py.typed").is_file()
@@ -56,7 +56,7 @@ def test_each_portion_of_the_namespace_comes_from_its_own_folder(portion):
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is a copy, not a checkout")
-def test_a_checkout_contains_nothing_that_a_program_generated():
+def test_git_tracks_no_generated_file():
     """A folder of results in a checkout would rename the results of a newcomer's first demo."""
     command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
@@ -105,12 +105,12 @@ def test_commit_titles_are_short_imperatives():
         ("Align the channels of an imported file by the times at which they start", False),
     ],
 )
-def test_the_check_of_commit_titles_knows_imperatives(title, is_allowed):
+def test_the_commit_title_check_recognises_imperatives(title, is_allowed):
     assert (title_fault(title) == "") is is_allowed
 
 
 @pytest.mark.parametrize("folder", sorted(LINES_AT_MOST))
-def test_a_package_keeps_to_its_budget_of_lines(folder):
+def test_a_package_stays_within_its_line_budget(folder):
     sources = [
         path
         for path in (ROOT / folder).rglob("*")

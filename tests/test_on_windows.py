@@ -70,13 +70,13 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_posix_only_functions_exist_on_this_system():
+def test_the_posix_functions_removed_for_windows_tests_exist_here():
     # Were the names misspelt, or gone from Python, nothing would be tested.
     program = f"import os; print(sum(hasattr(os, each) for each in {POSIX_ONLY!r}))"
     assert int(ran("-c", program).stdout) > 25
 
 
-def test_a_run_can_be_held_and_its_recording_marked(here):
+def test_a_run_on_windows_can_be_held_and_its_recording_marked(here):
     said = ran("-c", LOCKS.format(folder=str(here))).stdout.splitlines()
     assert "is in use by process" in said[0]
     assert said[1:] == ["True b'\\x00\\x00abc\\x00\\x00\\x00'", "False"]
@@ -84,7 +84,7 @@ def test_a_run_can_be_held_and_its_recording_marked(here):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_a_campaign_is_measured_verified_and_analysed(here):
+def test_a_campaign_is_measured_verified_and_analysed_on_windows(here):
     rig = str(ROOT / "hardware_configs" / "virtual_rig.toml")
     measure = ("-m", "tests.windows_here", "measure", "campaign.toml", "--bench", rig, "--out", "a folder")
     ran(*measure, folder=here)
@@ -100,7 +100,7 @@ def test_a_campaign_is_measured_verified_and_analysed(here):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_a_study_is_solved_by_processes_that_are_spawned(here):
+def test_a_study_on_windows_is_solved_by_spawned_processes(here):
     ran("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--workers", "1", folder=here)
     again = ran("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--resume", folder=here)
     assert "2 of 2 points, 0 failed (complete)" in again.stdout

@@ -73,7 +73,7 @@ def test_every_public_function_is_documented():
     assert {name: found for name, found in short.items() if found} == {}
 
 
-def test_every_public_class_states_what_it_is():
+def test_every_public_class_has_a_docstring():
     classes = {name: found for name, found in public() if inspect.isclass(found)}
     assert [name for name, found in classes.items() if not found.__dict__.get("__doc__")] == []
 
@@ -84,7 +84,7 @@ def left_open(angle, mass_kg, limit=1.0):
         raise ValueError(mass_kg)
 
 
-def test_a_planted_omission_is_found():
+def test_an_undocumented_parameter_is_found():
     assert list(shortcomings(left_open)) == ["parameter angle", "parameter limit", "what it raises"]
 
 

@@ -45,28 +45,28 @@ print(path.read_bytes() == whole, [each.name for each in path.parent.iterdir()])
     ("writer", "error"),
     [("knobs", "ConfigurationError"), ("toml", "ConfigurationError"), ("table", "OSError")],
 )
-def test_a_refused_file_leaves_the_older_one_as_it_was(tmp_path, writer, error):
+def test_a_failed_write_leaves_the_existing_file_unchanged(tmp_path, writer, error):
     script = [sys.executable, "-c", WRITERS[writer] + REFUSED, str(tmp_path / "file")]
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
     assert (ended.stdout, ended.stderr) == (f"{error}\nTrue ['file']\n", "")
 
 
 @pytest.mark.parametrize("named", [None, "another"])
-def test_a_refused_write_names_the_file(tmp_path, named):
+def test_a_failed_write_names_the_file_in_the_error(tmp_path, named):
     """An error of a write has no name."""
     with pytest.raises(OSError, match="full") as refused, replace_file(tmp_path / "file"):
         raise OSError(errno.ENOSPC, "full", named)
     assert refused.value.filename == (named or str(tmp_path / "file"))
 
 
-def test_a_refused_rename_names_the_file(tmp_path):
+def test_a_failed_rename_names_the_file_in_the_error(tmp_path):
     """The unfinished file has a name that nobody gave."""
     with pytest.raises(FileNotFoundError) as refused, replace_file(tmp_path / "file") as coming:
         coming.unlink(missing_ok=True)
     assert refused.value.filename == str(tmp_path / "file")
 
 
-def test_a_link_stays_a_link_and_its_target_is_replaced(tmp_path):
+def test_writing_to_a_link_keeps_the_link_and_replaces_its_target(tmp_path):
     (tmp_path / "target").write_text("first")
     (tmp_path / "link").symlink_to(tmp_path / "target")
     with replace_file(tmp_path / "link") as coming:
@@ -108,7 +108,7 @@ def writes(source):
 
 
 @pytest.mark.thorough
-def test_no_file_of_a_user_is_written_under_its_final_name():
+def test_user_files_are_never_written_directly_under_their_final_name():
     found = [
         f"{path.name}: {call}"
         for package in ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig", "extensions")

@@ -34,7 +34,7 @@ def notebook(site, name):
     return site / link
 
 
-def test_no_text_of_the_reference_is_taken_for_a_type(site):
+def test_no_reference_text_is_rendered_as_a_type(site):
     pages = sorted((site / "reference").glob("*.html"))
     assert len(pages) > 15
     assert [page.name for page in pages if ">Type<" in page.read_text(encoding="utf-8")] == []
@@ -42,7 +42,7 @@ def test_no_text_of_the_reference_is_taken_for_a_type(site):
     assert "Which motion of m0 that is: the one against the base, or the absolute one" in unescape(page)
 
 
-def test_paths_of_pages_are_links(site):
+def test_paths_of_pages_are_rendered_as_links(site):
     for page in site.rglob("*.html"):
         text = re.sub(r"<(a|code|pre|title)\b.*?</\1>", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
         assert re.findall(r"\bdocs/[\w/-]+\.md", text) == [], page.name
@@ -67,12 +67,12 @@ def test_the_shortest_notebook_runs(site, tmp_path):
 
 
 @pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda path: path.stem)
-def test_code_of_a_tutorial_fits_its_page(tutorial):
+def test_tutorial_code_lines_fit_the_page_width(tutorial):
     lines = "".join(CELL.findall(tutorial.read_text(encoding="utf-8"))).splitlines()
     assert [line for line in lines if len(line) > 100] == []
 
 
-def test_a_site_can_be_built_with_its_extra_alone():
+def test_the_docs_extra_installs_everything_needed_to_build_the_site():
     program = Path(__file__).parent.parent / "pyproject.toml"
     (extra,) = re.findall(r"^docs = (\[.*\])$", program.read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert {"vibench[bench]", "myst-nb>=1.2,<2"} <= set(json.loads(extra))

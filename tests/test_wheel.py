@@ -88,7 +88,7 @@ def users_folder(tmp_path):
 
 
 @pytest.mark.thorough
-def test_the_wheel_holds_types_templates_and_the_files_that_are_shipped(wheel):
+def test_the_wheel_contains_types_templates_and_shipped_files(wheel):
     names = set(ZipFile(wheel).namelist())
     for portion in PORTIONS:
         assert f"vibench/{portion}/py.typed" in names
@@ -105,7 +105,7 @@ def test_the_wheel_holds_types_templates_and_the_files_that_are_shipped(wheel):
 
 
 @pytest.mark.thorough
-def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_imported(wheel):
+def test_the_wheel_contains_every_source_file_at_its_import_path(wheel):
     names = {
         name
         for name in ZipFile(wheel).namelist()
@@ -123,7 +123,7 @@ def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_importe
 
 
 @pytest.mark.thorough
-def test_a_script_beside_files_with_names_of_our_folders_imports_vibench(python, users_folder):
+def test_a_script_imports_vibench_despite_local_files_named_like_its_folders(python, users_folder):
     script = users_folder / "script.py"
     script.write_text(f"{FACES}\nimport vibench.sim\nprint(vibench.sim.__file__)\n")
     imported = Path(run(python, script, cwd=users_folder).strip())
@@ -139,7 +139,7 @@ def test_every_name_of_every_public_api_resolves_from_the_wheel(python, users_fo
 
 
 @pytest.mark.thorough
-def test_the_command_works_as_a_module_and_as_a_program(python, users_folder):
+def test_the_vibench_command_works_as_a_module_and_as_a_program(python, users_folder):
     assert "predict" in run(python, "-m", "vibench.cli", "--help", cwd=users_folder)
     command = python.parent / ("vibench.exe" if sys.platform == "win32" else "vibench")
     arguments = ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json")
@@ -172,7 +172,7 @@ def lowest_allowed():
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_it_works_with_the_lowest_version_of_every_library_and_the_newest_of_theirs(
+def test_vibench_works_with_the_lowest_version_of_every_library_and_newest_dependencies(
     wheel, tmp_path, users_folder
 ):
     """docs/decisions/0005-dependencies.md says what each lower bound is for."""
