@@ -24,14 +24,14 @@ def benchmark(*state_errors, regime=Regime.PERIODIC):
         ((1.3e-8, 1.0e-8, 0.9e-8), "No level reduces the error", ["standard", "reference"]),
     ],
 )
-def test_a_level_without_improvement_is_not_reported_as_more_accurate(state_errors, said, without):
+def test_an_accuracy_level_without_improvement_is_reported_as_such(state_errors, said, without):
     found = benchmark(*state_errors)
     assert found.advice.startswith(said)
     assert found.advice.endswith("reference takes 2.0 times as long as quick.")
     assert [level.accuracy.value for level, _ in found.without_gain] == without
 
 
-def test_levels_that_cannot_differ_are_not_criticised():
+def test_levels_that_cannot_differ_are_not_reported_as_lacking_gain():
     assert benchmark(9.9e-14, 9.9e-14, 9.9e-14, regime=Regime.FREE).without_gain == ()
     assert benchmark(None, None, None, regime=Regime.CHAOTIC).without_gain == ()
     assert "scatters by 3.2%" in benchmark(None, None, None, regime=Regime.CHAOTIC).advice

@@ -12,7 +12,7 @@ STILL = Harmonic(100.0, 0.0)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])
 
 
-def test_without_contact_the_solution_is_the_matrix_exponential():
+def test_the_independent_solution_without_contact_is_the_matrix_exponential():
     specimen, drive = gong2025(contact="linear"), Harmonic(130.0, 20e-6, 0.3)
     omega = 2.0 * math.pi * drive.frequency_hz
     unit = np.linalg.inv(specimen.mass_matrix)

@@ -40,7 +40,7 @@ def test_higher_levels_improve_periodic_motion_and_not_chaos():
     assert Accuracy.REFERENCE not in [level.accuracy for level, _ in periodic.without_gain]
 
 
-def test_in_chaos_the_start_matters_more_than_the_level():
+def test_chaotic_scatter_exceeds_differences_between_accuracy_levels():
     chaotic = measure_motion(MOTIONS[-1], SHORT)
     for level in chaotic.levels:
         assert level.state_error is None
