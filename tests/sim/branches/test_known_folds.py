@@ -23,7 +23,7 @@ def folds(specimen, path, low, high):
 
 
 @pytest.mark.thorough
-def test_over_frequency_the_hardening_specimen_folds_at_98_296_and_116_296_hz():
+def test_a_hardening_branch_over_frequency_folds_at_98_296_and_116_296_hz():
     found = folds(hardening(), FrequencyPath((3e-6,)), 95.0, 125.0)
     assert sorted(each.frequency_hz for each in found) == pytest.approx([98.296, 116.296], abs=2e-3)
 
@@ -38,7 +38,7 @@ def test_over_frequency_the_hardening_specimen_folds_at_98_296_and_116_296_hz():
         (285.0, 9.32, 17.3),
     ],
 )
-def test_over_level_it_folds_at_both_ends_of_its_unstable_stretch(frequency, lower_um, upper_um):
+def test_a_hardening_branch_over_level_folds_at_the_ends_of_its_unstable_part(frequency, lower_um, upper_um):
     found = folds(hardening(), AmplitudePath(frequency), 0.3e-6 * lower_um, 1.3e-6 * upper_um)
     levels = sorted(1e6 * each.amplitude_m for each in found)
     assert levels[0] == pytest.approx(lower_um, abs=0.006)
@@ -46,7 +46,7 @@ def test_over_level_it_folds_at_both_ends_of_its_unstable_stretch(frequency, low
 
 
 @pytest.mark.thorough
-def test_with_stops_the_motion_with_contacts_begins_at_0_818_um_at_97_95_hz():
+def test_the_motion_with_contacts_begins_at_0_818_um_at_97_95_hz():
     specimen, path = gong2025(), AmplitudePath(97.95)
     found = list(shot_branches(specimen, path, 0.4e-6, 1.9e-6, MotionSearch(places=3, starts=4)))
     levels = [

@@ -94,7 +94,7 @@ class PiecewiseLinear:
 
 
 @pytest.mark.thorough
-def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
+def test_a_branch_with_linear_stops_matches_the_piecewise_exact_solution():
     specimen, amplitude = gong2025(contact="linear_gap"), 20e-6
     found = next(shot_branches(specimen, FrequencyPath((amplitude,)), 128.0, 140.0, FEW))
     assert found.shape is OrbitShape.MIRRORED
@@ -134,7 +134,7 @@ def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
 
 
 @pytest.mark.thorough
-def test_every_point_repeats_within_its_error(near_the_first_resonance):
+def test_every_branch_point_is_periodic_within_its_error(near_the_first_resonance):
     specimen = gong2025()
     for found in near_the_first_resonance:
         branch = found.branch
@@ -172,7 +172,7 @@ def test_the_asymmetric_branch_begins_and_ends_at_symmetry_breaking(near_the_fir
     assert sorted(joins) == pytest.approx(sorted(own), abs=0.02)
 
 
-def test_at_a_grazing_point_the_linear_motion_reaches_the_gap():
+def test_the_linear_motion_at_a_grazing_point_equals_the_gap():
     specimen = gong2025()
     free = gong2025(contact="linear")
     linear = steady_response(free, Harmonic(60.0, 1e-6), "reference", 20.0, 1.0)
@@ -196,7 +196,7 @@ def test_a_rigid_stop_branch_is_exact_until_a_grazing_contact():
             assert branch.events[-1].kind is BifurcationKind.GRAZING
 
 
-def test_each_point_uses_the_recorded_level_at_its_frequency():
+def test_each_branch_point_uses_the_recorded_level_at_its_frequency():
     specimen = gong2025()
     path = FrequencyPath((18e-6, 20e-6, 21e-6), (125.0, 130.0, 140.0))
     found = next(shot_branches(specimen, path, 126.0, 138.0, FEW))
