@@ -8,7 +8,7 @@ from vibench.sim import RigidStops, Specimen, gong2025
 from vibench.sim.chain import Chain, chain_of
 
 
-def test_only_the_link_to_the_base_resists_when_the_whole_chain_moves_as_one():
+def test_a_chain_moving_as_a_whole_stretches_only_the_spring_to_the_base():
     specimen = gong2025()
     together = chain_of(specimen, 5).stiffness_matrix @ np.ones(15)
     assert together[0] == pytest.approx(specimen.stiffnesses[0])

@@ -54,7 +54,7 @@ def noise(seed, count, rate_hz, rms_m):
         noise(2, 401, 2e3, 4e-6),
     ],
 )
-def test_a_negligible_neighbour_does_not_disturb_a_cell(drive):
+def test_a_cell_of_negligible_mass_does_not_disturb_its_neighbour(drive):
     """The heavy cell moves as the specimen does, whose intervals and contacts are another code."""
     heavy, lightness = gong2025(), 1e-12
     light = replace(
@@ -75,7 +75,7 @@ def test_a_negligible_neighbour_does_not_disturb_a_cell(drive):
 
 
 @pytest.mark.parametrize("drive", [LinearSweep(80.0, 300.0, 0.1, 20e-6), noise(3, 2001, 20e3, 20e-6)])
-def test_a_split_or_sampled_driven_run_equals_the_whole(drive):
+def test_a_split_or_sampled_chain_run_equals_the_whole_run(drive):
     chain = chain_of(gong2025(), 2)
     whole = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE)
     sampled = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE, sample_rate_hz=7e3)
@@ -95,7 +95,7 @@ def test_a_run_longer_than_its_drive_is_refused():
             integrate_chain(chain_of(gong2025(), 2), drive, 1.0)
 
 
-def test_base_motion_stretches_only_the_first_link():
+def test_base_motion_stores_energy_only_in_the_first_cell():
     chain = chain_of(gong2025(), 2)
     moved = chain_energies(chain, np.zeros((4, 2, 6)), np.full(4, 1e-5))
     np.testing.assert_allclose(moved[:, 0], 0.5 * chain.cells[0].stiffnesses[0] * 1e-10)
@@ -118,7 +118,7 @@ def test_stops_store_energy_only_in_contact():
 UNEQUAL = Chain((gong2025(damping_time_s=0.0), gong2025(damping_time_s=0.0)))
 
 
-def test_a_unit_of_equal_cells_has_the_folded_bands_of_one_cell():
+def test_a_unit_cell_of_two_equal_cells_has_the_folded_bands_of_one_cell():
     one, two = chain_of(UNEQUAL.cells[0], 1), UNEQUAL
     np.testing.assert_allclose(np.array(band_gaps(two))[:-1], np.array(band_gaps(one))[:-1], rtol=1e-9)
     half = band_frequencies_hz(one, [0.35, np.pi - 0.35])

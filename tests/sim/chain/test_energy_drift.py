@@ -68,7 +68,7 @@ def test_energy_is_conserved_for_every_law_drive_and_level(contact, cells, accur
 
 
 @pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
-def test_motion_deep_in_a_steep_contact_is_integrated_at_every_level(accuracy):
+def test_motion_deep_in_a_steep_contact_is_integrated_at_every_accuracy(accuracy):
     """At reference its steps asked for more than the digits of a number hold, and the run stalled."""
     specimen = gong2025(damping_time_s=0.0, contact="power:47")
     chain = chain_of(specimen, 1)
@@ -81,7 +81,7 @@ def test_motion_deep_in_a_steep_contact_is_integrated_at_every_level(accuracy):
 
 @pytest.mark.parametrize("contact", ["power:5", "power:29", "hertz", "linear_gap:2e5"])
 @pytest.mark.parametrize("gaps", [3.0, 1e3, pytest.param(1e6, marks=pytest.mark.thorough)])
-def test_a_failed_motion_ends_at_its_last_valid_state(contact, gaps):
+def test_a_failed_chain_run_ends_at_its_last_valid_state(contact, gaps):
     """Deep in a wall a run went on from a half-made window: 1e172 times the energy."""
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     start = np.zeros((2, 6))

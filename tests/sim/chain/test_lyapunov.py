@@ -13,7 +13,7 @@ pytestmark = pytest.mark.timeout(300)
 CHAOTIC = Harmonic(260.0, 5e-6)
 
 
-def test_without_contact_the_exponent_is_the_decay_of_the_slowest_mode():
+def test_the_exponent_of_a_chain_without_contact_is_the_slowest_decay():
     chain = chain_of(gong2025(contact="linear", damping_time_s=2e-4), 2)
     found = chain_lyapunov_exponent(chain, Harmonic(150.0, 1e-6), duration_s=2.0, settle_s=0.0)
     slowest = float(chain_modal_form(chain).rates.real.max())

@@ -32,7 +32,7 @@ UNEVEN = replace(gong2025(), dampings=(0.5, 0.0, 0.9))
         chain_of(UNEVEN, 3),
     ],
 )
-def test_the_modes_make_up_the_state_matrix_and_the_unit_matrix(chain):
+def test_the_modes_of_a_chain_rebuild_its_state_matrix(chain):
     modes, (system, _) = chain_modal_form(chain), chain_state_matrix(chain)
     one = (modes.shapes.T @ modes.rows).real
     again = (modes.shapes.T @ (modes.rates[:, None] * modes.rows)).real
@@ -41,7 +41,7 @@ def test_the_modes_make_up_the_state_matrix_and_the_unit_matrix(chain):
     assert np.max(np.abs(again - system) / scale) < 1e-10
 
 
-def test_coinciding_frequencies_have_a_full_set_of_modes():
+def test_modes_of_equal_frequency_form_a_complete_set():
     apart = replace(gong2025(), stiffnesses=(1e-9, *gong2025().stiffnesses[1:]), dampings=(0.0, 0.0, 0.0))
     chain = chain_of(apart, 6)
     modes = chain_modal_form(chain)
@@ -74,7 +74,7 @@ def test_a_finite_chain_responds_as_two_bloch_waves(frequency, cells, damping):
     np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-300)
 
 
-def test_in_a_gap_a_long_chain_decays_from_cell_to_cell_as_a_bloch_wave():
+def test_a_long_chain_in_a_band_gap_decays_per_cell_like_a_bloch_wave():
     specimen = gong2025(damping_time_s=0.0)
     for gap in band_gaps(chain_of(specimen, 1)):
         for part in (0.2, 0.5, 0.8):

@@ -25,7 +25,7 @@ PERIODIC = Harmonic(130.0, 20e-6)
 @pytest.mark.parametrize(
     "contact", ["hertz", "linear", "power:5", "power:3+5+7", "linear_gap:2e5", "hunt_crossley:0.5"]
 )
-def test_one_cell_matches_the_specimen_also_in_chaos(contact):
+def test_a_chain_of_one_cell_matches_the_specimen_even_in_chaos(contact):
     specimen, drive = gong2025(contact=contact), Harmonic(220.0, 40e-6)
     ours = chain_response(chain_of(specimen, 1), drive, duration_s=1.0, window_s=0.5)
     theirs = steady_response(specimen, drive, duration_s=1.0, window_s=0.5)
@@ -36,7 +36,7 @@ def test_one_cell_matches_the_specimen_also_in_chaos(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:5"])
-def test_lines_of_the_inner_masses_of_one_cell_match_a_densely_sampled_run(contact):
+def test_lines_of_the_inner_masses_match_a_densely_sampled_run(contact):
     chain, drive = chain_of(gong2025(contact=contact), 1), Harmonic(220.0, 40e-6, phase_rad=0.7)
     start = np.array([[1e-5, -2e-5, 1.5e-5, 0.05, -0.1, 0.08]])
     duration_s = 5.0 / drive.frequency_hz
@@ -68,7 +68,7 @@ def test_peaks_and_lines_match_a_densely_sampled_run():
 @pytest.mark.parametrize(
     "contact", ["hertz", "linear_gap:2e5", "hunt_crossley:0.5", "power:5", "power:3+5+7"]
 )
-def test_no_largest_value_is_missed_in_a_long_run_of_unequal_cells(contact):
+def test_largest_values_of_a_long_run_of_unequal_cells_match_dense_samples(contact):
     # Most windows are only summed up: the largest values must be those of the samples all the same.
     rng = np.random.default_rng(11)
     gap_m = 45e-6 if contact.startswith("power") else (25e-6, 120e-6)
@@ -86,7 +86,7 @@ def test_no_largest_value_is_missed_in_a_long_run_of_unequal_cells(contact):
     assert np.all(response.largest_m < sampled * (1.0 + 2e-3))
 
 
-def test_without_contact_both_responses_are_the_transmissibility():
+def test_both_chain_responses_without_contact_are_the_transmissibility():
     chain, drive = chain_of(gong2025(contact="linear"), 4), Harmonic(266.0, 1e-6)
     response = chain_response(chain, drive, duration_s=20.0, window_s=0.5)
     moved = chain_transmissibility(chain, drive.frequency_hz)[0]
@@ -129,7 +129,7 @@ def test_impossible_observables_are_refused_in_one_sentence(drive, window_s, sen
 @pytest.mark.parametrize(
     ("contact", "cells", "drive"), [("linear", 4, Harmonic(3e5, 1.0)), ("power:47", 20, Harmonic(42.0, 0.1))]
 )
-def test_a_requested_time_is_met_even_if_a_window_takes_longer(contact, cells, drive):
+def test_a_requested_computing_time_is_met_even_if_a_window_takes_longer(contact, cells, drive):
     chain = chain_of(gong2025(gap_m=1e-6, contact=contact), cells)
     chain_response(chain, drive, duration_s=1.0 / drive.frequency_hz, window_s=1.0 / drive.frequency_hz)
     began_s = time.thread_time()
@@ -143,7 +143,7 @@ def test_a_requested_time_is_met_even_if_a_window_takes_longer(contact, cells, d
     assert np.all(np.isinf(found.errors))
 
 
-def test_a_time_too_short_for_a_drive_period_is_refused():
+def test_a_computing_time_too_short_for_a_drive_period_is_refused():
     chain = chain_of(gong2025(0.1, 10.0, "power:3"), 4)
     with pytest.raises(ValueError, match=r"one drive period of 4\.7619 s takes longer to follow"):
         chain_response_to(chain, Harmonic(0.21, 2.71e-7), None, 0.5)
