@@ -41,7 +41,7 @@ def test_a_free_collision_has_duration_and_depth_of_hertz():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("speed", [0.02, 0.05, 0.3, 1.0])
-def test_a_whole_collision_ends_like_its_steps(speed, side):
+def test_a_collision_solved_as_a_whole_matches_a_stepwise_solution(speed, side):
     start = touching(speed, side, 2e-6)
     state, _ = followed(start, 1e-4, STANDARD)
     by_steps, _ = followed(start, 1e-4, 1e-11)
@@ -71,7 +71,7 @@ def test_an_interrupted_collision_is_resolved_in_steps():
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3])
-def test_peaks_lines_samples_and_small_changes_match_the_steps(speed):
+def test_peaks_lines_and_samples_of_a_collision_match_a_stepwise_solution(speed):
     start, until = touching(speed, 1.0, 20e-6), 1e-4
     state, seen = followed(start, until, STANDARD)
     by_steps, told = followed(start, until, 1e-11)
