@@ -57,7 +57,7 @@ def off(found, states):
     return np.abs((found - states) / scale).max(axis=-1)
 
 
-def test_batched_motions_are_as_accurate_as_single_ones():
+def test_motions_in_a_batch_are_as_accurate_as_single_motions():
     drives, starts = random_scenes(40, 2026)
     periods = [max(1, math.ceil(0.01 * drive.frequency_hz)) for drive in drives]
     beside, alone = [], []
@@ -101,7 +101,7 @@ def test_a_motion_that_ends_in_contact_continues_from_there():
     assert off(on_stop.motion, exact.final_state) < 1e-3
 
 
-def test_a_motion_does_not_depend_on_the_batch():
+def test_a_motion_does_not_depend_on_its_batch():
     drives, starts = random_scenes(20, 3)
     periods = [1 + 13 * k for k in range(20)]
     together = followed(SPECIMEN, drives, starts, periods)

@@ -43,7 +43,7 @@ def exact_linear(specimen, motion, base, duration_s):
 
 @pytest.mark.parametrize("interval_s", [1e-6, 1e-5, 1.7e-4, 2e-3])
 @pytest.mark.parametrize("contact", ["linear", "hertz", "power:201"])
-def test_without_contact_an_interval_is_exact(interval_s, contact):
+def test_an_interval_without_contact_is_exact(interval_s, contact):
     # Stops of 1 m are never met, and a power law of that reference is nothing.
     specimen = gong2025(contact=contact, gap_m=1.0)
     motion = np.array([3e-5, -2e-5, 1e-5, 0.02, -0.05, 0.03])
@@ -57,7 +57,7 @@ def test_without_contact_an_interval_is_exact(interval_s, contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_motion_does_not_depend_on_the_intervals(contact):
+def test_a_motion_does_not_depend_on_the_base_intervals(contact):
     specimen, speed, reached = gong2025(damping_time_s=3e-5, contact=contact), 0.3, []
     for intervals in (1, 7, 64):
         length = 2e-3 / intervals
@@ -80,14 +80,14 @@ def test_a_run_split_between_intervals_equals_the_whole_bit_for_bit(contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_standard_is_as_far_from_reference_as_it_promises(contact):
+def test_standard_accuracy_differs_from_reference_within_its_promise(contact):
     specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 20e-6, 0.5, 2e-5)
     run, _ = carried(specimen, pieces, 2e-5)
     exact, _ = carried(specimen, pieces, 2e-5, Accuracy.REFERENCE)
     assert np.max(np.abs(run.motion - exact.motion) / UNITS) < Accuracy.STANDARD.promise
 
 
-def test_a_run_ends_at_the_impact_beyond_its_storage():
+def test_a_run_ends_at_the_first_impact_that_cannot_be_stored():
     specimen, pieces = gong2025(), sine_pieces(130.0, 20e-6, 0.2, 2e-5)
     _, whole = carried(specimen, pieces, 2e-5)
     run, record = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(5)

@@ -141,7 +141,7 @@ def test_a_nan_time_is_refused():
         NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 0.0)
 
 
-def test_an_engine_older_than_its_sources_is_rebuilt_or_refused_with_the_command(tmp_path, monkeypatch):
+def test_an_engine_older_than_its_sources_is_refused_with_the_build_command(tmp_path, monkeypatch):
     older = tmp_path / "engine-x86_64-000000000000.so"
     older.touch()
     monkeypatch.setattr("vibench.sim.engine.library.FOLDER", tmp_path)

@@ -50,7 +50,7 @@ def output_under_sanitizers(*words):
 @needs_gcc
 @pytest.mark.thorough
 @pytest.mark.timeout(600)
-def test_the_program_of_tests_passes_under_the_sanitizers(sanitized, tmp_path):
+def test_the_native_test_program_passes_under_the_sanitizers(sanitized, tmp_path):
     engine = native_engine()
     shapes = collision_structure(engine).tobytes() + power_structure(engine).tobytes()
     for law in LAWS:

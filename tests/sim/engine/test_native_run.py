@@ -23,7 +23,7 @@ def native(specimen, drive, duration_s, accuracy="standard", start=None, first_s
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_standard_is_as_far_from_reference_as_it_promises(law):
+def test_standard_accuracy_differs_from_reference_within_its_promise(law):
     specimen, drive = gong2025(contact=law), Harmonic(130.0, 20e-6)
     quick, _, _ = native(specimen, drive, 1.0)
     exact, _, _ = native(specimen, drive, 1.0, "reference")
@@ -31,7 +31,7 @@ def test_standard_is_as_far_from_reference_as_it_promises(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_random_scenes_match_strict_steps(law):
+def test_random_scenes_match_an_integration_with_strict_steps(law):
     draws = np.random.default_rng(45)
     for _ in range(12):
         gaps = tuple(float(gap) for gap in draws.uniform(15e-6, 80e-6, 2))

@@ -48,7 +48,7 @@ def test_peaks_and_lines_match_the_samples(law, tolerance):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_observers_do_not_change_the_steps(law):
+def test_observers_do_not_change_the_motion(law):
     drive = Harmonic(260.0, 5e-6)
     motions = []
     for watch in Watch:
@@ -60,7 +60,7 @@ def test_observers_do_not_change_the_steps(law):
         np.testing.assert_array_equal(motion, motions[0])
 
 
-def test_lines_of_two_stretches_add_up():
+def test_spectral_lines_of_two_partial_runs_add_up():
     drive, records = Harmonic(130.0, 20e-6), []
     for ends_s in ((0.1,), (0.03, 0.0312345, 0.1)):
         run, record = NativeRun(gong2025(), drive, np.zeros(6), 1e-10), RunRecord(10_000)
