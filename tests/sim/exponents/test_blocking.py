@@ -15,7 +15,7 @@ def autoregression(memory, count, seed):
 
 
 @pytest.mark.parametrize("memory", [-0.5, 0.0, 0.6, 0.95])
-def test_the_error_is_the_closed_form_of_an_autoregression(memory):
+def test_the_error_of_a_correlated_mean_matches_the_closed_form(memory):
     count = 1 << 14
     found = [block_mean(autoregression(memory, count, seed)) for seed in range(12)]
     exact = 1.0 / (1.0 - memory) / np.sqrt(count)
@@ -25,7 +25,7 @@ def test_the_error_is_the_closed_form_of_an_autoregression(memory):
     assert np.mean([each.correlation_length for each in found]) == pytest.approx(correlated, rel=0.35)
 
 
-def test_means_scatter_within_their_stated_errors():
+def test_block_means_scatter_within_their_stated_errors():
     means = [block_mean(autoregression(0.8, 4096, seed)) for seed in range(150)]
     scores = [each.mean / each.standard_error for each in means]
     assert 0.8 < np.std(scores) < 1.3
@@ -37,7 +37,7 @@ def test_a_series_shorter_than_its_memory_is_not_trusted():
     assert not block_mean(np.arange(64.0)).is_long_enough
 
 
-def test_blocks_have_the_length_of_the_memory():
+def test_block_length_follows_the_correlation_length():
     short = block_mean(autoregression(0.0, 4096, 3)).block_length
     long = block_mean(autoregression(0.97, 4096, 3)).block_length
     assert short <= 2
@@ -52,12 +52,12 @@ def test_a_shifted_series_has_a_shifted_mean_and_the_same_error(values, shift):
         assert other.standard_error == pytest.approx(one.standard_error, rel=1e-6, abs=1e-9)
 
 
-def test_equal_values_have_zero_error_and_one_value_an_unknown_one():
+def test_equal_values_have_zero_error_and_a_single_value_an_unknown_error():
     assert block_mean([2.5] * 40).standard_error == 0.0
     assert np.isnan(block_mean([2.5]).standard_error)
 
 
 @pytest.mark.parametrize("values", [[], [1.0, np.nan], [[1.0, 2.0]]])
-def test_values_without_a_mean_are_refused(values):
+def test_values_without_a_finite_mean_are_refused(values):
     with pytest.raises(ValueError, match="has no mean here"):
         block_mean(values)

@@ -25,7 +25,7 @@ def slowest_decay(specimen):
 
 
 @pytest.mark.parametrize("contact", ["linear", "hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8"])
-def test_without_impacts_the_exponent_is_the_decay_of_the_slowest_mode(contact):
+def test_the_exponent_without_impacts_is_the_slowest_decay_rate(contact):
     specimen = gong2025(damping_time_s=3e-5, contact=contact)
     found = lyapunov_exponent(specimen, Harmonic(180.0, 1e-6), duration_s=5.0, settle_s=1.0)
     assert found.source is Source.MODES
@@ -38,7 +38,7 @@ def test_without_impacts_the_exponent_is_the_decay_of_the_slowest_mode(contact):
     assert found.local_exponents_per_s[50:].mean() == pytest.approx(found.exponent_per_s, abs=0.05)
 
 
-def test_the_papers_statements_on_chaos_hold():
+def test_exponents_agree_with_the_statements_of_the_paper_on_chaos():
     # Its section 3.1 and Fig. 10: over 100 per second when colliding at 5 um; near zero or below at 1 um.
     colliding = lyapunov_exponent(gong2025(), CHAOS)
     assert colliding.verdict is ExponentVerdict.CHAOTIC
@@ -70,7 +70,7 @@ def test_a_run_ends_as_soon_as_its_error_is_small_enough():
     assert abs(short.exponent_per_s - whole.exponent_per_s) < 4.0 * short.standard_error_per_s
 
 
-def test_a_lost_run_has_no_exponent_and_states_why():
+def test_a_failed_run_has_no_exponent_and_states_the_reason():
     found = lyapunov_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
     assert found.verdict is ExponentVerdict.UNKNOWN

@@ -25,7 +25,7 @@ def shrinking(specimen):
 @pytest.mark.thorough
 @pytest.mark.parametrize("drive", [CHAOS, Harmonic(260.0, 1e-6)])
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5", "power:47", "linear", "rigid:1"])
-def test_the_sum_of_exponents_is_the_damping(contact, drive):
+def test_the_sum_of_exponents_equals_the_trace_of_the_damping(contact, drive):
     specimen = gong2025(damping_time_s=3e-5, contact=contact)
     found = lyapunov_spectrum(specimen, drive, Accuracy.REFERENCE, duration_s=1.0, settle_s=0.2)
     assert shrinking(specimen) == pytest.approx(-390.081, abs=1e-3)
@@ -34,7 +34,7 @@ def test_the_sum_of_exponents_is_the_damping(contact, drive):
 
 
 @pytest.mark.parametrize(("accuracy", "allowed"), [(Accuracy.QUICK, 1e-2), (Accuracy.STANDARD, 1e-4)])
-def test_each_accuracy_level_meets_its_error_of_the_sum(accuracy, allowed):
+def test_the_sum_of_exponents_is_within_the_error_of_each_accuracy(accuracy, allowed):
     found = lyapunov_spectrum(gong2025(), LARGE, accuracy, duration_s=2.0, settle_s=0.2)
     assert found.sum_per_s == pytest.approx(shrinking(gong2025()), rel=allowed)
 
@@ -45,7 +45,7 @@ def test_a_lossy_contact_lowers_the_sum_of_exponents():
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:5", "rigid:1"])
-def test_without_damping_the_exponents_come_in_pairs_of_opposite_sign(contact):
+def test_exponents_without_damping_form_pairs_of_opposite_sign(contact):
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     found = lyapunov_spectrum(specimen, CHAOS, duration_s=8.0, settle_s=2.0)
     exponents = found.exponents_per_s
@@ -66,7 +66,7 @@ def test_the_first_of_six_exponents_is_the_largest():
     assert 4.0 < six.dimension < 5.0
 
 
-def test_without_impacts_the_exponents_are_the_decays_of_the_modes():
+def test_exponents_without_impacts_are_the_decay_rates_of_the_modes():
     found = lyapunov_spectrum(gong2025(), Harmonic(180.0, 1e-6), duration_s=4.0, settle_s=1.0)
     system, _ = state_matrix(gong2025())
     assert found.source is Source.MODES
@@ -75,7 +75,7 @@ def test_without_impacts_the_exponents_are_the_decays_of_the_modes():
 
 
 @pytest.mark.parametrize(("drive", "left"), [(Harmonic(130.0, 20e-6), 4), (CHAOS, 5)])
-def test_a_stop_without_rebound_removes_one_or_two_directions(drive, left):
+def test_a_stop_without_rebound_gives_one_or_two_exponents_of_minus_infinity(drive, left):
     found = lyapunov_spectrum(gong2025(contact="rigid:0"), drive, duration_s=4.0, settle_s=1.0)
     assert found.outcome is Outcome.REACHED_END
     assert np.count_nonzero(np.isfinite(found.exponents_per_s)) == left

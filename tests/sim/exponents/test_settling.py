@@ -30,13 +30,13 @@ def noise(mean, seed=1):
     return mean + np.random.default_rng(seed).standard_normal(COUNT)
 
 
-def test_lasting_chaos_is_the_motion_of_the_whole_run():
+def test_lasting_chaos_is_reported_for_the_whole_run():
     found = settling(a_run(noise(2.0)), np.ones(6))
     assert found.motion is FinalMotion.THROUGHOUT
     assert found.since == 0
 
 
-def test_a_quiet_end_begins_after_the_last_impact():
+def test_a_contact_free_end_begins_after_the_last_impact():
     impacts = np.where(np.arange(COUNT) < 250, 3, 0)
     found = settling(a_run(noise(2.0), impacts=impacts, is_quiet=True), np.ones(6))
     assert found.motion is FinalMotion.QUIET
@@ -54,12 +54,12 @@ def test_a_periodic_end_begins_where_the_section_starts_to_repeat(cycle):
     assert 300 <= found.since + cycle <= 300 + 2 * cycle
 
 
-def test_a_section_that_is_no_whole_number_of_periods_is_not_called_periodic():
+def test_a_section_over_a_fraction_of_a_period_is_not_called_periodic():
     found = settling(a_run(noise(2.0), np.ones((COUNT, 6)), periods=0), np.ones(6))
     assert found.motion is FinalMotion.THROUGHOUT
 
 
-def test_the_time_at_which_an_exponent_vanishes_is_found():
+def test_the_time_at_which_the_exponent_drops_to_zero_is_found():
     growth = noise(0.0)
     growth[:260] += 2.0
     found = settling(a_run(growth), np.ones(6))
@@ -68,13 +68,13 @@ def test_the_time_at_which_an_exponent_vanishes_is_found():
 
 
 @pytest.mark.parametrize("tail", [1.0, 3.0])
-def test_chaos_of_changing_strength_has_not_ended(tail):
+def test_chaos_of_changing_strength_is_not_reported_as_ended(tail):
     growth = noise(2.0)
     growth[200:] += tail - 2.0
     assert settling(a_run(growth), np.ones(6)).motion is FinalMotion.THROUGHOUT
 
 
-def test_periodic_motion_that_turns_chaotic_has_not_ended():
+def test_a_periodic_motion_that_turns_chaotic_is_not_reported_as_settled():
     growth = noise(2.0)
     growth[:200] -= 3.0
     assert settling(a_run(growth), np.ones(6)).motion is FinalMotion.THROUGHOUT

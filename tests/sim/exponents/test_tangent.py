@@ -47,7 +47,7 @@ def test_finite_differences_converge_to_the_tangent(contact, gap_m):
 
 
 @pytest.mark.parametrize("contact", ELASTIC)
-def test_volume_shrinks_by_the_damping_alone(contact):
+def test_phase_space_volume_shrinks_by_the_damping_alone(contact):
     # Liouville: an elastic force, however stiff, has no part in the divergence of the flow.
     specimen = gong2025(contact=contact)
     tangent, _, _ = run_with_tangent(specimen)
@@ -58,7 +58,7 @@ def test_volume_shrinks_by_the_damping_alone(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:7", "rigid:1"])
-def test_without_damping_the_tangent_is_symplectic(contact):
+def test_the_tangent_without_damping_is_symplectic(contact):
     # D' J D = J in displacements and momenta; here in displacements and velocities over their scales.
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     tangent, _, _ = run_with_tangent(specimen)
@@ -68,7 +68,7 @@ def test_without_damping_the_tangent_is_symplectic(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:29"])
-def test_a_tangent_does_not_change_the_steps(contact):
+def test_following_a_tangent_does_not_change_the_motion(contact):
     specimen = gong2025(contact=contact)
     _, carried, _ = run_with_tangent(specimen, Accuracy.STANDARD, 0.3)
     plain = integrate(specimen, DRIVE, 0.3, Accuracy.STANDARD)
@@ -76,7 +76,7 @@ def test_a_tangent_does_not_change_the_steps(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:7"])
-def test_each_level_of_accuracy_has_a_tangent_nearer_to_the_reference(contact):
+def test_a_higher_accuracy_gives_a_tangent_closer_to_the_reference(contact):
     specimen = gong2025(contact=contact)
     found = {level: run_with_tangent(specimen, level, 0.2)[0] for level in Accuracy}
     size = np.abs(found[Accuracy.REFERENCE]).max()
