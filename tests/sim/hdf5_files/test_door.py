@@ -106,7 +106,7 @@ def test_a_truncated_file_is_refused(make):
         open_hdf5(path)
 
 
-def test_a_group_that_contains_itself_is_visited_once(make):
+def test_an_hdf5_group_that_contains_itself_is_visited_once(make):
     def circle(file):
         file.create_group("a")
         file["a/again"] = file["a"]
