@@ -22,7 +22,7 @@ def truth():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("kills", [1, pytest.param(5, marks=pytest.mark.slow)])
-def test_a_killed_map_opens_at_once_and_ends_like_an_uninterrupted_one(tmp_path, truth, kills):
+def test_a_killed_and_resumed_map_equals_an_uninterrupted_map(tmp_path, truth, kills):
     path, luck = tmp_path / "map.h5", random.Random(kills)
     sessions = np.full(child.PLAN.grid.size, -1)
     for session in range(kills):

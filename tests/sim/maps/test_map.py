@@ -85,7 +85,7 @@ def test_a_small_map_is_computed_completely(points, step):
     assert plan.model_copy(update={"coarse": 32}).first_step == 32
 
 
-def test_every_quantity_reaches_the_scene():
+def test_every_quantity_of_a_map_is_set_in_its_scenes():
     plan = Map(
         k1_n_per_m=Range(start=500.0, stop=900.0, points=3),
         hertz_stiffness=Range(start=1e9, stop=5e9, points=2),
@@ -112,7 +112,7 @@ def test_random_starts_differ_and_are_reproducible():
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6), (60.0, 1e-6)])
-def test_a_settled_scene_matches_its_full_answer(frequency_hz, amplitude_m):
+def test_a_settled_map_point_matches_the_full_prediction(frequency_hz, amplitude_m):
     scene = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m).scene(
         (0, 1)
     )
@@ -152,7 +152,7 @@ def test_the_contact_energy_matches_the_deepest_penetration():
         assert contact_energy_j(unlike, replace(found, relative_i=1.0)) == 0.0
 
 
-def test_an_estimate_grows_with_the_work_and_shrinks_with_the_workers():
+def test_a_map_estimate_grows_with_work_and_shrinks_with_workers():
     plan = Map(frequency_hz=FREQUENCIES, amplitude_m=LEVELS, coarse=2)
     one, two = estimate_map(plan, 1), estimate_map(plan, 2)
     assert (one.points, one.coarse_points) == (20, 9)
@@ -213,7 +213,7 @@ def test_a_periodic_motion_has_the_same_responses_in_batches(frequency_hz, ampli
     assert beside.response_ii == pytest.approx(alone.response_ii, rel=1e-5)
 
 
-def test_a_map_along_one_quantity_keeps_states_once_a_drive_period():
+def test_a_map_along_one_quantity_keeps_one_state_per_drive_period():
     plan = Map(frequency_hz=Range(start=120.0, stop=130.0, points=3), amplitude_m=2e-5, chain=("up", "down"))
     results = solve_map(plan, workers=1)
     section, period = results.values("section_p"), results.values("period")
@@ -226,7 +226,7 @@ def test_a_map_along_one_quantity_keeps_states_once_a_drive_period():
     assert results.values("continues", start="down").tolist()[:-1] == [4.0, 5.0]
 
 
-def test_sections_of_a_chain_are_taken_where_the_drive_is_at_its_beginning():
+def test_chained_map_points_are_sampled_at_drive_phase_zero():
     # The lower points touch nothing and are known in closed form; what goes on from them strikes.
     plan = Map(frequency_hz=Range(start=84.0, stop=90.0, points=4), amplitude_m=5e-6, chain=("up",))
     phase = solve_map(plan, workers=1).values("drive_phase")
@@ -234,7 +234,7 @@ def test_sections_of_a_chain_are_taken_where_the_drive_is_at_its_beginning():
 
 
 @pytest.mark.parametrize("other", ["x_m", "frequency_hz"])
-def test_random_starts_are_not_computed_where_the_start_varies(other):
+def test_random_starts_are_refused_if_the_map_varies_the_start(other):
     """The same few states in every cell were counted as so many; files that hold such maps still open."""
     plan = Map(**{other: LEVELS if other == "x_m" else FREQUENCIES, "y_m": LEVELS, "random_starts": 8})
     for asked in (estimate_map, solve_map):
@@ -242,7 +242,7 @@ def test_random_starts_are_not_computed_where_the_start_varies(other):
             asked(plan)
 
 
-def test_a_map_with_an_error_keeps_the_errors_of_its_points():
+def test_a_map_with_an_error_target_keeps_the_errors_of_its_points():
     plan = Map(
         frequency_hz=Range(start=120, stop=140, points=3),
         amplitude_m=Range(start=1e-6, stop=2e-5, points=2),
@@ -255,7 +255,7 @@ def test_a_map_with_an_error_keeps_the_errors_of_its_points():
     assert "error_estimate" not in {column.name for column in plan.model_copy(update={"error": None}).columns}
 
 
-def test_a_diagram_with_an_error_keeps_states_once_a_drive_period():
+def test_a_diagram_with_an_error_target_keeps_one_state_per_drive_period():
     plan = Map(frequency_hz=Range(start=120, stop=140, points=3), amplitude_m=2e-5, error=0.01, chain=["up"])
     results = solve_map(plan)
     assert np.all(np.isfinite(results.arrays["section_x"][:, 0]))

@@ -40,7 +40,7 @@ def filled_codes(codes, known, plan):
     return found.reshape(codes.shape)
 
 
-def test_every_cell_is_computed_or_filled_in_once():
+def test_every_map_cell_is_computed_or_filled_in_once():
     codes = disc((50, 71), (20, 30), 12)
     known, plan = refined(codes)
     filled = np.concatenate([each.cells for each in plan.fillings])

@@ -35,7 +35,7 @@ def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
     assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
 
 
-def test_the_shares_of_a_map_match_its_points_and_its_audit(adaptive):
+def test_shares_of_a_map_match_its_points_corrected_by_the_audit(adaptive):
     assert sum(each.share.share for each in adaptive.motions) == pytest.approx(1.0)
     audit, cells = adaptive.audit, adaptive.plan.grid.size
     for number, motion in enumerate(adaptive.motions):
@@ -56,7 +56,7 @@ def several_starts():
     return solve_map(plan)
 
 
-def test_several_starts_reveal_the_number_of_motions(several_starts):
+def test_a_map_with_several_starts_counts_the_motions_at_each_point(several_starts):
     counts = several_starts.motion_counts
     for place in np.ndindex(counts.shape):
         found = several_starts.motions_at(*place)
@@ -92,21 +92,21 @@ def test_a_basin_map_distinguishes_attractors_and_kicks_them():
     assert all(each.returned.share == 1.0 for each in found if results.motions[each.motion] in solid)
 
 
-def test_kicks_need_a_basin_map(adaptive):
+def test_kick_stability_requires_a_basin_map(adaptive):
     with pytest.raises(InvalidStudy, match="over the start alone"):
         kick_stability(adaptive)
     with pytest.raises(InvalidStudy, match="-3 kicks were requested; give 1 or more"):
         kick_stability(adaptive, kicks=-3)
 
 
-def test_a_straight_boundary_has_exponent_one():
+def test_a_straight_basin_boundary_has_uncertainty_exponent_1():
     rows, columns = np.indices((256, 256))
     rough = uncertainty_exponent((rows + 2 * columns > 300).astype(np.int64))
     assert rough.low < 1.0 < rough.high
     assert rough.exponent == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_boundary_of_known_dimension_has_its_exponent():
+def test_a_basin_boundary_of_known_dimension_has_the_right_exponent():
     # Stripes whose edges are the points of Cantor's middle-third set: dimension 1 + ln 2 / ln 3.
     place = (np.arange(729) + 0.5) / 729
     label = np.zeros(729, dtype=np.int64)
@@ -119,7 +119,7 @@ def test_a_boundary_of_known_dimension_has_its_exponent():
     assert rough.exponent == pytest.approx(1.0 - np.log(2.0) / np.log(3.0), abs=0.12)
 
 
-def test_noise_has_no_exponent():
+def test_a_random_basin_map_has_no_uncertainty_exponent():
     labels = np.random.default_rng(3).integers(0, 2, (200, 200))
     assert uncertainty_exponent(labels) is None
     assert uncertainty_exponent(np.zeros((64, 64), dtype=np.int64)) is None
