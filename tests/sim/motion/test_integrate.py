@@ -67,7 +67,7 @@ def test_drive_work_equals_damping_work_in_a_periodic_motion():
 
 
 @pytest.mark.parametrize("contact", ["hertz", "hunt_crossley:0.5", "linear_gap", "power:3", "power:47"])
-def test_samples_lie_on_the_motion_in_flight_and_in_contact(contact):
+def test_samples_match_the_motion_in_flight_and_in_contact(contact):
     specimen = paper(contact)
     run = integrate(specimen, PERIODIC, 0.1, Accuracy.REFERENCE, sample_rate_hz=50_000.0)
     p = run.states[:, 1] - run.states[:, 2]

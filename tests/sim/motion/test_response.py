@@ -14,7 +14,7 @@ from vibench.sim import (
 
 
 @pytest.mark.parametrize("frequency_hz", [7.3, 60.0, 266.2, 601.7])
-def test_without_contact_both_responses_are_the_exact_transmissibility(frequency_hz):
+def test_both_responses_without_contact_are_the_exact_transmissibility(frequency_hz):
     specimen, drive = gong2025(contact="linear"), Harmonic(frequency_hz, 5e-6)
     response = steady_response(specimen, drive)
     x, _, _, p = base_transmissibility(specimen, frequency_hz)[0]
@@ -51,7 +51,7 @@ def test_the_responses_match_the_trajectory(contact, drive):
     assert response.impacts == np.count_nonzero(run.impacts.times_s > 0.4)
 
 
-def test_an_unfinished_run_has_no_response():
+def test_an_unfinished_run_gives_no_response():
     response = steady_response(gong2025(), Harmonic(130.0, 20e-6), max_impact_rate_hz=1.0)
     assert response.outcome is Outcome.TOO_MANY_IMPACTS
     assert np.isnan(response.response_i)

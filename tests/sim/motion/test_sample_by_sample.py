@@ -15,7 +15,7 @@ def shaken_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
 
 
 @pytest.mark.parametrize("amplitude_m", [0.0, 1e-7, 2e-6, 2e-5])
-def test_following_samples_equals_integration(amplitude_m):
+def test_following_a_base_sample_by_sample_equals_integration(amplitude_m):
     drive = shaken_base(amplitude_m)
     followed = follow_samples(gong2025(), drive, Accuracy.REFERENCE)
     duration_s = (len(drive.displacement_m) - 1) / RATE_HZ
@@ -28,7 +28,7 @@ def test_following_samples_equals_integration(amplitude_m):
     np.testing.assert_allclose(followed.states[near] / scale, whole.states[near] / scale, atol=1e-9)
 
 
-def test_impacts_are_counted_in_the_interval_they_begin_in():
+def test_impacts_are_counted_in_the_interval_in_which_they_begin():
     drive = shaken_base(2e-6)
     followed = follow_samples(gong2025(), drive)
     whole = integrate(gong2025(), drive, (len(drive.displacement_m) - 1) / RATE_HZ)
