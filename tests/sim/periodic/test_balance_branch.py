@@ -39,7 +39,7 @@ def kinds(branch):
     return [event.kind for event in branch.events]
 
 
-def test_a_first_order_branch_folds_where_the_closed_form_states():
+def test_a_first_order_branch_folds_at_the_closed_form_frequencies():
     zeta, alpha, force = 0.02, 0.5, 0.1
     structure, spring = oscillator(2.0 * zeta), PowerSpring(1.0, ((3, alpha),))
     options = BalanceOptions(fewest=1, most=1)
@@ -64,7 +64,7 @@ def test_a_first_order_branch_folds_where_the_closed_form_states():
     assert len(first_order_states(structure, spring, folds[1] * 1.001, force)) == 1
 
 
-def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_one_there():
+def test_a_duffing_branch_is_unstable_between_its_folds():
     structure, spring = oscillator(0.04), PowerSpring(1.0, ((3, 0.5),))
     options = BalanceOptions(fewest=7, tolerance=1e-6)
     low, high = 1.1 / (2 * math.pi), 2.0 / (2 * math.pi)
@@ -88,14 +88,14 @@ def test_a_linear_branch_has_no_events_and_reaches_its_end():
     assert np.all(branch.is_stable)
 
 
-def test_a_balance_that_has_not_converged_reports_it():
+def test_a_harmonic_balance_without_convergence_is_reported_as_such():
     # Chaos at 260 Hz and 5 um, with no more than 31 harmonics: whatever is found is not called a solution.
     structure, spring = structure_of(gong2025()), spring_of(gong2025())
     found = balance(structure, spring, 260.0, 5e-6, BalanceOptions(fewest=15, most=31))
     assert found.outcome is not BalanceEnd.CONVERGED
 
 
-def test_raising_the_drive_finds_the_stops_at_the_amplitude_at_which_p_equals_the_gap():
+def test_a_branch_over_amplitude_grazes_where_linear_p_equals_the_gap():
     specimen = gong2025(damping_time_s=3e-5)
     structure, spring = structure_of(specimen), spring_of(specimen)
     options, steps = BalanceOptions(fewest=15, most=15), ArcSteps(most_points=230)
@@ -126,7 +126,7 @@ def periodic_defect(damping, cubic, start, omega, force):
     return float(np.abs(end - start).max())
 
 
-def test_a_mirrored_duffing_motion_loses_or_gains_stability_where_its_symmetry_breaks():
+def test_a_duffing_branch_changes_stability_where_its_symmetry_breaks():
     # x-double-dot + 0.2 x-dot + x^3 = B sin t with B from 0 to 6.
     structure, spring = oscillator(0.2, 1e-9), PowerSpring(1.0, ((3, 1.0),))
     options = BalanceOptions(fewest=15, tolerance=1e-8)
@@ -139,7 +139,7 @@ def test_a_mirrored_duffing_motion_loses_or_gains_stability_where_its_symmetry_b
 
 
 @pytest.mark.slow
-def test_the_two_mass_unilateral_stop_of_nlvib_doubles_its_period_and_loses_it_on_a_torus():
+def test_the_nlvib_example_3_has_its_published_bifurcations():
     # Krack and Gross, NLvib, example 03: 21 harmonics, from 0.8 to 0.5 rad/s. Its authors report turning
     # points, period doubling near the peak, a stable motion at 0.635, and a Neimark-Sacker point above 0.60.
     stiffness = np.array([[1.0, -1.0], [-1.0, 2.0]])

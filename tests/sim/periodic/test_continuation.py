@@ -91,7 +91,7 @@ def test_a_branch_that_turns_back_in_a_kink_is_followed_across_it():
 
 
 @pytest.mark.parametrize("longest", [0.02, 0.05, 0.1, 0.3])
-def test_a_step_beyond_a_sharp_fold_does_not_land_on_another_branch(longest):
+def test_a_step_past_a_sharp_fold_does_not_jump_to_another_branch(longest):
     steps = ArcSteps(longest=longest)
     points = list(trace(LoopBesideALine(), np.array([0.02, 0.0]), 1.0, (-3.0, 3.0), steps))
     assert points[-1].end is ArcEnd.CLOSED

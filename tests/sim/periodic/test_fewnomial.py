@@ -21,7 +21,7 @@ def test_an_exponent_of_two_hundred_neither_overflows_nor_hides_a_zero():
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.3, 5.0))
-def test_zeros_of_a_scaled_variable_are_scaled(shift, exponent):
+def test_zeros_of_a_polynomial_scale_with_its_variable(shift, exponent):
     coefficients, exponents = np.array([2.0, -7.0, 3.0, -0.1]), np.array([0.0, 1.0, 2.5, 4.0])
     plain = positive_zeros(coefficients, exponents)
     scale = 10.0**shift
@@ -29,7 +29,7 @@ def test_zeros_of_a_scaled_variable_are_scaled(shift, exponent):
     np.testing.assert_allclose(positive_zeros(coefficients, exponents * exponent), plain ** (1.0 / exponent))
 
 
-def test_a_double_zero_is_found_once():
+def test_a_double_zero_of_a_polynomial_is_found_once():
     np.testing.assert_allclose(positive_zeros(np.array([1.0, -2.0, 1.0]), np.array([0.0, 1.0, 2.0])), [1.0])
 
 

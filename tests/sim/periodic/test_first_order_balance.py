@@ -30,7 +30,7 @@ def test_an_even_power_is_refused():
 
 @pytest.mark.parametrize("frequency_hz", [80.0, 180.0, 199.0, 260.0, 420.0, 550.0])
 @pytest.mark.parametrize("amplitude_m", [1e-6, 5e-6, 50e-6])
-def test_every_state_satisfies_the_papers_fifth_order_equations(frequency_hz, amplitude_m):
+def test_every_first_order_state_satisfies_equation_5_of_the_paper(frequency_hz, amplitude_m):
     specimen, omega = gong2025(), 2.0 * math.pi * frequency_hz
     # The paper's equation 5 in its coordinates (x, p, z), with displacements A cos + B sin.
     m0, m1, m2 = specimen.masses
@@ -57,7 +57,7 @@ def test_every_state_satisfies_the_papers_fifth_order_equations(frequency_hz, am
 
 
 @pytest.mark.parametrize("exponent", [3, 47, 201])
-def test_a_weak_drive_leaves_the_linear_response(exponent):
+def test_a_weak_drive_gives_the_linear_response(exponent):
     specimen, spring = gong2025(), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
     (state,) = first_order_states(structure_of(specimen), spring, 130.0, 1e-12)
     linear = base_transmissibility(specimen, 130.0)[0]
@@ -65,7 +65,7 @@ def test_a_weak_drive_leaves_the_linear_response(exponent):
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 29, 201])
-def test_a_huge_drive_binds_the_two_masses(exponent):
+def test_a_huge_drive_gives_the_response_of_the_joined_masses(exponent):
     # p grows only as the n-th root of the force, so x approaches that of the two-mass specimen.
     specimen, spring = gong2025(), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
     states = first_order_states(structure_of(specimen), spring, 300.0, 10.0)
@@ -89,7 +89,7 @@ def test_the_duffing_resonance_lies_on_its_backbone():
     assert states[-1].relative == pytest.approx(-amplitude, rel=1e-12)  # sin drive, then a quarter turn
 
 
-def test_condensed_slopes_are_the_derivatives_by_frequency():
+def test_slopes_of_the_condensed_model_match_differences_over_frequency():
     structure, harmonics, omega, step = structure_of(gong2025()), np.array([0, 1, 2, 7]), 1500.0, 0.01
     before, here, after = (condense(structure, omega + d, harmonics) for d in (-step, 0.0, step))
     slope = (after.compliance - before.compliance) / (2.0 * step)

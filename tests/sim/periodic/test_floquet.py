@@ -18,7 +18,7 @@ def oscillator(damping=0.05, stiffness=1.0):
     return LinearStructure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
 
 
-def test_without_a_spring_the_multipliers_match_the_modes():
+def test_floquet_multipliers_without_a_spring_match_the_modes():
     specimen = gong2025()
     structure = structure_of(specimen)
     motion = Motion(130.0, np.array([1]), np.array([1e-6 + 0j]))
@@ -60,7 +60,7 @@ def test_perturbations_match_an_independent_integrator(spring):
     np.testing.assert_allclose(transition(structure, spring, motion), state.reshape(2, 2), atol=5e-6)
 
 
-def test_the_period_is_the_half_period_squared_for_a_mirrored_motion():
+def test_the_transition_over_a_mirrored_period_is_its_half_period_squared():
     structure, spring = oscillator(), PowerSpring(0.5, ((5, 0.4),))
     motion = Motion(0.2, np.array([1, 3]), np.array([1.0 - 0.2j, 0.1j]))
     half = transition(structure, spring, motion, math.pi)

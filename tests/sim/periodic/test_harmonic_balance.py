@@ -104,7 +104,7 @@ def test_too_few_harmonics_are_reported(exact_orbit):
 
 
 @pytest.mark.parametrize("kept", list(HarmonicSet))
-def test_without_a_spring_the_linear_response_is_exact(kept):
+def test_harmonic_balance_without_a_spring_gives_the_exact_linear_response(kept):
     specimen = gong2025(contact="linear")
     found = balance(structure_of(specimen), LINEAR, 266.0, 5e-6, BalanceOptions(kept=kept))
     assert found.outcome is BalanceEnd.CONVERGED
@@ -120,7 +120,7 @@ def test_a_motion_that_does_not_reach_the_stops_is_linear():
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 47])
-def test_one_harmonic_is_the_papers_analytical_solution(exponent):
+def test_balance_with_one_harmonic_is_the_analytical_solution_of_the_paper(exponent):
     structure, spring = structure_of(gong2025()), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
     (state,) = first_order_states(structure, spring, 60.0, 5e-6)
     found = balance(structure, spring, 60.0, 5e-6, BalanceOptions(fewest=1, most=1))
@@ -158,7 +158,7 @@ def test_the_jacobian_and_both_slopes_are_the_derivatives_of_the_residual(spring
     np.testing.assert_allclose(by_amplitude, slope, atol=1e-9 * np.abs(slope).max())
 
 
-def test_a_mirrored_pair_of_one_sided_stops_gives_mirrored_means():
+def test_mirrored_one_sided_stops_give_means_of_opposite_sign():
     structure, options = two_masses(0.1), BalanceOptions(kept=HarmonicSet.ALL)
     above = balance(structure, GapSpring(5.0, 1.0, 0.05, math.inf), 0.1, 0.05, options)
     below = balance(structure, GapSpring(5.0, 1.0, math.inf, 0.05), 0.1, 0.05, options)

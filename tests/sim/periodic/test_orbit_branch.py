@@ -27,7 +27,7 @@ def upward():
     return periodic_branch(orbit, Parameter.FREQUENCY, 112.0, STEPS)
 
 
-def test_a_branch_ends_at_the_requested_value(upward):
+def test_a_branch_of_orbits_ends_at_the_requested_value(upward):
     assert upward.end is ArcEnd.REACHED_BOUND
     assert upward.frequencies_hz[[0, -1]] == pytest.approx([100.0, 112.0])
     assert upward.response_ii.shape == (len(upward.frequencies_hz), 4)
@@ -41,7 +41,7 @@ def test_a_symmetric_branch_does_not_end_at_its_mirror_image():
     assert branch.events == ()
 
 
-def test_at_a_neimark_sacker_point_a_complex_pair_lies_on_the_unit_circle(upward):
+def test_a_complex_pair_is_on_the_unit_circle_at_a_neimark_sacker_point(upward):
     points = [event for event in upward.events if event.kind is BifurcationKind.NEIMARK_SACKER]
     assert points
     for event in points:
@@ -92,7 +92,7 @@ def test_an_isolated_branch_closes_beside_another_branch():
     assert sorted(folds) == pytest.approx([94.1881, 98.8147], abs=2e-4)
 
 
-def test_a_branch_to_its_start_has_one_point():
+def test_a_branch_between_equal_ends_is_refused():
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
     with pytest.raises(ValueError, match="two different ends"):
         periodic_branch(orbit, Parameter.FREQUENCY, 130.0)

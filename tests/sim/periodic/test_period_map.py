@@ -26,7 +26,7 @@ def by_differences(mapping, state, drive, step=1e-5):
 
 @pytest.mark.parametrize("shape", list(OrbitShape))
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8", "power:7"])
-def test_the_derivative_matches_differences_of_the_map(contact, shape):
+def test_the_derivative_of_the_period_map_matches_differences(contact, shape):
     specimen = gong2025(contact=contact)
     state = integrate(specimen, DRIVE, 20 / DRIVE.frequency_hz).final_state
     mapping = PeriodMap(specimen, shape)
@@ -34,7 +34,7 @@ def test_the_derivative_matches_differences_of_the_map(contact, shape):
     assert np.abs(by_differences(mapping, state, DRIVE) - exact).max() < 1e-6 * np.abs(exact).max()
 
 
-def test_the_derivative_over_two_periods_is_the_product():
+def test_the_derivative_over_two_periods_is_the_product_of_single_ones():
     mapping = PeriodMap(gong2025())
     state = integrate(gong2025(), DRIVE, 20 / DRIVE.frequency_hz).final_state
     between = mapping.image(state, DRIVE)
@@ -44,7 +44,7 @@ def test_the_derivative_over_two_periods_is_the_product():
 
 
 @pytest.mark.parametrize(("contact", "power"), [("hertz", 1.0), ("linear_gap", 0.5)])
-def test_past_grazing_the_derivative_changes_with_the_power_of_the_law(contact, power):
+def test_the_map_derivative_past_grazing_changes_with_the_power_of_the_law(contact, power):
     # The contact lasts as the square root of its depth d; its stiffness is d^0.5 (Hertz) or constant.
     specimen = gong2025(contact=contact)
     motion = base_transmissibility(specimen, DRIVE.frequency_hz)[0]

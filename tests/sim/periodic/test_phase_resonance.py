@@ -24,7 +24,7 @@ def hardening():
         (PhaseReference.ABSOLUTE, (480.0, 520.0)),
     ],
 )
-def test_without_contact_phase_resonance_is_linear_quadrature(of, band_hz):
+def test_phase_resonance_without_contact_is_linear_quadrature(of, band_hz):
     specimen = gong2025()
     branch = phase_resonance_branch(specimen, band_hz, (1e-8, 1e-7), of)
     assert np.ptp(branch.frequencies_hz) < 1e-6
@@ -73,11 +73,11 @@ def test_a_failed_newton_iteration_is_refused(low_m):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))
 
 
-def test_a_band_that_holds_several_modes_is_refused_with_their_frequencies():
+def test_a_band_with_several_modes_is_refused_with_their_frequencies():
     with pytest.raises(ValueError, match=r"is at 94\.6"):
         phase_resonance_branch(gong2025(), (50.0, 600.0), (1e-8, 1e-7))
 
 
-def test_without_damping_there_is_no_phase_resonance():
+def test_an_undamped_specimen_has_no_phase_resonance():
     with pytest.raises(ValueError, match="without damping has no phase resonance"):
         phase_resonance_branch(gong2025(0.0), (92.0, 97.0), (1e-8, 1e-7))

@@ -26,7 +26,7 @@ def test_the_known_periodic_state_is_found(shape):
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(100.0, 5e-6), (130.0, 20e-6)])
-def test_the_product_of_multipliers_is_given_by_damping(frequency_hz, amplitude_m):
+def test_the_product_of_multipliers_follows_from_damping(frequency_hz, amplitude_m):
     # Liouville's theorem: the contact, which has no loss, cannot change the volume.
     orbit = periodic_orbit(SPECIMEN, Harmonic(frequency_hz, amplitude_m), OrbitShape.MIRRORED)
     product = np.prod(orbit.floquet_multipliers)
@@ -36,7 +36,7 @@ def test_the_product_of_multipliers_is_given_by_damping(frequency_hz, amplitude_
         assert np.abs(orbit.floquet_multipliers - value).min() < 1e-7
 
 
-def test_without_contact_the_orbit_is_the_linear_response():
+def test_the_orbit_without_contact_is_the_linear_response():
     specimen, drive = gong2025(contact="linear"), Harmonic(266.0, 5e-6)
     orbit = periodic_orbit(specimen, drive, start=np.zeros(6))
     linear = np.abs(base_transmissibility(specimen, 266.0)[0])
@@ -68,7 +68,7 @@ def test_the_map_slopes_match_a_linear_flow():
     np.testing.assert_allclose(slope, origin / scales, atol=1e-9 * np.abs(origin / scales).max())
 
 
-def test_chaos_has_no_period_and_a_settled_orbit_has_one():
+def test_chaos_has_no_period_and_a_settled_orbit_has_period_one():
     drive = Harmonic(130.0, 20e-6)
     section = stroboscopic_section(SPECIMEN, drive, 300)
     assert smallest_period(section, state_scales(SPECIMEN, drive)) == 1
