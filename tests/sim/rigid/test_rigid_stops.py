@@ -119,7 +119,7 @@ class Oracle:
     ("restitution", "drive"),
     [(1.0, BOUNCING), (0.8, BOUNCING), (0.5, STICKING), (0.0, STICKING)],
 )
-def test_an_independent_event_driven_integrator_agrees(restitution, drive):
+def test_rigid_stop_motion_agrees_with_an_event_driven_integrator(restitution, drive):
     specimen = rigid(restitution)
     oracle = Oracle(specimen, drive)
     theirs = oracle.run(0.02, np.zeros(6))
@@ -232,7 +232,7 @@ def bound_response(specimen, frequency_hz):
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("mode", [0, 1])
-def test_with_a_vanishing_gap_the_resonances_match_the_bound_pair(restitution, mode):
+def test_resonances_with_a_vanishing_gap_match_the_joined_masses(restitution, mode):
     specimen = rigid(restitution, gap_m=1e-10)
     resonance = float(specimen.bound_frequencies_hz[mode])
     for frequency_hz in (0.99 * resonance, resonance):
@@ -241,7 +241,7 @@ def test_with_a_vanishing_gap_the_resonances_match_the_bound_pair(restitution, m
         assert response.response_ii == pytest.approx(bound_response(specimen, frequency_hz), rel=2e-3)
 
 
-def test_ever_stiffer_contacts_approach_rigid_stops_at_the_rate_of_their_contact_time():
+def test_stiff_contacts_converge_to_rigid_stops_as_their_contact_time():
     rigid_end = integrate(rigid(1.0), BOUNCING, 0.01, Accuracy.REFERENCE)
     errors = []
     for stiffness in (1e13, 1e15, 1e17):
@@ -370,7 +370,7 @@ def test_a_chattering_sweep_equals_its_sampled_drive():
 @example(first_s=0.020404096147730984, restitution=0.6).via(
     "a release whose speed is rounding of either sign"
 )
-def test_a_split_run_equals_the_whole_even_if_held(first_s, restitution):
+def test_a_split_run_equals_the_whole_even_during_sticking(first_s, restitution):
     specimen = rigid(restitution)
     for drive in (STICKING, LinearSweep(180.0, 220.0, 0.03, 50e-6)):
         whole = integrate(specimen, drive, 0.03, Accuracy.REFERENCE)
