@@ -33,7 +33,7 @@ def ledger(tmp_path, monkeypatch):
     ],
     ids=["hertz", "hertz, automatic", "power:5", "linear", "with a tangent"],
 )
-def test_scenes_cost_the_estimate_within_its_factor(ledger, contact, duration, observe):
+def test_the_computing_time_of_scenes_is_within_the_estimated_factor(ledger, contact, duration, observe):
     random = np.random.default_rng(3)
     scenes = [
         Scene(
@@ -69,7 +69,7 @@ def test_a_plan_states_cost_uncertainty_and_source(ledger):
     )
 
 
-def test_costs_of_larger_budgets_are_learnt_separately(ledger):
+def test_computing_times_of_larger_budgets_are_learnt_separately(ledger):
     usual, patient = (Scene(gong2025(), Harmonic(260.0, 5e-6), budget_s=budget_s) for budget_s in (1.0, 10.0))
     for _ in range(FEWEST):
         learn_cost(usual, 0.1)

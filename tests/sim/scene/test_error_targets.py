@@ -27,5 +27,5 @@ def test_stated_errors_hold_and_targets_are_met_for_fixed_starts(campaign, index
         assert target["stated"] <= target["error"]
 
 
-def test_scenes_are_the_same_in_every_shard(campaign):
+def test_random_scenes_of_the_campaign_are_reproducible(campaign):
     assert campaign["drawn_scene"](SEED, 7) == campaign["drawn_scene"](SEED, 7)

@@ -13,7 +13,7 @@ def ledger(tmp_path):
     return CostLedger(tmp_path / "costs" / "here.json")
 
 
-def test_without_experience_a_plan_keeps_its_estimate_and_wide_factor(ledger):
+def test_a_cost_estimate_without_experience_keeps_its_wide_factor(ledger):
     expected = ledger.expected(KIND, 2.0)
     assert (expected.time_s, expected.runs) == (2.0, 0)
     assert expected.factor >= 10.0
@@ -36,13 +36,13 @@ def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
     assert np.mean(held) < 0.985 or scatter < 0.2
 
 
-def test_estimates_follow_a_slower_machine(ledger):
+def test_cost_estimates_follow_a_slower_machine(ledger):
     for taken_s in [1.0] * 100 + [3.0] * 100:
         ledger.learn(KIND, 1.0, taken_s)
     assert ledger.expected(KIND, 1.0).time_s == pytest.approx(3.0, rel=0.05)
 
 
-def test_a_new_kind_uses_the_nearest_known_kind(ledger):
+def test_costs_of_a_new_kind_of_run_are_taken_from_the_nearest_kind(ledger):
     for _ in range(FEWEST):
         ledger.learn("event driven/hertz/standard", 1.0, 0.5)
         ledger.learn("polynomial/power/standard", 1.0, 4.0)
@@ -50,7 +50,7 @@ def test_a_new_kind_uses_the_nearest_known_kind(ledger):
     assert ledger.expected("polynomial/power/quick", 1.0).time_s == pytest.approx(4.0)
 
 
-def test_experience_is_kept_for_the_next_process(ledger, tmp_path):
+def test_learnt_costs_are_stored_for_the_next_process(ledger, tmp_path):
     for taken_s in (0.2, 0.3, 0.25):
         ledger.learn(KIND, 1.0, taken_s)
     ledger.save()
@@ -63,13 +63,13 @@ def test_experience_is_kept_for_the_next_process(ledger, tmp_path):
     "text",
     ["", "{", "[]", '{"a": 1}', '{"a": {"runs": -3, "mean": 0.0, "variance": 1.0}}', '{"a": {"mean": NaN}}'],
 )
-def test_a_damaged_file_is_ignored(tmp_path, text):
+def test_a_damaged_cost_file_is_ignored(tmp_path, text):
     path = tmp_path / "here.json"
     path.write_text(text)
     assert CostLedger(path).expected("a", 1.0).runs == 0
 
 
-def test_an_unwritable_folder_only_loses_experience(tmp_path):
+def test_costs_are_learnt_even_if_their_folder_is_not_writable(tmp_path):
     (tmp_path / "costs").write_text("a file in the way")
     ledger = CostLedger(tmp_path / "costs" / "here.json")
     for _ in range(FEWEST):

@@ -9,7 +9,7 @@ QUIET, LOUD = Harmonic(200.0, 1e-6), Harmonic(260.0, 5e-6)
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "rigid:0.8", "linear"])
 @pytest.mark.parametrize("duration", [FixedDuration(), AutomaticDuration()], ids=["fixed", "automatic"])
-def test_provably_contact_free_motion_is_answered_in_closed_form(contact, duration):
+def test_provably_contact_free_motion_is_planned_in_closed_form(contact, duration):
     plan = plan_scene(Scene(gong2025(contact=contact), QUIET, duration=duration))
     assert plan.method is Method.CLOSED_FORM
     assert "closed form" in plan.explain()
@@ -31,7 +31,7 @@ def test_a_transient_within_the_window_is_integrated():
         assert "has not decayed" in plan.explain()
 
 
-def test_a_force_at_every_p_is_always_integrated():
+def test_a_contact_force_at_every_p_is_always_integrated():
     assert plan_scene(Scene(gong2025(contact="power:7"), QUIET)).method is Method.POLYNOMIAL
 
 

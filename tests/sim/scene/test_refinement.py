@@ -93,7 +93,7 @@ def test_the_error_of_a_mean_over_starts_contains_that_of_the_runs():
         ("rigid:0.6", 7.22e-6, 5.448e-6, 247.9, 5.844e-6, True),
     ],
 )
-def test_a_mean_over_starts_is_chaotic_only_if_a_small_change_keeps_growing(
+def test_only_growing_perturbations_make_a_mean_over_starts_chaotic(
     contact, gap_m, damping_s, frequency_hz, amplitude_m, is_chaos
 ):
     specimen = gong2025(damping_s, gap_m, contact)
@@ -103,7 +103,7 @@ def test_a_mean_over_starts_is_chaotic_only_if_a_small_change_keeps_growing(
     assert (found.motion is MotionKind.CHAOTIC_SO_FAR) is is_chaos
 
 
-def test_answers_improve_until_the_time_is_over():
+def test_predictions_improve_until_the_requested_time_is_over():
     answers = list(refine_scene(asked(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
     reports = [each.target for each in answers]
     assert len(answers) > 1
@@ -115,7 +115,7 @@ def test_answers_improve_until_the_time_is_over():
     assert "needs about" in reports[-1].text
 
 
-def test_a_motion_that_never_settles_is_answered_for_a_named_window():
+def test_a_motion_that_never_settles_is_predicted_for_a_stated_window():
     scene = asked(frequency_hz=101.0, amplitude_m=1e-6, damping_s=0.0, error=1e-6)
     found = solve_scene(scene)
     named = FixedDuration(found.duration_s, found.window_s)
@@ -125,7 +125,7 @@ def test_a_motion_that_never_settles_is_answered_for_a_named_window():
     assert np.all(off(found, truth) <= 1.0)
 
 
-def test_a_motion_without_contact_is_answered_in_closed_form():
+def test_a_motion_without_contact_is_predicted_in_closed_form():
     found = solve_scene(asked(amplitude_m=1e-6, error=0.1))
     assert found.method is Method.CLOSED_FORM
     assert found.target.is_met
@@ -138,14 +138,14 @@ def test_an_error_below_rounding_is_reported_as_unreachable():
     assert report.text.endswith("is not known")
 
 
-def test_an_answer_in_a_transient_states_that_it_is_not_settled():
+def test_the_error_of_a_prediction_in_a_transient_includes_the_transient():
     soon = solve_scene(asked(time_s=1e-6))
     settled = solve_scene(asked(error=1e-6))
     assert soon.error_estimate > abs(soon.response_i / settled.response_i - 1.0) > 1e-3
     assert soon.error_estimate > abs(soon.relative_ii / settled.relative_ii - 1.0)
 
 
-def test_the_time_of_one_drive_period_is_the_shortest():
+def test_a_computing_time_shorter_than_one_drive_period_is_refused():
     scene = Scene(gong2025(), Harmonic(1e-3, 1e-2), target=Target(time_s=1e-3))
     with pytest.raises(ValueError, match=r"takes longer to follow; give more time\.$"):
         solve_scene(scene)
@@ -166,18 +166,18 @@ def test_options_fixed_by_an_error_target_are_refused(given, named):
 
 
 @pytest.mark.parametrize("given", [{}, {"error": 0.0}, {"error": 1.1}, {"time_s": 0.0}, {"time_s": np.inf}])
-def test_a_target_needs_an_error_or_a_time_in_range(given):
+def test_a_target_without_a_valid_error_or_time_is_refused(given):
     with pytest.raises(ValueError, match="not allowed"):
         Target(**given)
 
 
-def test_a_window_may_be_named_beside_a_target():
+def test_a_window_length_may_be_given_with_a_target():
     scene = asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.05)
     found = solve_scene(replace(scene, duration=AutomaticDuration(window_s=1.0)))
     assert found.window_s == pytest.approx(1.0)
 
 
-def test_the_error_of_a_mean_holds_in_95_percent():
+def test_the_stated_error_of_a_mean_covers_it_in_95_percent():
     random = np.random.default_rng(3)
     held = [
         abs(values.mean() - 1.0) <= mean_error([np.full(4, each) for each in values], None)[0] * values.mean()
@@ -188,7 +188,7 @@ def test_the_error_of_a_mean_holds_in_95_percent():
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
 @pytest.mark.parametrize("other", [0.3, 3.0])
-def test_the_error_of_a_mean_over_two_motions_holds_and_is_not_far_too_wide(share, other):
+def test_the_error_of_a_mean_over_two_motions_holds_and_is_not_too_wide(share, other):
     random, count = np.random.default_rng(4), 100
     true, scatter = 1.0 + share * (other - 1.0), abs(other - 1.0) * np.sqrt(share * (1.0 - share) / count)
     held, errors = [], []

@@ -23,7 +23,7 @@ def test_a_repeating_section_has_its_shortest_period(period):
     assert found == Repetition(period, 0.0)
 
 
-def test_a_decay_has_settled_when_its_remainder_is_small():
+def test_a_decay_counts_as_settled_when_its_remainder_is_small():
     steps = np.arange(COUNT)
     slow = 1.0 + 1e-3 * np.exp(-steps / (3.0 * FORGETTING))
     assert repetition(section_of(slow), OMEGA, FORGETTING, SHARP) is None
@@ -34,24 +34,24 @@ def test_a_decay_has_settled_when_its_remainder_is_small():
     assert left < found.distance < 3.0 * left
 
 
-def test_a_slow_drift_with_no_end_does_not_repeat():
+def test_an_endless_slow_drift_does_not_count_as_repeating():
     drift = 1.0 + 1e-7 * np.arange(COUNT)
     assert repetition(section_of(drift), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_a_torus_and_a_noise_do_not_repeat():
+def test_quasi_periodic_motion_and_noise_do_not_count_as_repeating():
     torus = 1.0 + 0.1 * np.sin(np.sqrt(2.0) * np.arange(COUNT))
     noise = np.random.default_rng(1).uniform(0.5, 1.5, COUNT)
     assert repetition(section_of(torus), OMEGA, FORGETTING, SHARP) is None
     assert repetition(section_of(noise), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_nearly_equal_periods_are_not_separated_from_settling():
+def test_alternating_values_that_differ_by_5e_6_give_no_verdict():
     nearly_one = np.resize([1.0, 1.0 + 5e-6], COUNT)
     assert repetition(section_of(nearly_one), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_too_short_a_section_gives_no_verdict():
+def test_a_section_of_five_points_gives_no_verdict():
     assert repetition(section_of(np.ones(5)), OMEGA, FORGETTING, SHARP) is None
 
 

@@ -93,7 +93,7 @@ def test_intermittent_chaos_is_not_classified_as_a_torus():
         ((MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED), (True, False, False)),
     ],
 )
-def test_one_of_several_chaotic_motions_may_become_another(kinds, final):
+def test_one_of_several_chaotic_motions_may_turn_into_another(kinds, final):
     """Of 400 starts followed for 300 s, 2 % were left where nine of sixteen were after a minute."""
     counts = counts_of(kinds, range(1, len(kinds) + 1))
     assert tuple(each.is_final for each in counts) == final

@@ -4,7 +4,7 @@ import pytest
 from vibench.sim.scene.scatter import bootstrap_of_largest, window_scatter
 
 
-def test_the_scatter_is_the_closed_form_bootstrap_of_the_maximum():
+def test_the_closed_form_bootstrap_of_a_maximum_matches_random_draws():
     random = np.random.default_rng(3)
     peaks, blocks = random.gumbel(5.0, 0.3, 40), 5
     drawn = random.choice(peaks, (200_000, blocks)).max(axis=1)

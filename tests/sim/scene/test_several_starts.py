@@ -46,13 +46,13 @@ def short_chaos():
     return solve_scene(SHORT_CHAOS)
 
 
-def test_a_start_dependent_motion_is_named_without_further_starts():
+def test_start_dependence_is_excluded_without_further_starts():
     found = solve_scene(scene("hertz", 130.0, 20e-6))
     assert (found.memory, found.ensemble, found.is_one_of_several) == (StartMemory.KEPT, None, False)
     assert solve_scene(scene("hertz", 200.0, 1e-6)).memory is StartMemory.KEPT
 
 
-def test_without_a_budget_only_chaos_is_recognised():
+def test_start_dependence_without_a_budget_is_known_only_for_chaos():
     quiet = solve_scene(scene("hertz", 130.0, 20e-6, budget_s=0.0))
     chaos = solve_scene(scene("hertz", 260.0, 5e-6, budget_s=0.0))
     assert (quiet.memory, quiet.ensemble) == (StartMemory.UNKNOWN, None)
@@ -101,7 +101,7 @@ def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
 
-def test_still_chaotic_starts_may_reach_an_unknown_motion():
+def test_starts_still_chaotic_at_the_end_count_as_possibly_unknown_motion():
     found = solve_scene(
         scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
     ).ensemble
@@ -123,7 +123,7 @@ def test_lasting_chaos_has_a_lower_bound_of_lifetime():
     assert not found.is_one_of_several
 
 
-def test_a_run_of_fixed_length_has_an_ensemble():
+def test_a_start_dependent_run_of_fixed_length_gets_an_ensemble():
     found = solve_scene(scene("hertz", 240.5, 5e-6, damping_time_s=3e-5, duration=FixedDuration(12.0, 2.0)))
     assert (found.memory, found.duration_s) == (StartMemory.LOST, 12.0)
     assert found.ensemble.escape.escapes > 0
@@ -152,7 +152,7 @@ def test_a_larger_budget_follows_more_starts(short_chaos):
         replace(SHORT_CHAOS, budget_s=-1.0)
 
 
-def test_an_answer_for_json_states_every_motion(lottery):
+def test_a_prediction_as_json_lists_every_motion(lottery):
     said = lottery.to_dict()["ensemble"]
     assert set(said) - {"asked"} == set(Ensemble.__dataclass_fields__) - {"requested_motion"}
     assert said["motions"][0]["share"]["share"] == lottery.ensemble.motions[0].share.share

@@ -26,7 +26,7 @@ def test_the_intervals_of_all_shares_together_hold_about_19_times_in_20(shares):
     assert held / len(drawn) > 0.93
 
 
-def test_unfinished_starts_may_reach_any_outcome():
+def test_share_intervals_allow_unfinished_starts_to_reach_any_motion():
     settled, pending = shares_of([Count(6, is_final=True), Count(10, is_final=False)])
     alone = wilson_share(6, 16)
     assert (settled.share, settled.low, settled.high) == (alone.share, alone.low, 1.0)
@@ -50,7 +50,7 @@ def test_chaos_without_escape_has_only_a_lower_bound_of_lifetime():
     assert (found.rate_per_s, found.low_per_s) == (0.0, 0.0)
 
 
-def test_each_unfinished_outcome_may_turn_into_another():
+def test_share_intervals_allow_unfinished_motions_to_exchange():
     one, other = shares_of([Count(4, is_final=False), Count(4, is_final=False)])
     assert (one.low, one.high) == (other.low, other.high) == (0.0, 1.0)
     settled, *open_ones = shares_of([Count(8, is_final=True), *2 * [Count(4, is_final=False)]])

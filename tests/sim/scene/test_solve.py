@@ -53,7 +53,7 @@ def test_the_closed_form_matches_transmissibility_and_final_state():
 
 
 @pytest.mark.parametrize(("contact", "frequency_hz", "amplitude_m"), PERIODIC)
-def test_a_fixed_duration_answers_as_the_plain_run_does(contact, frequency_hz, amplitude_m):
+def test_a_fixed_duration_prediction_equals_the_plain_run(contact, frequency_hz, amplitude_m):
     scene = scene_of(contact, frequency_hz, amplitude_m, duration=FixedDuration(8.0, 2.0))
     found = solve_scene(scene)
     plain = steady_response(scene.specimen, scene.drive, scene.accuracy, 8.0, 2.0)
@@ -126,7 +126,7 @@ def test_perturbations_are_followed_where_chaos_is_uncertain(monkeypatch):
     assert all(has for start_s, has in carried[:12] if start_s >= 9.0 - 1e-9)
 
 
-def test_other_runs_of_the_same_chaos_are_within_the_stated_error():
+def test_chaotic_runs_from_other_starts_are_within_the_stated_error():
     """19 in 20 should, and were the measured 9 in 10 true, 8 of 20 outside were one chance in 2400."""
     duration = FixedDuration(12.0, 4.0)
     found = solve_scene(replace(CHAOS, duration=duration))
@@ -161,7 +161,7 @@ def test_chaos_ending_in_a_torus_is_not_chaotic():
     assert found.motion is MotionKind.QUASI_PERIODIC
 
 
-def test_the_spectrum_has_the_drive_line_of_response_two_and_the_chaos_beside_it():
+def test_the_spectrum_contains_response_ii_at_the_drive_and_chaotic_noise():
     observe = (Observable.RESPONSE, Observable.SPECTRUM)
     periodic = solve_scene(scene_of("hertz", 130.0, 20e-6, observe=observe, duration=FixedDuration(4.0, 1.0)))
     chaos = solve_scene(replace(CHAOS, observe=observe, duration=FixedDuration(4.0, 1.0)))
@@ -175,7 +175,7 @@ def test_the_spectrum_has_the_drive_line_of_response_two_and_the_chaos_beside_it
     assert np.max(periodic.spectrum[quiet]) < 1e-6
 
 
-def test_the_section_holds_a_state_for_every_period_of_the_window():
+def test_the_section_contains_one_state_per_drive_period_of_the_window():
     observe = (Observable.RESPONSE, Observable.POINCARE)
     found = solve_scene(replace(CHAOS, observe=observe, duration=FixedDuration(4.0, 1.0)))
     assert found.section.shape == (260, 6)
@@ -184,7 +184,7 @@ def test_the_section_holds_a_state_for_every_period_of_the_window():
     np.testing.assert_allclose(quiet.section[-1], quiet.final_state, atol=1e-15)
 
 
-def test_the_exponent_matches_the_motion_reached():
+def test_the_lyapunov_exponent_matches_the_final_motion():
     observe = (Observable.RESPONSE, Observable.LYAPUNOV)
     chaos = solve_scene(replace(CHAOS, observe=observe))
     assert chaos.lyapunov_per_s == pytest.approx(112.0, abs=6.0 * chaos.lyapunov_error_per_s + 2.0)
@@ -214,7 +214,7 @@ def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent
             assert each.lyapunov_per_s is None or each.lyapunov_per_s > 3.0 * each.lyapunov_error_per_s
 
 
-def test_a_diverging_motion_has_an_outcome_without_numbers():
+def test_a_diverging_motion_has_an_outcome_and_no_response():
     """A start so far out that the force is more than numbers can hold."""
     begins_far = Given((0.0, 1e300, -1e300, 0.0, 0.0, 0.0))
     scene = scene_of("power:7", 130.0, 20e-6, start=begins_far, duration=FixedDuration(0.1, 0.05))
@@ -234,7 +234,7 @@ def heavy_on_light():
 
 
 @pytest.mark.thorough
-def test_exchange_of_displacement_and_velocity_is_no_growth():
+def test_exchange_of_displacement_and_velocity_is_not_taken_for_growth():
     slow = Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
     found = solve_scene(slow)
     assert found.memory is StartMemory.KEPT
@@ -250,7 +250,7 @@ def test_a_scene_of_too_many_steps_ends_with_a_sentence(monkeypatch):
     assert found.ensemble is None
 
 
-def test_perturbations_count_in_the_steps_of_a_run(monkeypatch):
+def test_perturbations_count_towards_the_step_limit_of_a_run(monkeypatch):
     """A step with small changes takes four times as long, and images of a period had no limit together."""
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 100_000)
     plain, tangent, mapped = (
@@ -270,7 +270,7 @@ def test_perturbations_count_in_the_steps_of_a_run(monkeypatch):
     ("contact", "damping_time_s", "frequency_hz", "periods"),
     [("linear", 1e-6, 400.0, 3000), ("linear", 2e-6, 600.0, 3000), ("hertz", 2e-5, 380.0, 300)],
 )
-def test_a_fading_motion_is_undecided(contact, damping_time_s, frequency_hz, periods):
+def test_a_slowly_decaying_motion_is_undecided(contact, damping_time_s, frequency_hz, periods):
     """Neither repeating nor growing, it was called quasi-periodic, with a response half too large."""
     specimen = gong2025(contact=contact, damping_time_s=damping_time_s)
     length = AutomaticDuration(window_s=200 / frequency_hz, longest_s=periods / frequency_hz)
@@ -305,7 +305,7 @@ def test_a_window_of_too_many_drive_periods_is_refused():
         solve_scene(fast)
 
 
-def test_a_perturbation_may_vanish():
+def test_a_perturbation_that_shrinks_to_zero_is_handled():
     """It shrinks below the smallest number in a gap of 1e-300 m: "math domain error" was the answer."""
     tiny = Scene(
         gong2025(gap_m=1e-300, contact="power:5"), Harmonic(260.0, 5e-6), duration=FixedDuration(0.5, 0.2)

@@ -102,7 +102,7 @@ def test_lines_of_two_windows_agree_within_the_stated_error():
     ("contact", "amplitude_m", "frequency_hz", "duration_s"),
     [("rigid:1", 10e-6, 100.0, 0.4), ("linear_gap", 10e-6, 100.0, 0.35), ("rigid:0.5", 20e-6, 240.0, 0.4)],
 )
-def test_growing_rounding_errors_are_in_the_stated_error_of_exact_laws(
+def test_stated_errors_of_exact_laws_include_growing_rounding_errors(
     contact, amplitude_m, frequency_hz, duration_s
 ):
     """All lengths times a number: the same scene. Exact laws, compared with themselves, said 1e-11."""
@@ -117,7 +117,7 @@ def test_growing_rounding_errors_are_in_the_stated_error_of_exact_laws(
     assert np.all(np.abs(answers[:, None] - answers) <= stated[:, None] + stated)
 
 
-def test_step_errors_before_divergence_are_in_the_stated_error():
+def test_stated_errors_include_step_errors_before_divergence():
     # The largest p comes early, where no two starts differ yet, and is off by 1.6e-5 at quick.
     start = Given((-3.011e-05, -5.022e-05, 4.918e-05, -0.03867, 0.003417, -0.01607))
     drive, length = Harmonic(300.749, 1.661e-05, 4.993954), FixedDuration(0.3, 0.3)
