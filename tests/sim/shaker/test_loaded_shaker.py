@@ -100,7 +100,7 @@ def test_base_and_specimen_move_as_in_the_closed_form_of_the_loaded_rig(linear_m
     assert lines(motion.m0_velocity) / lines(drive) == pytest.approx(velocity, rel=1e-3)
 
 
-def test_the_specimen_notches_the_base_where_it_resonates(linear_motion):
+def test_the_base_motion_has_a_notch_at_the_specimen_resonance(linear_motion):
     drive, motion = linear_motion
     measured = np.abs(lines(motion.base_acceleration) / lines(drive))
     alone = np.abs(per_volt(LINES_HZ)[0])
@@ -169,7 +169,7 @@ def test_the_amplifier_clips_at_its_largest_voltage():
     assert table.structure["limited_steps"] > SECOND / 2
 
 
-def test_the_amplifier_gives_no_more_current_than_its_limiter_is_set_to():
+def test_the_amplifier_current_stays_within_its_limit():
     table = shaken(amplifier=replace(AMPLIFIER, current_limit_a=1.0))
     motion = table.move(tones(3.0, [200.0]), np.zeros(SECOND), SECOND)
     current = motion.ends[:, COLUMN["current"]]
@@ -177,7 +177,7 @@ def test_the_amplifier_gives_no_more_current_than_its_limiter_is_set_to():
     assert table.structure["limited_steps"] > 0
 
 
-def test_noise_is_added_at_the_amplifiers_output():
+def test_noise_is_added_at_the_amplifier_output():
     table = shaken()
     noise = np.random.default_rng(1).standard_normal(SECOND)
     assert np.array_equal(table.move(np.zeros(SECOND), noise).amplifier_voltage, noise)
@@ -209,13 +209,13 @@ def test_a_non_finite_motion_is_an_error_with_its_time():
         table.move(drive, np.zeros(100))
 
 
-def test_the_state_at_the_ends_of_steps_is_kept_only_when_requested():
+def test_states_at_step_ends_are_kept_only_on_request():
     table = shaken()
     assert table.move(np.zeros(10), np.zeros(10)).ends.shape == (0, len(MOTION_COLUMNS))
     assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))
 
 
-def test_two_consecutive_parts_equal_the_whole():
+def test_two_consecutive_simulations_equal_the_whole():
     drive = tones(0.7, [260.0])
     whole, parts = shaken(), shaken()
     expected = whole.move(drive, np.zeros(SECOND)).m0_velocity
@@ -224,7 +224,7 @@ def test_two_consecutive_parts_equal_the_whole():
     assert parts.impacts == whole.impacts > 0
 
 
-def test_the_voltage_recorded_at_the_coil_moves_the_table_as_the_amplifier_did():
+def test_replaying_the_recorded_coil_voltage_reproduces_the_table_motion():
     drive = tones(0.7, [266.0])
     measured = shaken()
     recorded = measured.move(drive, 0.01 * np.random.default_rng(2).standard_normal(SECOND))
@@ -235,7 +235,7 @@ def test_the_voltage_recorded_at_the_coil_moves_the_table_as_the_amplifier_did()
     assert driven.structure["limited_steps"] == 0
 
 
-def test_one_call_equals_its_blocks():
+def test_one_simulation_call_equals_a_series_of_blocks():
     drive, block = tones(0.7, [266.0])[:9500], 1000
     whole, stepwise = shaken(), shaken()
     motion = whole.move(drive, block=block)
