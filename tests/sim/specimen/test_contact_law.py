@@ -26,7 +26,7 @@ def test_a_fitted_power_law_has_the_force_of_hertz_at_one_micrometre(name):
 
 @settings(deadline=None)
 @given(st.floats(1e-6, 60e-6))
-def test_the_sum_of_three_powers_lies_between_its_lowest_and_its_highest(p):
+def test_the_three_power_force_is_between_its_lowest_and_highest_power(p):
     at, still = np.array([p]), np.zeros(1)
     third, sum_, seventh = (
         float(spring_of(gong2025(contact=name)).force(at, still)[0])
@@ -57,7 +57,7 @@ def test_a_high_power_law_is_finite_and_negligible_below_its_reference():
         ("power:3@0.25+7@0.75", fit_power_law([3, 7], HERTZ.stiffness, GAP, shares=[0.25, 0.75])),
     ],
 )
-def test_a_name_gives_its_law(text, law):
+def test_a_contact_law_is_found_by_its_name(text, law):
     assert law_by_name(text, HERTZ.stiffness, GAP) == law
 
 
@@ -78,7 +78,7 @@ def test_a_name_gives_its_law(text, law):
         ("linear_gap:nan", "Stop stiffness nan N/m is not allowed"),
     ],
 )
-def test_a_wrong_name_is_refused_in_one_sentence(text, sentence):
+def test_a_wrong_contact_law_name_is_refused_in_one_sentence(text, sentence):
     with pytest.raises(ValueError, match=sentence):
         law_by_name(text, HERTZ.stiffness, GAP)
 
@@ -86,7 +86,7 @@ def test_a_wrong_name_is_refused_in_one_sentence(text, sentence):
 @pytest.mark.parametrize(
     "name", ["hertz", "linear", "linear_gap", "hunt_crossley:0.5", "rigid:0.7", "power:3+5+7"]
 )
-def test_a_law_round_trips_through_a_file(name):
+def test_a_contact_law_round_trips_through_a_file(name):
     law = gong2025(contact=name).contact
     adapter = TypeAdapter(ContactLaw)
     assert adapter.validate_json(adapter.dump_json(law)) == law
@@ -97,5 +97,5 @@ def test_a_power_law_without_terms_is_refused():
         PowerLaw(46e-6, ())
 
 
-def test_the_union_and_the_registry_contain_the_same_laws():
+def test_the_contact_law_union_and_registry_contain_the_same_laws():
     assert {law.__dataclass_fields__["kind"].default for law in get_args(ContactLaw)} == set(CONTACT_LAWS)

@@ -36,7 +36,7 @@ def test_the_peaks_lie_at_the_modes():
 
 
 @given(DAMPINGS, DAMPINGS, DAMPINGS)
-def test_the_modes_rebuild_any_state_and_its_rate(first, second, third):
+def test_the_modes_rebuild_any_state_and_its_time_derivative(first, second, third):
     k0, k1, k2 = gong2025().stiffnesses
     specimen = dataclasses.replace(gong2025(), dampings=(first * k0, second * k1, third * k2))
     form = modal_form(specimen)

@@ -18,18 +18,18 @@ def test_the_free_specimen_has_the_three_modes_of_the_paper():
     np.testing.assert_allclose(gong2025().natural_frequencies_hz, [94.6, 266.2, 499.6], atol=0.05)
 
 
-def test_the_specimen_bound_together_has_the_two_terminal_resonances():
+def test_the_specimen_with_joined_masses_has_the_two_terminal_resonances():
     np.testing.assert_allclose(gong2025().bound_frequencies_hz, [201.5, 436.0], atol=0.05)
 
 
-def test_damping_in_proportion_to_stiffness_gives_a_ratio_that_grows_with_frequency():
+def test_stiffness_proportional_damping_ratios_grow_with_frequency():
     specimen = gong2025(damping_time_s=3e-5)
     np.testing.assert_allclose(
         specimen.damping_ratios, np.pi * specimen.natural_frequencies_hz * 3e-5, rtol=1e-12
     )
 
 
-def test_the_si_reading_of_the_papers_damping_is_overdamped_in_every_mode():
+def test_the_paper_damping_read_in_si_units_overdamps_every_mode():
     np.testing.assert_allclose(gong2025(damping_time_s=1e-2).damping_ratios, [2.97, 8.36, 15.7], rtol=3e-3)
 
 
@@ -45,7 +45,7 @@ def test_an_unknown_field_of_a_stored_specimen_is_refused():
         TypeAdapter(Specimen).validate_python(stored)
 
 
-def test_dampers_that_couple_the_modes_have_the_ratios_of_the_poles():
+def test_damping_ratios_of_coupled_modes_match_the_poles():
     specimen = replace(
         gong2025(),
         masses=(5e-3, 2e-3, 3e-3),
@@ -67,7 +67,7 @@ def test_dampers_that_couple_the_modes_have_the_ratios_of_the_poles():
     np.testing.assert_allclose(specimen.damping_ratios, [0.71605, 0.16889, 0.03498], atol=1e-5)
 
 
-def test_ratios_of_modes_that_hardly_couple_match_modes_that_do_not():
+def test_damping_ratios_are_continuous_at_vanishing_mode_coupling():
     """The poles of an overdamped mode are real: two of them, whose product is the square of its frequency."""
     for damping_time_s in (2e-5, 1e-2):
         alone = gong2025(damping_time_s=damping_time_s)

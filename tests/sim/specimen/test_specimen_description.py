@@ -41,7 +41,7 @@ def written(folder, text, name="mine.toml"):
     return path
 
 
-def test_the_papers_specimen_is_one_file_among_others_and_the_same_to_the_last_bit():
+def test_the_shipped_gong2025_file_equals_the_built_in_specimen():
     assert load_specimen("gong2025").specimen() == gong2025()
     assert {
         "gong2025",
@@ -54,7 +54,7 @@ def test_the_papers_specimen_is_one_file_among_others_and_the_same_to_the_last_b
     } <= shipped_specimens().keys()
 
 
-def test_a_response_through_the_file_is_the_papers_to_the_last_digit():
+def test_a_response_of_the_gong2025_file_equals_the_built_in_specimen():
     drive = Harmonic(130.0, 20e-6)
     own, file = (
         steady_response(each, drive, duration_s=1.0, window_s=0.5)
@@ -71,7 +71,7 @@ def test_every_shipped_specimen_can_be_simulated(name):
     assert math.isfinite(response.response_i)
 
 
-def test_two_masses_match_their_own_equations_in_and_out_of_contact():
+def test_the_two_mass_specimen_matches_its_equations_with_and_without_contact():
     specimen = load_specimen("two_masses").specimen()
     (_, m1, m2), (_, k1, k2), (_, c1, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
     frequency_hz = np.linspace(20.0, 600.0, 59)
@@ -92,20 +92,20 @@ def test_two_masses_match_their_own_equations_in_and_out_of_contact():
     assert one.relative_ii == pytest.approx(other.relative_ii, rel=1e-3)
 
 
-def test_a_file_states_every_number_itself(tmp_path):
+def test_a_specimen_file_may_state_every_number(tmp_path):
     specimen = load_specimen(written(tmp_path, WHOLE)).specimen()
     assert specimen.stiffnesses == (2e4, 800.0, 1.2e4)
     assert specimen.gaps_m == (30e-6, math.inf)
     assert specimen.contact.stiffness == 1e5
 
 
-def test_a_file_may_begin_with_a_byte_order_mark(tmp_path):
+def test_a_specimen_file_may_begin_with_a_byte_order_mark(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(WHOLE, encoding="utf-8-sig")
     assert load_specimen(path) == load_specimen(written(tmp_path, WHOLE, "other.toml"))
 
 
-def test_a_file_may_start_from_another_beside_it(tmp_path):
+def test_a_specimen_file_may_be_based_on_another_file(tmp_path):
     written(tmp_path, WHOLE, "base.toml")
     own = written(tmp_path, 'model = "base.toml"\nname = "softer"\ndamping_time_s = 1e-5\n')
     specimen = load_specimen(own).specimen()
@@ -113,7 +113,7 @@ def test_a_file_may_start_from_another_beside_it(tmp_path):
     assert specimen.gaps_m == (30e-6, math.inf)
 
 
-def test_a_changed_specimen_loses_its_description(tmp_path):
+def test_a_specimen_with_changed_values_has_no_description_text(tmp_path):
     changed = load_specimen(written(tmp_path, 'name = "mine"\nmodel = "gong2025"\ngap_m = 62e-6\n'))
     assert "45 um" in load_specimen("gong2025").about
     assert changed.about == ""
@@ -164,13 +164,13 @@ def test_a_broken_specimen_file_is_refused_by_name(tmp_path, change, said):
     assert "\n" not in str(refusal.value)
 
 
-def test_files_that_start_from_each_other_are_refused(tmp_path):
+def test_specimen_files_based_on_each_other_are_refused(tmp_path):
     written(tmp_path, 'name = "a"\nmodel = "b.toml"\n', "a.toml")
     with pytest.raises(UnknownSpecimenError, match="comes back to it"):
         load_specimen(written(tmp_path, 'name = "b"\nmodel = "a.toml"\n', "b.toml"))
 
 
-def test_a_table_without_a_folder_opens_no_file(tmp_path):
+def test_a_specimen_table_outside_a_file_may_not_name_a_file(tmp_path):
     """What stands in a recording or in a study's answers names shipped specimens only."""
     with pytest.raises(ValidationError, match="no specimen that comes with vibench"):
         SpecimenTable.model_validate({"model": str(written(tmp_path, WHOLE))})
