@@ -138,7 +138,7 @@ def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
 
 
 @pytest.mark.slow
-def test_errors_on_workers_and_cancelling_are_as_with_threads(cluster, longer):
+def test_a_cluster_reports_errors_and_cancels_like_threads(cluster, longer):
     _, address, _ = cluster
     executor = ClusterExecutor(address, operator.neg)
     store = MemoryStore(longer)

@@ -19,14 +19,14 @@ def test_the_cost_of_a_point_is_estimated_from_its_neighbours():
     assert costs.estimate_s(4) == 1.0
 
 
-def test_a_point_that_was_measured_is_not_estimated_again():
+def test_the_cost_of_a_measured_point_is_not_estimated_again():
     costs = line_of([1.0] * 3)
     list(costs.learn(0, 3.0))
     list(costs.learn(1, 7.0))
     assert 0 not in list(costs.learn(1, 7.0))
 
 
-def test_plans_without_a_measured_neighbour_are_scaled_by_the_error_of_other_plans():
+def test_unmeasured_cost_estimates_are_scaled_by_the_error_of_measured_ones():
     costs = line_of([1.0, 1.0, 1.0, 2.0])
     is_missing = np.array([False, True, True, True])
     assert costs.left_s(is_missing) == pytest.approx(4.0)

@@ -6,7 +6,7 @@ from vibench.sim.study import frequency_range
 from vibench.sim.study._study import expand_ranges
 
 
-def test_a_range_includes_its_stop_when_it_is_hit():
+def test_a_frequency_range_includes_its_stop_if_a_step_reaches_it():
     assert frequency_range(10.0, 600.0, 1.0) == tuple(float(f) for f in range(10, 601))
     assert frequency_range(1.0, 2.0, 0.1)[-1] == pytest.approx(2.0)
     assert len(frequency_range(1.0, 2.0, 0.1)) == 11
@@ -34,18 +34,18 @@ def test_a_range_of_too_many_values_is_refused_before_it_is_made():
         frequency_range(1.0, 2.0, 1e-12)
 
 
-def test_ranges_and_numbers_mix_and_overlaps_count_once():
+def test_ranges_and_numbers_can_be_mixed_and_duplicates_count_once():
     given = [3, {"start": 1, "stop": 3, "step": 1}, {"start": 2.0, "stop": 2.5, "step": 0.25}]
     assert expand_ranges(given) == [1.0, 2.0, 2.25, 2.5, 3]
 
 
-def test_values_other_than_ranges_are_passed_to_their_validator():
+def test_values_other_than_ranges_are_left_to_later_validation():
     assert expand_ranges("all") == "all"
     assert expand_ranges({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
     assert expand_ranges([1.0, "two"]) == [1.0, "two"]
 
 
 @pytest.mark.parametrize("start", ["true", None, "20", True])
-def test_a_range_takes_three_numbers(start):
+def test_a_range_without_three_numbers_is_refused(start):
     with pytest.raises(ValueError, match="give three numbers"):
         expand_ranges({"start": start, "stop": 2.0, "step": 1.0})

@@ -46,7 +46,7 @@ def answers(curve):
         ({"gaps_m": [30e-6, 45e-6], "frequencies_hz": [100.0, 130.0, 160.0, 190.0]}, False),
     ],
 )
-def test_batches_are_used_for_long_independent_points(changed, in_lanes):
+def test_long_independent_study_points_are_solved_in_batches(changed, in_lanes):
     plan = Study(**{**CURVE, "duration_s": 20.0, "window_s": 1.0} | changed)
     assert (study_solver(plan) == InBatches()) is in_lanes
 
@@ -87,7 +87,7 @@ def test_batched_and_single_motions_agree_within_their_errors():
     assert kept.count(MotionKind.PERIODIC) >= 3
 
 
-def test_scenes_that_batches_do_not_support_are_solved_without_them():
+def test_scenes_that_batches_do_not_support_are_solved_singly():
     drive, length = Harmonic(130.0, 20e-6), FixedDuration(2.0, 0.5)
     scenes = [
         Scene(gong2025(contact="rigid:0.5"), drive, duration=length, budget_s=0.0),
@@ -99,7 +99,7 @@ def test_scenes_that_batches_do_not_support_are_solved_without_them():
     assert found[1].method is Method.CLOSED_FORM
 
 
-def test_a_thinned_long_lead_in_keeps_its_start():
+def test_a_thinned_long_lead_in_does_not_cause_start_dependence():
     # 13,000 drive periods, of which 4,096 states are held: another start is compared with these.
     scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
     assert solve_scene(scene).memory is StartMemory.KEPT
@@ -107,7 +107,7 @@ def test_a_thinned_long_lead_in_keeps_its_start():
 
 
 @pytest.mark.parametrize(("phase_rad", "length"), [(0.5 * np.pi, (20.0, 1.0)), (1.57, (20.0, 1.0))])
-def test_a_start_is_kept_with_one_contact_per_period(phase_rad, length):
+def test_one_contact_per_period_does_not_cause_start_dependence(phase_rad, length):
     drive = Harmonic(130.0, 20e-6, phase_rad)
     scene = Scene(gong2025(), drive, duration=FixedDuration(*length), budget_s=0.02)
     assert solve_scene(scene).memory is StartMemory.KEPT
@@ -134,7 +134,7 @@ def test_scenes_with_many_states_use_smaller_batches_with_equal_results(monkeypa
     assert [repr(each.prediction) for each in solve_scenes(scenes)] == together
 
 
-def test_impossible_work_is_planned_as_zero():
+def test_planned_work_stays_finite_with_unsolvable_points():
     study = Study(**CURVE, damping_times_s=[0.0, 1e300])
     assert np.isfinite(planned_work_s(study))
 

@@ -64,7 +64,7 @@ def resumed(path):
 
 
 @pytest.mark.thorough
-def test_a_killed_study_continues_and_ends_like_one_that_was_never_interrupted(
+def test_a_killed_and_resumed_study_gives_the_results_of_an_uninterrupted_study(
     tmp_path, truth, require_equal
 ):
     path, luck = tmp_path / "a.h5", random.Random(0)

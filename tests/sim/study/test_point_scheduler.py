@@ -27,7 +27,7 @@ def test_short_points_are_grouped_into_larger_jobs():
     assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
 
 
-def test_the_weight_of_a_point_includes_all_points_that_wait_for_it():
+def test_the_priority_of_a_point_includes_all_points_waiting_for_it():
     # 0 <- 1 <- 2 take 6 s in a row; 3 alone takes 5 s.
     scheduler = scheduler_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
     assert scheduler.take(0.1, 1) == (0,)
@@ -46,7 +46,7 @@ def test_the_successor_of_a_finished_point_can_start_at_once():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_measured_neighbours_change_the_order():
+def test_measured_times_of_neighbours_change_the_order_of_points():
     scheduler = scheduler_of([1.0, 1.0, 1.0, 2.0])
     assert scheduler.take(0.1, 1) == (3,)
     scheduler.finish(3)
@@ -70,7 +70,7 @@ def test_a_point_that_failed_in_a_group_is_repeated_alone():
     st.lists(st.tuples(st.floats(0.001, 10.0), st.booleans()), min_size=1, max_size=20),
     st.integers(0, 2**32),
 )
-def test_every_point_is_handed_out_until_it_is_finished_and_never_after(points, seed):
+def test_every_point_is_scheduled_until_finished_and_never_after(points, seed):
     """Chains of any length, answers in any order, some handed back, some times learnt."""
     luck = random.Random(seed)
     planned_s, is_chained = zip(*points, strict=True)

@@ -68,14 +68,14 @@ def truth(small):
 @pytest.mark.thorough
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 2**32), st.integers(1, 9))
-def test_no_order_of_answers_and_no_lost_worker_changes_an_answer(small, truth, require_equal, seed, slots):
+def test_neither_completion_order_nor_lost_workers_change_a_result(small, truth, require_equal, seed, slots):
     store = MemoryStore(small)
     assert run_study(small, UnreliableExecutor(seed, slots), store) is StudyEnd.COMPLETE
     require_equal(results_of(small, store.arrays), truth)
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 7])
-def test_any_number_of_threads_gives_the_same_answers_bit_for_bit(small, truth, require_equal, workers):
+def test_any_number_of_threads_gives_the_same_results_bit_for_bit(small, truth, require_equal, workers):
     require_equal(solve_study(small, workers=workers), truth)
 
 
@@ -97,7 +97,7 @@ def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
     assert not np.array_equal(*states)
 
 
-def test_the_base_does_not_jump_where_a_chain_changes_frequency():
+def test_base_motion_is_continuous_where_a_chain_changes_frequency():
     study = Study(frequencies_hz=[201.3, 233.7, 260.1], amplitudes_m=[5e-6], starts=["down"], **SHORT)
     results = solve_study(study, workers=1)
     phase = results.values(PHASE).ravel()
@@ -108,7 +108,7 @@ def test_the_base_does_not_jump_where_a_chain_changes_frequency():
     assert list(results.values(CONTINUES).ravel()) != list(range(3))
 
 
-def test_predictions_state_where_they_began(truth):
+def test_predictions_state_the_start_of_their_run(truth):
     starts = {(each.start, each.frequency_hz) for each in truth.predictions()}
     assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
 
@@ -169,7 +169,7 @@ class SolverThatStops:
         )
 
 
-def test_a_run_that_did_not_reach_its_end_is_distinguished(small):
+def test_a_run_that_did_not_reach_its_end_is_marked_as_stopped(small):
     store = MemoryStore(small)
     executor = ThreadExecutor(1, SolverThatStops())
     run_study(small, executor, store)
@@ -203,7 +203,7 @@ def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_
     np.testing.assert_array_equal(results.values("response_i")[is_done], whole[is_done])
 
 
-def test_progress_counts_every_point_once_and_ends_with_nothing_left(study):
+def test_progress_counts_every_point_once_and_ends_with_no_time_left(study):
     seen = []
     solve_study(study, workers=2, observer=seen.append)
     counts = [each.done for each in seen]

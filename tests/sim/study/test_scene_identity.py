@@ -29,12 +29,12 @@ def test_different_scenes_have_different_identities():
     assert len(set(identities.values())) == len(identities)
 
 
-def test_equal_scenes_have_one_identity_however_they_were_made():
+def test_equal_scenes_have_one_identity_however_they_are_constructed():
     again = Scene(gong2025(2e-5, 45e-6, "hertz"), Harmonic(260.0, 5e-6, 0.0))
     assert scene_identity(again) == scene_identity(SCENE)
 
 
-def test_a_name_does_not_change_the_identity():
+def test_the_name_of_a_start_does_not_change_the_scene_identity():
     one, other = (replace(SCENE, start=Given(STATE, name)) for name in ("kick", "push"))
     assert scene_identity(one) == scene_identity(other)
 

@@ -54,7 +54,7 @@ def computed_in(path, study, solver=solve_scene, cancelled=None):
     return begun, end
 
 
-def test_every_field_of_a_prediction_is_kept_or_has_another_length_for_every_scene():
+def test_every_prediction_field_of_fixed_length_is_stored():
     kept = set(NUMBERS) | {"motion", "method", "outcome", "ended", "final_state", "memory", "ensemble"}
     of_the_study = {"frequency_hz", "amplitude_m", "accuracy", "start"}
     of_any_length = {"section", "spectrum", "spectrum_hz"}
@@ -73,7 +73,7 @@ def test_a_study_file_round_trips(small, tmp_path, require_equal):
     assert json.loads(json.dumps(again, allow_nan=False)) == again
 
 
-def test_the_motions_of_an_ensemble_come_back_from_the_file(tmp_path):
+def test_motions_of_an_ensemble_round_trip_through_the_study_file(tmp_path):
     """Chaos that dies out within a few tens of seconds: some starts have settled after twelve."""
     study = Study(
         frequencies_hz=[242.0],
@@ -117,7 +117,7 @@ def test_h5py_alone_finds_named_axes_units_and_missing_points(small, tmp_path):
         assert file.attrs["Conventions"].startswith(b"CF-")
 
 
-def test_nothing_in_the_file_needs_a_new_reader(small, tmp_path):
+def test_a_study_file_needs_no_recent_hdf5_version(small, tmp_path):
     path = tmp_path / "a.h5"
     make_file(path, small)
     with h5py.File(path) as file:
@@ -131,7 +131,7 @@ def test_nothing_in_the_file_needs_a_new_reader(small, tmp_path):
         file.visititems(require_plain)
 
 
-def test_sessions_state_who_computed_which_point(small, tmp_path):
+def test_sessions_record_which_executor_computed_which_point(small, tmp_path):
     path = tmp_path / "a.h5"
     make_file(path, small)
     count = itertools.count()
@@ -200,7 +200,7 @@ def test_a_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     FileStore(path, small).close()
 
 
-def test_a_short_read_of_a_study_does_not_end_it(small, tmp_path):
+def test_a_short_read_of_its_file_does_not_stop_a_study(small, tmp_path):
     """A reader holds HDF5's lock while it looks: a study that began just then was refused its own file."""
     path = tmp_path / "a.h5"
     make_file(path, small)
@@ -241,7 +241,7 @@ def test_another_kind_of_hdf5_file_and_a_newer_version_are_refused(small, tmp_pa
         open_study(newer)
 
 
-def test_a_folder_that_does_not_exist_is_named(small, tmp_path):
+def test_a_missing_folder_of_a_study_is_named_in_the_error(small, tmp_path):
     with pytest.raises(StudyError, match=r"nowhere.*choose another folder"):
         solve_study(small, tmp_path / "nowhere" / "a.h5")
 

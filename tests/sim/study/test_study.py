@@ -20,7 +20,7 @@ def test_a_study_round_trips_through_json():
     assert Study.model_validate_json(study.model_dump_json()) == study
 
 
-def test_the_specimen_is_the_papers_when_nothing_else_is_stated():
+def test_the_default_specimen_of_a_study_is_gong2025():
     study = Study(**LEAST)
     assert study.specimen.specimen() == gong2025()
     assert study.specimen.specimen("power:5", 0.0, 30e-6) == gong2025(0.0, 30e-6, "power:5")
@@ -38,7 +38,7 @@ def test_unvaried_values_of_a_study_come_from_its_specimen():
     assert Study.model_validate_json(study.model_dump_json()) == study
 
 
-def test_the_structure_in_an_older_study_is_read_as_its_specimen():
+def test_the_structure_table_of_an_older_study_is_read_as_specimen():
     structure = {"masses_kg": [5e-3, 2e-3, 2e-3]}
     with pytest.warns(SpecimenWarning):
         assert Study(**LEAST, structure=structure).specimen.masses_kg == (5e-3, 2e-3, 2e-3)
@@ -57,7 +57,7 @@ def test_the_grid_has_a_point_for_every_combination():
     assert study.starts == (Start.REST, Start.UP)
 
 
-def test_differences_name_what_differs():
+def test_differences_of_two_studies_name_the_changed_fields():
     one, other = Study(**LEAST), Study(**{**LEAST, "amplitudes_m": [2e-6]}, accuracy="quick")
     assert one.differences(one) == ()
     assert one.differences(other) == ("amplitudes_m", "accuracy")
