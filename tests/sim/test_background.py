@@ -27,7 +27,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-def test_processes_idle_and_at_work_end_when_their_program_is_killed(tmp_path):
+def test_idle_and_busy_processes_end_when_their_program_is_killed(tmp_path):
     script = tmp_path / "program.py"
     script.write_text(PROGRAM)
     with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as killed:
@@ -70,14 +70,14 @@ def deaf(path, tell, _cancelled):
         time.sleep(0.1)
 
 
-def test_parts_come_in_order_before_the_end(pool):
+def test_streamed_parts_arrive_in_order_before_the_end(pool):
     heard = []
     job = pool.stream(count, heard.append, heard.append, heard.append, 2000)
     polled(pool, lambda: job.is_over)
     assert heard == [*range(2000), None]
 
 
-def test_a_stream_that_is_dropped_ends_by_itself_and_its_process_does_the_next(pool):
+def test_a_dropped_stream_ends_and_its_process_runs_the_next_job(pool):
     heard, answers = [], []
     job = pool.stream(count, heard.append, heard.append, heard.append, 10**9)
     polled(pool, lambda: heard)
@@ -93,7 +93,7 @@ def test_a_stream_that_is_dropped_ends_by_itself_and_its_process_does_the_next(p
 
 
 @pytest.mark.thorough
-def test_a_stream_that_does_not_end_when_dropped_is_ended(pool):
+def test_the_process_of_a_dropped_stream_that_does_not_end_is_terminated(pool):
     heard, answers = [], []
     job = pool.stream(deaf, heard.append, heard.append, heard.append, "")
     polled(pool, lambda: heard)
@@ -148,7 +148,7 @@ def leave(_number):
     os._exit(1)
 
 
-def test_a_callback_may_change_its_pool(pool):
+def test_a_callback_may_close_its_process_pool(pool):
     errors = []
     pool.ask(leave, errors.append, lambda error: (errors.append(error), pool.close()), 0)
     polled(pool, lambda: errors)

@@ -93,7 +93,7 @@ def test_a_gap_of_one_metre_is_never_closed(contact):
 
 @pytest.mark.parametrize("contact", SPRINGY)
 @pytest.mark.parametrize("gap_m", [1e-12, 1e-9])
-def test_the_smallest_gaps_agree_with_the_equations_as_written(contact, gap_m):
+def test_the_smallest_gaps_agree_with_direct_integration(contact, gap_m):
     specimen = paper(contact, gap_m=gap_m)
     ours = integrate(specimen, DRIVE, 0.003, Accuracy.REFERENCE)
     assert ours.outcome is Outcome.REACHED_END
@@ -104,7 +104,7 @@ def test_the_smallest_gaps_agree_with_the_equations_as_written(contact, gap_m):
 @pytest.mark.thorough
 @pytest.mark.parametrize("contact", [*SPRINGY, *POWERS])
 @pytest.mark.parametrize("drive", [Harmonic(130.0, 1e-2), Harmonic(50e3, 1e-2)])
-def test_violent_drives_agree_with_the_equations_as_written(contact, drive):
+def test_very_large_drives_agree_with_direct_integration(contact, drive):
     specimen, duration_s = paper(contact), 0.0015
     ours = integrate(specimen, drive, duration_s, Accuracy.REFERENCE)
     theirs = as_written(specimen, drive, duration_s, longest_step_s=1e-6)
@@ -113,7 +113,7 @@ def test_violent_drives_agree_with_the_equations_as_written(contact, drive):
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3, 1e6])
 @pytest.mark.parametrize("contact", SPRINGY)
-def test_any_stiffness_keeps_to_its_accuracy(contact, factor):
+def test_any_contact_stiffness_is_solved_within_its_accuracy(contact, factor):
     law = paper(contact).contact
     specimen = replace(paper(contact), contact=replace(law, stiffness=factor * law.stiffness))
     finals = [integrate(specimen, DRIVE, 0.02, level).final_state for level in Accuracy]
@@ -129,7 +129,7 @@ def test_any_stiffness_keeps_to_its_accuracy(contact, factor):
 @pytest.mark.parametrize(
     "contact", ["hertz", *(pytest.param(law, marks=pytest.mark.slow) for law in SPRINGY[1:])]
 )
-def test_masses_in_a_ratio_of_a_million_agree_with_the_equations_as_written(contact, factor, place):
+def test_mass_ratios_of_a_million_agree_with_direct_integration(contact, factor, place):
     masses = list(paper(contact).masses)
     masses[place] *= factor
     specimen, start = (
@@ -148,7 +148,7 @@ def test_masses_in_a_ratio_of_a_million_agree_with_the_equations_as_written(cont
 @pytest.mark.parametrize("place", [0, 1, 2])
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 @pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.8", "rigid:1", "power:47"])
-def test_masses_in_a_ratio_of_a_million_under_the_other_laws_agree_between_accuracies(contact, factor, place):
+def test_mass_ratios_of_a_million_with_other_laws_agree_between_accuracies(contact, factor, place):
     masses = list(paper(contact).masses)
     masses[place] *= factor
     specimen, drive = replace(paper(contact, gap_m=5e-6), masses=tuple(masses)), Harmonic(430.0, 50e-6)
@@ -160,7 +160,7 @@ def test_masses_in_a_ratio_of_a_million_under_the_other_laws_agree_between_accur
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:1", "rigid:0.8", "rigid:1"])
 @pytest.mark.parametrize("frequency_hz", [60.0, 130.0, 300.0])
-def test_a_motion_just_beyond_grazing_strikes_and_one_just_below_does_not(contact, frequency_hz):
+def test_only_motion_beyond_grazing_strikes_the_stop(contact, frequency_hz):
     specimen = paper(contact)
     path = base_transmissibility(specimen, frequency_hz)[0, 3]
     omega = 2.0 * math.pi * frequency_hz
@@ -203,7 +203,7 @@ def test_a_slow_pressed_contact_settles_where_its_springs_balance(contact):
 
 @pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.5", "rigid:1"])
 @pytest.mark.parametrize(("acceleration", "stays"), [(20.0, True), (17.0, False)])
-def test_m1_stays_on_a_rigid_stop_only_while_it_is_pressed_on_it(contact, acceleration, stays):
+def test_m1_stays_on_a_rigid_stop_only_while_pressed_against_it(contact, acceleration, stays):
     specimen, base, start = pulled_away(contact, acceleration)
     # k1 gap / m1 = 17.8 m/s^2: below it the spring draws m1 off the stop.
     threshold = specimen.stiffnesses[1] * specimen.gap_m / specimen.masses[1]
@@ -256,7 +256,7 @@ def test_overflowing_numbers_end_with_an_outcome(contact, size):
 
 
 @pytest.mark.parametrize("contact", [*LAWS, "linear"])
-def test_a_run_ends_in_a_sentence_when_its_steps_are_used_up(contact, monkeypatch):
+def test_a_run_with_too_many_steps_ends_with_advice(contact, monkeypatch):
     monkeypatch.setattr("vibench.sim.engine.run.MOST_STEPS", 1_000_000)
     specimen = paper(contact)
     assert integrate(specimen, DRIVE, 1.0).outcome is Outcome.REACHED_END

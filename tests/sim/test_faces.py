@@ -84,14 +84,14 @@ def asked_enums():
 
 
 @pytest.mark.parametrize(("function", "parameter", "kind"), list(asked_enums()))
-def test_enum_arguments_accept_their_words_and_refuse_others_with_the_allowed_ones(function, parameter, kind):
+def test_enum_arguments_accept_their_values_as_text_and_refuse_others(function, parameter, kind):
     call = CALLS[function]
     call(**{parameter: next(iter(kind)).value})
     with pytest.raises(ValueError, match=f"'nonsense' is not allowed: give one of {', '.join(kind)}"):
         call(**{parameter: "nonsense"})
 
 
-def test_observables_may_be_named_by_words():
+def test_observables_and_accuracy_may_be_given_as_text():
     named = sim.Scene(SPECIMEN, DRIVE, observe=("response", "lyapunov"), accuracy="quick")
     assert named.observe == (sim.Observable.RESPONSE, sim.Observable.LYAPUNOV)
     assert named.accuracy is sim.Accuracy.QUICK
@@ -100,7 +100,7 @@ def test_observables_may_be_named_by_words():
     ).starts == (study.Start.UP,)
 
 
-def test_a_checker_of_types_knows_every_word_of_an_enum():
+def test_type_hints_list_every_text_value_of_an_enum():
     for case in asked_enums():
         function, parameter, kind = case.values
         if inspect.isfunction(function):

@@ -22,6 +22,6 @@ print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
 
 
 @pytest.mark.parametrize("law", ["hertz", "rigid:0.8", "power:3+5+7"])
-def test_no_compiler_is_loaded(law):
+def test_the_first_simulation_loads_no_compiler(law):
     run = subprocess.run([sys.executable, "-c", FIRST_USE, law], capture_output=True, text=True, check=True)
     assert not {"numba", "llvmlite"} & set(json.loads(run.stdout))

@@ -193,7 +193,7 @@ def test_the_soft_oscillator_grazes_where_its_linear_resonance_reaches_the_stop(
     assert (found.motion is FinalMotion.QUIET) == (beyond < 0.0)
 
 
-def test_uedas_oscillator_has_the_exponent_of_the_literature():
+def test_the_ueda_oscillator_has_the_published_exponent():
     # x'' + 0.05 x' + x^3 = 7.5 cos t; its spring is next to nothing.
     specimen = replace(on_heavy_base(PowerLaw(1.0, ((3, 1.0),)), 1.0, 0.05), stiffnesses=UEDAS_SPRINGS)
     drive, period = shaken(specimen, 1.0, 7.5), 2.0 * math.pi
@@ -207,7 +207,7 @@ def test_uedas_oscillator_has_the_exponent_of_the_literature():
 
 
 @pytest.mark.parametrize(("omega", "chaotic", "largest"), [(0.802, 0.0285, 1.4552), (0.8025, 0.0242, 1.4570)])
-def test_two_attractors_live_side_by_side_just_above_grazing(omega, chaotic, largest):
+def test_two_attractors_coexist_just_above_grazing(omega, chaotic, largest):
     case, period = soft(omega), 2.0 * math.pi / omega
     # On its way to chaos a start may come near the other attractor and stay there: one of sixteen does.
     strays = [exponent(case, omega, 5000, p) for p in (1.0, 0.5, 1.2)]
@@ -225,7 +225,7 @@ def test_two_attractors_live_side_by_side_just_above_grazing(omega, chaotic, lar
 
 
 @pytest.mark.parametrize("omega", [0.72, 0.76])
-def test_below_grazing_the_soft_oscillator_decays_by_its_own_damper(omega):
+def test_the_soft_oscillator_below_grazing_decays_by_its_damper(omega):
     found = exponent(soft(omega), omega, 500)
     assert found.source is Source.MODES
     assert found.exponent_per_s == pytest.approx(-0.01, rel=1e-7)

@@ -36,7 +36,7 @@ def pair(contact, gap_m=45e-6, faint=(1e-2, 2e-2, 3e-2)):
 @pytest.mark.parametrize(
     ("contact", "drive"), [*((law, DRIVE) for law in POWERS + STOPS), ("hertz", Harmonic(260.0, 5e-6))]
 )
-def test_an_independent_integrator_of_the_equations_as_written_agrees(contact, drive):
+def test_every_contact_law_agrees_with_direct_integration(contact, drive):
     specimen = paper(contact)
     ours = integrate(specimen, drive, 0.02, Accuracy.REFERENCE)
     assert ours.outcome is Outcome.REACHED_END
@@ -60,7 +60,7 @@ def test_every_solver_integrates_a_softening_law():
 
 @pytest.mark.parametrize("gap_m", [(30e-6, 45e-6), (20e-6, math.inf), (math.inf, 20e-6)])
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap"])
-def test_unequal_stops_agree_with_the_equations_as_written(contact, gap_m):
+def test_unequal_stops_agree_with_direct_integration(contact, gap_m):
     specimen = paper(contact, gap_m=gap_m)
     ours = integrate(specimen, DRIVE, 0.02, Accuracy.REFERENCE, sample_rate_hz=1e5)
     p = ours.states[:, 1] - ours.states[:, 2]
@@ -72,7 +72,7 @@ def test_unequal_stops_agree_with_the_equations_as_written(contact, gap_m):
 
 @settings(max_examples=10, deadline=None)
 @given(st.floats(60.0, 500.0), st.floats(2e-6, 30e-6), st.sampled_from(["hertz", "linear_gap"]))
-def test_exchanged_stops_mirror_the_motion(frequency_hz, amplitude_m, contact):
+def test_exchanging_unequal_stops_mirrors_the_motion(frequency_hz, amplitude_m, contact):
     here = paper(contact, gap_m=(20e-6, 50e-6))
     there = paper(contact, gap_m=(50e-6, 20e-6))
     # Short: chaos makes of the rounding of pi ten thousand times more in 10 ms, and its square in 20 ms.
@@ -118,7 +118,7 @@ def test_every_engine_gives_the_same_free_motion(contact):
     assert distance(harmonic.final_state, as_written(specimen, STILL, 0.01, start)) < 1e-6
 
 
-def test_a_linear_stop_returns_the_bilinear_frequency():
+def test_a_linear_stop_gives_the_bilinear_frequency():
     stiffness = 4e5
     specimen = replace(pair(LinearGap(stiffness), 1e-12), stiffnesses=(1e-2, 2e4, 3e-2))
     specimen = replace(specimen, lower_gap_m=math.inf)

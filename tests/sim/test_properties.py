@@ -99,7 +99,7 @@ def longer(specimen, scale):
 
 @settings(max_examples=25, deadline=None)
 @given(contact=laws, log_scale=st.floats(-4.0, 4.0))
-def test_motion_scales_with_length(contact, log_scale):
+def test_motion_scales_with_the_unit_of_length(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
     long = end(longer(specimen, scale), Harmonic(170.0, 20e-6 * scale)) / scale
     assert np.all(np.abs(long - end(specimen)) < LIMITS)
@@ -128,7 +128,7 @@ def slower(specimen, scale):
 
 @settings(max_examples=25, deadline=None)
 @given(contact=laws, log_scale=st.floats(-3.0, 3.0))
-def test_another_unit_of_time_gives_the_same_motion(contact, log_scale):
+def test_motion_scales_with_the_unit_of_time(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
     slow = end(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
     slow[3:] *= scale
@@ -176,7 +176,7 @@ def test_no_sampling_rate_changes_a_bit_of_any_motion(contact, rate):
 
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, cuts=st.lists(st.floats(0.0, 0.1), min_size=1, max_size=6))
-def test_a_run_split_anywhere_ends_in_the_same_state(contact, cuts):
+def test_a_run_split_at_any_time_ends_in_the_same_state(contact, cuts):
     # Damped, and not driven into chaos: a run that is cut rounds anew at every cut.
     specimen = paper(contact, damping_time_s=1e-4)
     for drive in (Harmonic(95.0, 8e-6), LogarithmicSweep(90.0, 110.0, 0.1, 8e-6)):
