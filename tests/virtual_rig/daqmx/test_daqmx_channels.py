@@ -30,7 +30,7 @@ def verify(task):
     task.control(TaskMode.TASK_VERIFY)
 
 
-def test_a_voltage_channel_has_no_excitation_until_it_is_given_one(task, daq):
+def test_a_voltage_channel_has_no_excitation_by_default(task, daq):
     channel = task.ai_channels.add_ai_voltage_chan(MODULE)
     assert channel.ai_coupling is Coupling.DC
     assert channel.ai_excit_src is ExcitationSource.NONE
@@ -48,7 +48,7 @@ def excited(task, current_a, module=MODULE):
     return channel
 
 
-def test_excitation_couples_to_ac_by_itself(task, daq):
+def test_turning_on_excitation_sets_ac_coupling(task, daq):
     assert excited(task, 0.002).ai_coupling is Coupling.AC
     task.read(10)
     assert (daq.world.wirings[-1][0].iepe_current_a, daq.world.wirings[-1][0].coupling) == (0.002, "AC")
@@ -66,7 +66,7 @@ def test_an_unsupported_sensor_current_is_refused_with_the_supported_ones(task):
         verify(task)
 
 
-def test_the_smallest_range_that_fits_is_taken(task):
+def test_the_smallest_sufficient_input_range_is_used(task):
     channel = task.ai_channels.add_ai_voltage_chan("Dev2/ai0", min_val=-0.7, max_val=0.5)
     assert (channel.ai_rng_low, channel.ai_rng_high) == (-1.0, 1.0)
 
@@ -96,12 +96,12 @@ def test_sensors_need_a_device_with_excitation(task):
         lambda inputs: inputs.add_ai_microphone_chan(MODULE),
     ],
 )
-def test_channels_other_than_volts_are_refused_by_name(task, add):
+def test_channel_types_other_than_voltage_are_refused_by_name(task, add):
     with pytest.raises(RpcError, match="not supported"):
         add(task.ai_channels)
 
 
-def test_volt_is_the_only_unit(task):
+def test_units_other_than_volts_are_refused(task):
     with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "VOLTS"):
         task.ai_channels.add_ai_voltage_chan(
             MODULE, units=VoltageUnits.FROM_CUSTOM_SCALE, custom_scale_name="vibrometer"
@@ -140,7 +140,7 @@ def test_a_multiplexer_shares_its_rate_among_the_channels(task):
         ("Dev1/ai0, Dev1/ai0", DAQmxErrors.VIRTUAL_CHAN_NAME_USED),
     ],
 )
-def test_inputs_that_do_not_exist_or_do_not_go_together_are_refused(task, names, code):
+def test_missing_inputs_and_invalid_combinations_are_refused(task, names, code):
     with refused(code):
         task.ai_channels.add_ai_voltage_chan(names)
 
@@ -166,7 +166,7 @@ def test_a_setting_of_a_list_of_channels_reaches_all_of_them(task):
     assert [task.ai_channels[name].ai_coupling for name in task.channel_names] == [Coupling.AC] * 2
 
 
-def test_only_the_device_that_detects_overloads_shows_them_and_only_while_running(task, daq):
+def test_overloads_can_be_read_only_while_the_task_is_running(task, daq):
     daq.world.gain = 6.0  # 12 V on ai1
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-10, max_val=10)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
@@ -178,7 +178,7 @@ def test_only_the_device_that_detects_overloads_shows_them_and_only_while_runnin
     assert not task.in_stream.overloaded_chans_exist
 
 
-def test_the_module_states_that_it_does_not_detect_overloads(task):
+def test_the_ni_9234_refuses_queries_about_overloads(task):
     task.ai_channels.add_ai_voltage_chan(MODULE)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
     task.start()

@@ -19,7 +19,7 @@ def system(daq):
     return System.remote(daq.options)
 
 
-def test_the_driver_is_new_enough_for_the_single_call_read_of_everything(system):
+def test_the_driver_version_is_at_least_24_5(system):
     assert system.driver_version >= (24, 5)
 
 
@@ -74,7 +74,7 @@ def test_an_impossible_system_is_refused(product, name):
 
 
 @given(st.floats(NI_9234.inputs.rates.minimum_hz, NI_9234.inputs.rates.maximum_hz))
-def test_a_9234_rate_is_the_next_one_up_and_stays_when_requested_again(rate_hz):
+def test_a_9234_rounds_a_rate_up_to_the_next_available_rate(rate_hz):
     rates = NI_9234.inputs.rates
     actual = rates.next_up(rate_hz)
     available = 51200 / np.arange(1, 32)
@@ -84,7 +84,7 @@ def test_a_9234_rate_is_the_next_one_up_and_stays_when_requested_again(rate_hz):
     assert rates.next_up(actual) == actual
 
 
-def test_the_6211_divides_its_timebase():
+def test_the_usb_6211_rate_is_its_timebase_over_an_integer():
     assert USB_6211.inputs.rates.next_up(3000.0) == 20e6 / 6666
 
 
@@ -103,7 +103,7 @@ def test_lists_and_ranges_of_names_are_understood(text, names):
     assert expand(text) == names
 
 
-def test_one_name_for_many_channels_is_numbered():
+def test_one_name_given_to_several_channels_is_numbered():
     assert channel_names("force", ("a", "b")) == ("force0", "force1")
     assert channel_names("x, y", ("a", "b")) == ("x", "y")
     assert channel_names("", ("a", "b")) == ("a", "b")

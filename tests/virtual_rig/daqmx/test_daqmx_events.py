@@ -18,7 +18,7 @@ def task(daq):
     return daq.inputs("Dev1/ai1")
 
 
-def test_every_n_samples_the_callback_can_read_n_samples_without_a_gap(task):
+def test_a_callback_every_n_samples_reads_n_samples_without_a_gap(task):
     task.timing.cfg_samp_clk_timing(10000, sample_mode=AcquisitionType.CONTINUOUS)
     blocks = queue.Queue()
 
@@ -35,7 +35,7 @@ def test_every_n_samples_the_callback_can_read_n_samples_without_a_gap(task):
     task.stop()
 
 
-def test_a_callback_that_does_not_read_is_not_called_without_end(task):
+def test_a_callback_that_does_not_read_is_not_called_repeatedly(task):
     task.timing.cfg_samp_clk_timing(10000, sample_mode=AcquisitionType.CONTINUOUS)
     calls = queue.Queue()
 
@@ -61,7 +61,7 @@ def test_a_task_can_be_closed_while_its_events_are_listened_to(daq):
         task.close()
 
 
-def test_events_that_make_no_sense_are_refused(task):
+def test_events_for_the_wrong_direction_are_refused(task):
     task.timing.cfg_samp_clk_timing(1000)
     with refused(DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_NOT_FOR_INPUT):
         task.register_every_n_samples_transferred_from_buffer_event(10, lambda *event: 0)

@@ -53,7 +53,7 @@ def test_unread_samples_are_lost_when_memory_is_full(daq, task, monkeypatch):
 
 
 @pytest.mark.parametrize("pace", [None, WallPace(speed=5.0)])
-def test_a_failed_world_is_reported_to_every_reader(connect, pace):
+def test_a_failed_simulation_is_reported_to_every_reader(connect, pace):
     daq = connect(pace)
 
     def stand_still(*_):

@@ -33,13 +33,13 @@ def task(daq):
     return task
 
 
-def test_the_rate_read_back_is_the_rate_of_the_samples(task):
+def test_the_reported_rate_is_the_actual_sampling_rate(task):
     assert task.timing.samp_clk_rate == RATE_HZ
     np.testing.assert_allclose(task.read(300), expected((1, 2, 3), 0, 300), atol=1e-9)
 
 
 @pytest.mark.parametrize("samples", [1, 512, 5120, 51200])
-def test_nothing_is_lost_or_repeated_between_reads_of_any_size(task, samples):
+def test_no_sample_is_lost_or_repeated_between_reads_of_any_size(task, samples):
     reader = AnalogMultiChannelReader(task.in_stream)
     block = np.empty((3, samples))
     for number in range(4):
@@ -47,7 +47,7 @@ def test_nothing_is_lost_or_repeated_between_reads_of_any_size(task, samples):
         np.testing.assert_allclose(block, expected((1, 2, 3), number * samples, samples), atol=1e-7)
 
 
-def test_a_long_run_keeps_its_memory_and_its_place(daq):
+def test_a_long_run_needs_constant_memory_and_keeps_its_read_position(daq):
     task = daq.inputs("Dev1/ai1:2")
     task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=51200)
     reader = AnalogMultiChannelReader(task.in_stream)
@@ -60,7 +60,7 @@ def test_a_long_run_keeps_its_memory_and_its_place(daq):
     assert task.in_stream.input_buf_size == 100_000
 
 
-def test_two_runs_are_equal_bit_for_bit(connect):
+def test_two_runs_of_the_simulated_daq_are_equal_bit_for_bit(connect):
     runs = []
     for _ in range(2):
         daq = connect()
@@ -97,7 +97,7 @@ def test_a_finite_task_that_a_read_starts_can_be_read_again_and_again(daq):
     np.testing.assert_allclose(second, expected((1,), 200, 200)[0], atol=1e-9)
 
 
-def test_polling_for_samples_advances_the_rig(task):
+def test_polling_for_samples_advances_the_simulated_time(task):
     task.start()
     questions = 0
     while task.in_stream.avail_samp_per_chan < 100:
@@ -106,7 +106,7 @@ def test_polling_for_samples_advances_the_rig(task):
     assert len(task.read(READ_ALL_AVAILABLE)[0]) >= 100
 
 
-def test_polling_for_the_end_advances_the_rig(daq):
+def test_polling_for_the_end_advances_the_simulated_time(daq):
     task = daq.inputs("Dev1/ai1", 1000, samples=500)
     task.start()
     questions = 0
@@ -122,7 +122,7 @@ def test_a_task_without_a_clock_reads_on_demand_where_the_device_can(daq):
     assert np.shape(task.read(5)) == (2, 5)
 
 
-def test_a_delta_sigma_device_runs_its_clock_at_the_default_rate_by_default(daq):
+def test_a_delta_sigma_device_without_timing_samples_at_its_lowest_rate(daq):
     task = daq.inputs("cDAQ1Mod1/ai1")
     assert task.timing.samp_timing_type is SampleTimingType.SAMPLE_CLOCK
     assert task.timing.samp_clk_rate == pytest.approx(51200 / 31)
@@ -160,7 +160,7 @@ def test_a_waveform_has_no_more_than_was_requested(task):
     assert not waveform.extended_properties
 
 
-def test_stopping_and_starting_begins_at_sample_zero_again(task):
+def test_restarting_a_task_begins_at_sample_zero(task):
     task.start()
     task.read(100)
     task.stop()
@@ -170,7 +170,7 @@ def test_stopping_and_starting_begins_at_sample_zero_again(task):
     np.testing.assert_allclose(task.read(10), expected((1, 2, 3), 100, 10), atol=1e-9)
 
 
-def test_a_task_stays_reserved_through_a_stop_if_it_was_reserved_before(task, daq):
+def test_a_committed_task_stays_reserved_after_a_stop(task, daq):
     task.control(TaskMode.TASK_COMMIT)
     task.start()
     task.stop()

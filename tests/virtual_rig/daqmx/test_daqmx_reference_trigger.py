@@ -23,7 +23,7 @@ def by_line(task, line="/Dev1/PFI1"):
     task.triggers.reference_trigger.cfg_dig_edge_ref_trig(line, BEFORE)
 
 
-def test_the_samples_around_an_edge_on_a_line_are_kept_whenever_it_comes(daq, task):
+def test_a_reference_trigger_keeps_the_samples_around_its_edge(daq, task):
     by_line(task)
     for passed_s in (0.0137, 0.4):
         task.start()
@@ -49,7 +49,7 @@ def test_a_trigger_before_the_pretrigger_samples_are_complete_is_ignored(daq, ta
     assert np.shape(task.read(SAMPLES)) == (2, SAMPLES)
 
 
-def test_a_task_whose_trigger_never_comes_can_be_stopped(daq, task):
+def test_a_task_waiting_for_its_trigger_can_be_stopped(daq, task):
     by_line(task)
     task.start()
     caught = []

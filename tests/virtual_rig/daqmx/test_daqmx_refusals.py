@@ -59,7 +59,7 @@ def test_a_running_task_cannot_be_changed(task):
             change()
 
 
-def test_a_cleared_task_is_gone(daq):
+def test_a_cleared_task_is_refused_as_invalid(daq):
     task = Task("short", grpc_options=daq.options)
     interpreter, handle = task._interpreter, task._handle
     task.close()
@@ -67,7 +67,7 @@ def test_a_cleared_task_is_gone(daq):
         interpreter.start_task(handle)
 
 
-def test_a_second_task_of_the_same_name_is_refused_or_joined_as_requested(daq, task):
+def test_a_second_task_with_the_same_name_is_refused_or_attached(daq, task):
     def options(behavior):
         return GrpcSessionOptions(daq.options.grpc_channel, "", initialization_behavior=behavior)
 
@@ -106,14 +106,14 @@ def test_a_task_on_the_clock_of_another_task_starts_with_it(daq, task):
     assert daq.world.played["Dev1/ao0"][0].start_s == 0.25
 
 
-def test_a_read_past_the_end_returns_the_rest_with_an_error(daq):
+def test_a_read_past_the_end_returns_the_remaining_samples_with_an_error(daq):
     task = daq.inputs("Dev1/ai1", 1000, samples=30)
     with refused(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE, kind=DaqReadError) as caught:
         task.read(50)
     assert caught.value.samps_per_chan_read == 30
 
 
-def test_a_chassis_shows_its_trigger_terminal_once_it_is_reserved(daq):
+def test_a_chassis_shows_its_trigger_terminal_once_its_task_is_reserved(daq):
     task = daq.inputs("cDAQ1Mod1/ai0")
     with refused(DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING):
         _ = task.triggers.start_trigger.term
@@ -142,7 +142,7 @@ def test_an_unknown_attribute_is_refused_by_name_or_number(daq, task):
         task._interpreter.set_chan_attribute_double(task._handle, "Dev1/ai0", 0x1815, 3.0)  # AI_RNG_HIGH
 
 
-def test_every_call_of_the_protocol_is_answered_or_named_as_not_simulated(daq):
+def test_calls_that_are_not_simulated_are_refused_by_name(daq):
     stub = nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel)
     for name, request in [
         ("CreateDIChan", nidaqmx_pb2.CreateDIChanRequest()),
@@ -192,7 +192,7 @@ def test_a_restarted_server_has_no_tasks(daq, task):
         ("TaskControl", {"action_raw": 77}),
     ],
 )
-def test_a_number_that_is_no_member_of_its_enum_is_refused_by_name(daq, task, name, fields):
+def test_an_invalid_enum_number_is_refused_with_the_number(daq, task, name, fields):
     request = getattr(nidaqmx_pb2, f"{name}Request")(task=Session(name="measure"), **fields)
     if hasattr(request, "physical_channel"):
         request.physical_channel = "Dev1/ai2"

@@ -39,7 +39,7 @@ def test_tasks_of_a_disconnected_client_remain_until_the_restart(daq):
     task.start()
 
 
-def test_another_service_can_share_the_port(connect):
+def test_a_second_grpc_service_can_share_the_port(connect):
     echo = grpc.method_handlers_generic_handler(
         "rig.Echo", {"Say": grpc.unary_unary_rpc_method_handler(lambda request, context: request[::-1])}
     )

@@ -40,7 +40,7 @@ def wait_for(daq, samples, task):
         assert rig.changed.wait_for(lambda: rig._acquisitions[0].transferred >= samples, 10.0)
 
 
-def test_samples_exist_only_after_their_time(connect, clock):
+def test_samples_become_available_only_after_their_time(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
     task.start()
@@ -64,7 +64,7 @@ def test_a_timeout_returns_the_samples_so_far(connect, clock):
     assert task.in_stream.curr_read_pos == 100
 
 
-def test_a_partial_read_of_two_channels_leaves_every_row_in_its_place(connect, clock):
+def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = daq.inputs("Dev1/ai1:2", 1000)
     task.start()
@@ -78,7 +78,7 @@ def test_a_partial_read_of_two_channels_leaves_every_row_in_its_place(connect, c
     np.testing.assert_allclose(block[1, :50], 0.5 + 3 * np.sin(2 * np.pi * 120 * time_s), atol=1e-9)
 
 
-def test_a_reader_that_is_too_late_loses_samples_with_an_error(connect, clock):
+def test_a_reader_that_is_too_late_gets_a_lost_samples_error(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
     task.in_stream.input_buf_size = 500
@@ -96,7 +96,7 @@ def test_a_reader_that_is_too_late_loses_samples_with_an_error(connect, clock):
         task.is_task_done()
 
 
-def test_a_reader_waits_for_the_clock(connect, clock):
+def test_a_reader_waits_for_samples_in_real_time(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
     task.start()
@@ -108,7 +108,7 @@ def test_a_reader_waits_for_the_clock(connect, clock):
     assert len(brought[0]) == 100
 
 
-def test_speed_makes_rig_time_pass_faster(connect, clock):
+def test_the_speed_setting_makes_simulated_time_pass_faster(connect, clock):
     daq = connect(WallPace(speed=20.0, clock=clock))
     task = continuous(daq, samples=10000)
     task.start()
@@ -117,7 +117,7 @@ def test_speed_makes_rig_time_pass_faster(connect, clock):
     assert task.in_stream.total_samp_per_chan_acquired == 2000
 
 
-def test_the_real_clock_brings_samples_without_a_gap(connect):
+def test_real_time_samples_have_no_gap(connect):
     daq = connect(WallPace(speed=10.0))
     task = continuous(daq, rate_hz=51200.0)
     read = np.concatenate([task.read(5120, timeout=10.0) for _ in range(20)])

@@ -111,7 +111,7 @@ def test_samples_that_are_not_written_in_time_stop_the_output(pair, daq):
         outputs.is_task_done()
 
 
-def test_a_finite_output_ends_and_leaves_zero(daq):
+def test_a_finite_output_ends_at_zero_volts(daq):
     task = daq.outputs(OUTPUT, 3.5)
     task.timing.cfg_samp_clk_timing(RATE_HZ, samps_per_chan=300)
     task.write(ramp(300), auto_start=True)
@@ -162,7 +162,7 @@ def test_limits_beyond_the_device_are_refused(daq):
         task.control(TaskMode.TASK_VERIFY)
 
 
-def test_more_than_a_given_buffer_holds_is_refused_before_the_start(pair):
+def test_writing_more_than_the_buffer_size_is_refused_before_the_start(pair):
     _, outputs = pair
     outputs.out_stream.output_buf_size = 100
     with refused(DAQmxErrors.NO_MORE_SPACE, "100 samples", kind=DaqWriteError):
@@ -178,7 +178,7 @@ def test_a_software_timed_output_holds_its_value(daq):
     assert inputs.read() == 1.25
 
 
-def test_two_outputs_play_their_own_rows(daq):
+def test_two_outputs_each_play_their_own_row(daq):
     task = daq.task()
     task.ao_channels.add_ao_voltage_chan("Dev2/ao0:1")
     task.timing.cfg_samp_clk_timing(10000, samps_per_chan=200)
@@ -191,7 +191,7 @@ def test_two_outputs_play_their_own_rows(daq):
         np.testing.assert_allclose(daq.world.output(channel, start_s + np.arange(200) / 10000), row)
 
 
-def test_a_waveform_is_played_as_its_samples(pair):
+def test_a_waveform_object_is_played_sample_by_sample(pair):
     inputs, outputs = pair
     assert outputs.write_waveform(AnalogWaveform.from_array_1d(ramp(500))) == 500
     outputs.start()
