@@ -124,7 +124,7 @@ def test_a_refused_command_queues_its_number_and_changes_nothing(command, code):
     assert (device.settings(1), device.settings(2), device.memory.catalogue) == settings
 
 
-def test_peak_limit_is_ten_volts_open_and_five_into_fifty_ohm():
+def test_the_peak_limit_is_10_v_open_and_5_v_into_50_ohm():
     device = generator()
     device.execute(b"VOLT 8;VOLT:OFFS 1")
     assert errors(device) == []
@@ -152,7 +152,7 @@ def test_phase_is_in_radians_and_kept_in_whole_degrees():
     assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
 
 
-def test_a_shape_with_a_lower_limit_lowers_the_frequency():
+def test_a_shape_with_a_lower_frequency_limit_reduces_the_frequency():
     device = generator()
     device.execute(b"FREQ 20MHz;:FUNC SQU")
     assert ask(device, "FREQ?") == "1.25E+07"
@@ -228,7 +228,7 @@ class TestQuirks:
         assert device.execute(b"VOLT:LIM?").data == b"\n"
         assert errors(device) == [-102]
 
-    def test_without_that_quirk_an_unknown_query_is_not_answered(self):
+    def test_an_unknown_query_is_not_answered_without_the_empty_line_quirk(self):
         device = generator()
         assert device.execute(b"VOLT:LIM?").data == b""
         assert errors(device) == [-113]
@@ -239,7 +239,7 @@ class TestQuirks:
         assert ask(device, "VOLT?;:FREQ?") == "1.0E+00;1.0E+06"
         assert errors(device) == []
 
-    def test_the_load_may_be_settable_at_the_panel_only(self):
+    def test_the_load_can_be_set_only_at_the_panel_with_the_panel_quirk(self):
         device = generator(replace(PLAIN, panel_load_ohm=50.0))
         device.execute(b"OUTP:IMP INF")
         assert errors(device) == [-113]
@@ -257,7 +257,7 @@ def test_a_corrupted_reply_is_followed_by_a_sound_one():
     assert device.execute(b"*IDN?").data == sound
 
 
-def test_setting_the_duty_succeeds_with_error_minus_102():
+def test_setting_the_duty_cycle_succeeds_but_queues_error_minus_102():
     device = generator()
     device.execute(b"PULS:DCYC 20")
     assert ask(device, "PULS:DCYC?") == "2.0E+01"

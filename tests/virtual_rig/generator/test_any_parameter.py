@@ -30,7 +30,7 @@ PARAMETERS = (
 
 
 @pytest.mark.parametrize("kind", [AFG1022, Keysight33500B])
-def test_every_command_takes_any_parameter(kind):
+def test_every_command_handles_any_parameter_without_failing(kind):
     generator = kind(lambda: 0.0)
     for command in generator.commands:
         header = command.header.translate(str.maketrans("#", "1", "[]")).encode()

@@ -18,7 +18,7 @@ def asked(generator, message):
     return generator.execute(message).data
 
 
-def test_a_message_of_endless_queries_is_carried_out_and_its_answers_are_dropped_as_deadlocked(afg):
+def test_a_message_with_too_many_queries_loses_its_answers_with_error_430(afg):
     query = b"DATA:DATA? EMEM"
     one = len(asked(afg, query))
     many = LONGEST_REPLY // one
@@ -30,7 +30,7 @@ def test_a_message_of_endless_queries_is_carried_out_and_its_answers_are_dropped
     assert asked(afg, b"*IDN?").startswith(b"TEKTRONIX")
 
 
-def test_waveforms_of_new_names_are_refused_when_the_memory_is_full():
+def test_new_waveforms_are_refused_when_the_memory_is_full():
     generator = Keysight33500B(lambda: 0.0)
     codes = np.zeros(400_000, dtype=">i2").tobytes()
     told = []

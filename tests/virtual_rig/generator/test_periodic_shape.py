@@ -23,7 +23,7 @@ def mean(shape, start, span):
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @given(start=STARTS, span=SPANS)
-def test_a_mean_agrees_with_many_values(shape, start, span):
+def test_a_mean_of_a_shape_agrees_with_many_values(shape, start, span):
     points = 20_001
     phase = (start + span * (np.arange(points) + 0.5) / points) % 1.0
     brute = shape.mean(phase, np.zeros(points)).mean()
@@ -34,26 +34,26 @@ def test_a_mean_agrees_with_many_values(shape, start, span):
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @given(start=STARTS, first=SPANS, second=SPANS)
-def test_two_stretches_add_up_to_one(shape, start, first, second):
+def test_means_over_two_parts_add_up_to_the_mean_over_both(shape, start, first, second):
     middle = (start + first) % 1.0
     parts = first * mean(shape, start, first) + second * mean(shape, middle, second)
     assert (first + second) * mean(shape, start, first + second) == pytest.approx(parts, abs=1e-9)
 
 
 @given(st.integers(0, 36), st.integers(1, 200))
-def test_a_table_mean_over_whole_points_is_the_mean_of_its_codes(first, count):
+def test_a_waveform_mean_over_whole_points_is_the_mean_of_its_codes(first, count):
     codes = TABLE.codes[np.arange(first, first + count) % 37].astype(float)
     expected = 2 * codes.mean() / TOP_CODE - 1
     assert mean(TABLE, (first + 1e-12) / 37, count / 37) == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_lowest_and_highest_codes_are_the_ends_of_the_range():
+def test_the_lowest_and_highest_codes_are_minus_one_and_plus_one():
     table = Table(np.array([0, TOP_CODE], dtype=np.uint16))
     values = table.mean(np.array([0.1, 0.6]), np.zeros(2))
     assert values.tolist() == [-1.0, 1.0]
 
 
-def test_a_stretch_far_below_the_resolution_of_a_point_still_reads_the_point():
+def test_a_mean_over_a_tiny_part_of_a_point_equals_the_point():
     assert mean(TABLE, 0.3, 1e-15) == mean(TABLE, 0.3, 0.0)
 
 

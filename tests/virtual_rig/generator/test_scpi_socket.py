@@ -48,7 +48,7 @@ def test_a_waveform_full_of_newlines_arrives_whole(instrument):
     assert instrument.query("SYST:ERR?").startswith("0,")
 
 
-def test_a_message_that_trickles_in_byte_by_byte_is_one_message(server):
+def test_a_message_received_byte_by_byte_is_one_message(server):
     with socket.create_connection(("127.0.0.1", server.port), timeout=5) as client:
         for byte in b"FREQ 7;:FREQ?\n":
             client.sendall(bytes([byte]))
@@ -63,7 +63,7 @@ def test_two_clients_share_one_instrument(server, instrument):
         assert other.recv(100) == b"3.0E+00\n"
 
 
-def test_only_this_machine_can_connect_by_default(server):
+def test_the_scpi_socket_listens_on_loopback_by_default(server):
     assert server.resource_name == f"TCPIP0::127.0.0.1::{server.port}::SOCKET"
 
 
@@ -75,7 +75,7 @@ def test_closing_ends_the_server_even_with_a_client_connected(generator):
         pass
 
 
-def test_commands_from_many_threads_and_rendering_never_mix_up_replies(generator, server):
+def test_replies_are_not_mixed_up_between_many_client_threads(generator, server):
     failures = []
 
     def client(number):

@@ -60,7 +60,7 @@ def test_an_output_that_is_off_is_exactly_silent_whatever_is_set():
     ("declared", "load_ohm", "factor"),
     [("50", math.inf, 2.0), ("50", 50.0, 1.0), ("INF", math.inf, 1.0), ("50", 15e3, 2 * 15e3 / 15050)],
 )
-def test_the_real_voltage_is_twice_the_displayed_one_if_the_declared_50_ohm_are_not_there(
+def test_the_voltage_doubles_if_50_ohm_are_declared_without_a_50_ohm_load(
     declared, load_ohm, factor
 ):
     rig = Rig(Terminal(load_ohm=load_ohm, noise_v_per_rt_hz=0.0))
@@ -90,7 +90,7 @@ def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
     assert rig.render(4) == pytest.approx([1, 1, 0.25 * 1 + 0.75 * 3, 3])
 
 
-def test_rendered_samples_never_change():
+def test_samples_already_rendered_do_not_change():
     rig = Rig()
     rig.upload([0, 0])
     rig.send("FUNC EMEM;:VOLT 0.002;:VOLT:OFFS 1.001;:OUTP ON")
@@ -101,7 +101,7 @@ def test_rendered_samples_never_change():
     assert rig.render(3) == pytest.approx([3, 3, 3])
 
 
-def test_arbitrary_means_agree_with_a_brute_force_staircase():
+def test_interval_means_of_a_waveform_agree_with_a_fine_staircase():
     rig = Rig()
     codes = np.random.default_rng(1).integers(0, 16384, 1000)
     rig.upload(codes)
@@ -114,7 +114,7 @@ def test_arbitrary_means_agree_with_a_brute_force_staircase():
     assert rig.render(count) == pytest.approx(staircase, abs=2.0 / oversampling)
 
 
-def test_arbitrary_means_are_exact_where_an_interval_is_a_whole_number_of_points():
+def test_interval_means_over_whole_waveform_points_are_exact():
     rig = Rig()
     codes = np.random.default_rng(2).integers(0, 16384, 8192)
     rig.upload(codes)
@@ -165,7 +165,7 @@ def test_the_noise_has_the_rms_of_its_density_in_half_the_sample_rate(seed, dens
     assert noise.std() == pytest.approx(expected, rel=0.03)
 
 
-def test_a_clock_that_is_fast_makes_every_frequency_higher():
+def test_a_fast_generator_clock_raises_every_frequency():
     rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0, clock_error_ppm=100.0))
     rig.send("FREQ 1000;:VOLT 2;:PHAS:INIT;:OUTP ON")
     assert rig.render(5000) == pytest.approx(sine_means(1.0, 1000.1, 0.0, 5000), abs=1e-9)
@@ -194,13 +194,13 @@ def test_a_burst_plays_its_cycles_once_for_each_trigger_and_then_rests():
     assert rig.render(500).max() > 0.9
 
 
-def test_a_gated_burst_never_opens_because_the_gate_input_is_empty():
+def test_a_gated_burst_without_a_gate_signal_stays_silent():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:BURS:MODE GAT;:BURS ON;:OUTP ON;*TRG")
     assert rig.render(2000) == pytest.approx(np.zeros(2000), abs=1e-12)
 
 
-def test_noise_is_accepted_but_the_shape_before_continues_playing():
+def test_selecting_noise_is_accepted_but_the_previous_shape_keeps_playing():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON;:FUNC PRN")
     assert rig.generator.execute(b"FUNC?").data == b"PRN\n"
