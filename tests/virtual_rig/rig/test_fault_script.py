@@ -85,19 +85,19 @@ class TestTheScript:
         (tmp_path / "rig.toml").write_text(text + '\nfaults = "bad.toml"\n', encoding="utf-8")
         assert Path(load_rig(tmp_path / "rig.toml").virtual.faults) == tmp_path / "bad.toml"
 
-    def test_a_real_rig_has_no_script(self, rig):
+    def test_a_fault_script_is_refused_for_a_real_rig(self, rig):
         with pytest.raises(ConfigurationError, match="is a real one"):
             with_faults(rig.model_copy(update={"virtual": None}), NIGHT)
 
     @pytest.mark.parametrize("name", sorted(DISK_FAULTS))
-    def test_a_rig_that_only_serves_refuses_faults_of_a_disk_it_cannot_reach(self, scripted, name):
+    def test_a_rig_served_to_other_programs_refuses_disk_faults(self, scripted, name):
         text = fault(name, 1, **({"delay_s": 0.1} if name == "slow_disk" else {}))
         with pytest.raises(ConfigurationError, match="befall the program that records"):
             VirtualRig(scripted(text), disk=DiskFaults.REFUSED)
 
 
 class TestTime:
-    def test_every_fault_begins_at_its_step_however_the_world_is_advanced(self, scripted):
+    def test_every_fault_begins_at_its_time_for_any_block_size(self, scripted):
         text = fault("corrupt_reply", 0.12345) + fault("over_range", 0.5, for_s=0.1)
         shown = []
         for piece_s in (0.05, 0.7):
@@ -140,7 +140,7 @@ class TestEffects:
             ("fail_daq", {"call": "ReadAnalogF64", "code": -200361}, DataLost),
         ],
     )
-    def test_a_fault_of_the_converter_stops_its_reader_and_heals(self, scripted, name, parameters, error):
+    def test_a_converter_fault_stops_its_reader_and_ends_on_time(self, scripted, name, parameters, error):
         with ReconnectingBench(scripted(fault(name, 0.5, for_s=0.4, **parameters))) as kept:
             kept.bench.digitizer.start()
             with pytest.raises(error):
@@ -162,7 +162,7 @@ class TestEffects:
         # The first at once, half a second each after it, and nothing else lets the time of this rig pass.
         assert failures == 5
 
-    def test_a_full_disk_is_emptied_during_retries(self, scripted):
+    def test_a_disk_full_fault_ends_during_retries(self, scripted):
         with RigPower(scripted(fault("fill_disk", 0.1, for_s=2.5))) as power:
             power.let_pass(0.2)
             refusals = 0
@@ -184,7 +184,7 @@ class TestEffects:
     @pytest.mark.parametrize(
         ("name", "said"), [("pull_usb_cable", "amplifier"), ("hang_generator", "MAY STILL BE ON")]
     )
-    def test_a_generator_out_of_reach_is_found_at_the_next_command_and_comes_back(self, scripted, name, said):
+    def test_a_lost_generator_is_detected_at_the_next_command_and_returns(self, scripted, name, said):
         with ReconnectingBench(scripted(fault(name, 0.2, for_s=1.5))) as kept:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.3)
@@ -195,7 +195,7 @@ class TestEffects:
             kept.reopen()
             kept.bench.generator.set_amplitude(0.1)
 
-    def test_a_clock_jump_shifts_the_phase_accordingly(self, scripted):
+    def test_a_clock_jump_shifts_the_phase_by_its_time(self, scripted):
         with open_bench(scripted(fault("jump_clock", 1.0, by_s=0.0025))) as bench:
             bench.generator.load_sine(100.0, 1.0)
             bench.generator.start()
@@ -207,7 +207,7 @@ class TestEffects:
         before, after = (np.angle(np.sum((part * turned)[middle])) for part in (volts[:5120], volts[5120:]))
         assert (after - before) % (2 * np.pi) == pytest.approx(np.pi / 2, abs=0.02)
 
-    def test_a_knob_that_was_turned_is_turned_back(self, scripted):
+    def test_a_turned_gain_knob_is_turned_back_after_the_fault(self, scripted):
         with VirtualRig(scripted(fault("turn_amplifier_gain", 0.1, gain_db=20, for_s=0.1))) as virtual:
             gains = []
             for _ in range(3):
@@ -215,7 +215,7 @@ class TestEffects:
                 virtual.world.advance(0.11)
             assert gains == pytest.approx([10**0.5, 10.0, 10**0.5])
 
-    def test_a_cable_that_fell_out_is_plugged_in_again(self, scripted):
+    def test_a_disconnected_cable_is_reconnected_after_the_fault(self, scripted):
         text = fault("disconnect", 0.3, channel="cDAQ1Mod1/ai0", for_s=0.3)
         with open_bench(scripted(text)) as bench:
             bench.generator.load_sine(100.0, 1.0)

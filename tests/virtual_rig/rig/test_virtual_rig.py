@@ -109,7 +109,7 @@ def test_a_sine_set_by_pyvisa_is_read_by_nidaqmx_through_the_whole_chain(switch_
     assert amplitude(volts[LASER]) > 100 * np.std(volts[LASER][:-1] - volts[LASER][1:]) / RATE_HZ
 
 
-def test_silence_until_the_output_is_on_and_after_it_is_off(switch_on):
+def test_the_drive_is_silent_before_output_on_and_after_output_off(switch_on):
     program = switch_on()
     task = program.task()
     before = program.read(task, 1280)
@@ -175,7 +175,7 @@ def test_a_rig_in_real_time_delivers_samples_as_time_passes(switch_on):
     assert amplitude(volts[DRIVE][1280:]) == pytest.approx(0.05, rel=0.02)
 
 
-def test_leaving_takes_the_generator_off_the_bus():
+def test_leaving_a_virtual_rig_removes_its_generator_from_the_bus():
     with VirtualRig(RIG):
         assert "C060606" in serials_on_the_bus()
     assert "C060606" not in serials_on_the_bus()
@@ -192,7 +192,7 @@ def test_a_generator_that_is_not_on_usb_cannot_be_simulated():
         VirtualRig(RIG.model_copy(update={"generator": generator}))
 
 
-def test_an_address_in_use_starts_nothing():
+def test_a_rig_on_an_address_in_use_is_refused_and_starts_nothing():
     with VirtualRig(RIG) as first:
         other = changed(RIG, generator={"resource": "USB0::0x0699::0x0353::C2::INSTR"})
         with pytest.raises(ConfigurationError, match="cannot listen"), VirtualRig(other, first.daq_address):
