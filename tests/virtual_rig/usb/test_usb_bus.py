@@ -54,7 +54,7 @@ def plugged():
 
 
 @listing
-def test_a_plain_user_script_lists_opens_asks_and_uploads(plugged):
+def test_a_plain_pyvisa_script_lists_opens_queries_and_uploads(plugged):
     # Nothing below knows that the instrument is simulated.
     rm = pyvisa.ResourceManager("@py")
     (name,) = [name for name in rm.list_resources() if "::1689::851::" in name]
@@ -130,7 +130,7 @@ def test_a_cable_put_back_works_with_the_session_that_was_open(plugged):
 
 
 @listing
-def test_several_generators_on_one_bus_keep_apart(plugged):
+def test_several_generators_on_one_bus_are_independent(plugged):
     other = Plugged(serial="C020202")
     try:
         plugged.instrument.write("FREQ 111")
@@ -158,13 +158,13 @@ def test_a_second_session_is_refused_while_the_first_is_open(plugged):
     assert plugged.instrument.query("*OPC?").strip() == "1"
 
 
-def test_plain_pyusb_sees_maker_product_and_serial(plugged):
+def test_pyusb_reads_manufacturer_product_and_serial(plugged):
     device = usb.core.find(idVendor=0x0699, idProduct=0x0353)
     assert (device.manufacturer, device.product, device.serial_number) == ("TEKTRONIX", "AFG1022", "C010101")
     assert "Bulk OUT" in str(device) or "bulk" in str(device).lower()
 
 
-def test_it_works_although_pyvisa_was_imported_first_without_libusb():
+def test_the_usb_bus_works_if_pyvisa_was_imported_first_without_libusb():
     program = """
         import warnings
         warnings.simplefilter("ignore")

@@ -91,7 +91,7 @@ def test_a_termination_character_ends_a_transfer_early():
     assert host.read() == (b"1\n", True)
 
 
-def test_a_new_message_throws_away_an_unread_reply_and_reports_it():
+def test_a_new_message_discards_an_unread_reply_and_queues_an_error():
     host = Host()
     host.write(b"*IDN?")
     assert host.ask(b"SYST:ERR?") == b'-410,"Query INTERRUPTED"\n'
@@ -104,7 +104,7 @@ def test_a_read_without_a_query_times_out_and_reports_it():
     assert host.ask(b"SYST:ERR?") == b'-420,"Query UNTERMINATED"\n'
 
 
-def test_a_late_reply_times_out_and_is_there_for_the_next_read():
+def test_a_late_reply_times_out_and_arrives_at_a_later_read():
     host = Host()
     host.generator.delay_next_reply(5.0)
     host.write(b"*OPC?")
@@ -129,7 +129,7 @@ def test_aborting_a_read_that_is_not_there_is_refused():
     assert Host().control(3, value=9, length=2, kind=CLASS_IN_ENDPOINT)[0] == 0x81
 
 
-def test_capabilities_promise_488_2_and_neither_remote_control_nor_trigger():
+def test_capabilities_state_488_2_without_remote_control_or_trigger():
     answer = Host().control(7, length=0x18)
     assert len(answer) == 0x18
     assert answer[0] == 1
@@ -145,7 +145,7 @@ def test_a_malformed_transfer_stalls(damage):
 
 
 @pytest.mark.parametrize("request_number", [1, 5, 64, 99, 128, 160])
-def test_a_class_request_that_no_program_makes_stalls(request_number):
+def test_an_unsupported_class_request_stalls(request_number):
     with pytest.raises(BrokenPipeError):
         Host().control(request_number)
 
