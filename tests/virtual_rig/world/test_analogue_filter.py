@@ -25,7 +25,7 @@ def test_the_running_filter_has_the_analogue_gain_and_phase(analogue):
         assert np.max(np.abs(error)) < tolerance
 
 
-def test_a_resonance_sits_where_it_belongs_close_to_the_nyquist_frequency():
+def test_a_filter_resonance_near_nyquist_has_the_right_frequency():
     running = running_filter(resonant(30e3, 0.02), STEP_S)
     frequency_hz = np.arange(25e3, 35e3, 10.0)
     assert frequency_hz[np.argmax(np.abs(response(running, frequency_hz)))] == pytest.approx(30e3, abs=50)

@@ -41,7 +41,7 @@ def moved(frequency_hz, amplitude_v, grid):
 
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0, WATCHED_HZ])
-def test_the_coarsest_grid_has_its_stated_error_at_the_base_and_a_right_specimen(frequency_hz):
+def test_the_coarsest_grid_keeps_its_stated_error_of_base_and_specimen(frequency_hz):
     coarse, fine = (moved(frequency_hz, 5e-3, TimeGrid(rate_hz)) for rate_hz in (COARSE.rate_hz, 409_600.0))
     # Near 266 Hz the specimen pushes back with its whole resonance.
     allowed = max(level_error(frequency_hz, COARSE.rate_hz), 6e-3)
@@ -80,7 +80,7 @@ def test_a_grid_whose_error_is_too_large_is_refused_with_the_error(rate_hz):
         rig_with(5120.0, grid_rate_hz=rate_hz)
 
 
-def test_a_coarse_grid_is_refused_for_a_sample_rate_that_it_does_not_carry():
+def test_a_grid_too_coarse_for_the_sampling_rate_is_refused():
     with pytest.raises(ConfigurationError, match=r"carries 6400 samples a second at most.*51200"):
         rig_with(51_200.0, grid_rate_hz=COARSE.rate_hz)
     world = World(rig_with(6400.0, grid_rate_hz=COARSE.rate_hz), terminal=None)

@@ -46,7 +46,7 @@ def test_aliases_are_suppressed_by_more_than_80_db(ratio, cycles_per_sample):
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_a_constant_is_unchanged(ratio):
+def test_decimation_keeps_a_constant_unchanged(ratio):
     history = history_steps(ratio, 0.0)
     samples = decimator(ratio, 0, 0.3).convert(np.full(history + 1000, 2.5), -history, 0, int(1000 / ratio))
     assert samples == pytest.approx(2.5, rel=1e-13)
@@ -54,7 +54,7 @@ def test_a_constant_is_unchanged(ratio):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("delay_steps", [EARLIEST_STEPS, 0.0, 300.0])
-def test_no_sample_needs_the_future_or_more_history_than_there_is(ratio, delay_steps):
+def test_decimated_samples_need_no_future_and_no_missing_history(ratio, delay_steps):
     filtered = decimator(ratio, 1000, delay_steps)
     assert filtered.first_step(0) >= 1000 - history_steps(ratio, delay_steps)
     for sample in range(50):
@@ -64,7 +64,7 @@ def test_no_sample_needs_the_future_or_more_history_than_there_is(ratio, delay_s
 
 @settings(deadline=None, max_examples=25)
 @given(st.sampled_from(RATIOS), st.lists(st.integers(1, 40), min_size=1, max_size=6))
-def test_samples_do_not_depend_on_the_blocks_they_come_in(ratio, sizes):
+def test_decimated_samples_do_not_depend_on_the_block_size(ratio, sizes):
     history, count = history_steps(ratio, 0.2), sum(sizes)
     means = np.random.default_rng(1).standard_normal(history + int(np.ceil(count * ratio)) + 1)
     filtered = decimator(ratio, 0, 0.2)

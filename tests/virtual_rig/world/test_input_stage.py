@@ -42,13 +42,13 @@ def test_the_bias_of_an_excited_iepe_sensor_overloads_a_five_volt_input_on_dc_co
     assert clips
 
 
-def test_a_wider_input_shows_bias_and_signal():
+def test_a_12_v_input_shows_sensor_bias_and_signal():
     volts, clips = stage(SENSOR, Coupling.DC, 0.002, range_v=12.0).pass_on(signals(SINE))
     assert volts == pytest.approx(IEPE_BIAS_V + SINE)
     assert not clips
 
 
-def test_an_open_input_shows_nothing_unless_it_is_excited():
+def test_an_open_input_reads_zero_unless_excitation_is_on():
     assert np.all(stage(OPEN_INPUT).pass_on(signals(SINE))[0] == 0)
     assert stage(OPEN_INPUT, iepe_current_a=0.002).pass_on(signals(SINE))[1]
 
@@ -58,25 +58,25 @@ def test_excitation_on_a_voltage_source_shifts_it_by_the_drop_in_the_source():
     assert volts == pytest.approx(SINE + 0.1)
 
 
-def test_a_divider_in_front_of_the_input_divides():
+def test_a_voltage_divider_reduces_the_input_voltage():
     volts, _ = stage(Cable(Behind.VOLTAGE_SOURCE, Signal.DRIVE, attenuation=10.0)).pass_on(signals(SINE))
     assert volts == pytest.approx(SINE / 10)
 
 
-def test_ac_coupling_is_down_by_the_root_of_two_at_its_cut():
+def test_ac_coupling_is_3_db_down_at_its_cut_off_frequency():
     time_s = STEP_S * np.arange(819_200)
     volts, _ = stage(SOURCE, Coupling.AC).pass_on(signals(np.sin(2 * np.pi * AC_CUT_HZ * time_s)))
     assert np.max(np.abs(volts[-204_800:])) == pytest.approx(np.sqrt(0.5), rel=1e-3)
 
 
-def test_an_input_goes_a_little_beyond_its_range_before_it_clips():
+def test_an_input_clips_slightly_beyond_its_range():
     within, clips_within = stage(SOURCE).pass_on(signals(np.array([5.0 * OVER_RANGE])))
     beyond, clips_beyond = stage(SOURCE).pass_on(signals(np.array([-5.2])))
     assert (within[0], clips_within) == (5.0 * OVER_RANGE, False)
     assert (beyond[0], clips_beyond) == (-5.0 * OVER_RANGE, True)
 
 
-def test_another_cable_takes_effect_in_the_next_steps():
+def test_a_changed_cable_takes_effect_in_the_next_steps():
     running = stage(SOURCE)
     before, _ = running.pass_on(signals(SINE))
     running.plug(OPEN_INPUT)

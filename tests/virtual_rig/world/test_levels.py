@@ -46,7 +46,7 @@ def test_the_strongest_sine_stays_within_the_shakers_limits_from_fifty_hertz_up(
     assert np.max(reached) < 0.95 * allowed
 
 
-def test_weak_noise_never_makes_an_impact_and_strong_noise_makes_hundreds():
+def test_weak_noise_causes_no_impact_and_strong_noise_hundreds():
     weak, strong = switched_on(), switched_on()
     truth = moved(weak, noise(WEAK_VPP, 1)).ends
     moved(strong, noise(STRONG_VPP, 1))

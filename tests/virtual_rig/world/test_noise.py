@@ -8,7 +8,7 @@ from vibench.virtual_rig.world.sensors import PAGE, NoiseStream
 
 
 @given(st.lists(st.integers(1, 3000), min_size=1, max_size=12), st.integers(0, 3 * PAGE))
-def test_blocks_of_any_size_join_to_the_same_noise(sizes, first):
+def test_noise_does_not_depend_on_the_block_size(sizes, first):
     whole = NoiseStream(1, "here").draw(first, sum(sizes))
     stream, position, parts = NoiseStream(1, "here"), first, []
     for size in sizes:
@@ -17,7 +17,7 @@ def test_blocks_of_any_size_join_to_the_same_noise(sizes, first):
     assert np.array_equal(np.concatenate(parts), whole)
 
 
-def test_no_samples_can_be_requested():
+def test_a_noise_stream_can_return_zero_samples():
     assert NoiseStream(1, "here").draw(17, 0).shape == (0,)
 
 

@@ -40,7 +40,7 @@ def accelerometer(noise_m_per_s2=0.0, **config):
     )
 
 
-def test_a_steady_velocity_shows_as_volts_by_the_decoders_range():
+def test_a_steady_velocity_gives_volts_by_the_decoder_range():
     volts = vibrometer().volts(np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
     assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
 
@@ -51,14 +51,14 @@ def test_velocity_beyond_full_scale_is_clipped():
     assert np.count_nonzero(volts == -FULL_SCALE_V) > 190
 
 
-def test_the_vibrometers_noise_has_the_density_that_is_configured():
+def test_the_vibrometer_noise_has_the_configured_density():
     density = 2e-8
     volts = vibrometer(noise_density=density).volts(np.zeros(200_000), 0)
     rms = np.std(volts) * FULL_SCALE_M_PER_S / FULL_SCALE_V
     assert rms == pytest.approx(density * np.sqrt(GRID_RATE_HZ / 2), rel=0.01)
 
 
-def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
+def test_the_accelerometer_noise_has_its_stated_rms_in_the_full_band():
     acceleration = accelerometer(noise_m_per_s2=0.005).volts(np.zeros(200_000), 0)
     acceleration /= RIG.accelerometer.sensitivity_v_per_m_per_s2
     spectrum = np.abs(np.fft.rfft(acceleration)) ** 2 * 2 / len(acceleration) ** 2
@@ -72,7 +72,7 @@ def test_the_accelerometer_clips_at_its_full_scale():
     assert volts[-1] == limit
 
 
-def test_the_decoders_whole_delay_matches_its_bandwidth_and_the_rest():
+def test_the_decoder_delay_includes_the_delay_of_its_bandwidth():
     config = RIG.vibrometer
     bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz)
     assert vibrometer().delay_steps / GRID_RATE_HZ + bandwidth_s == pytest.approx(config.delay_s)
@@ -84,7 +84,7 @@ def test_a_delay_that_cannot_be_simulated_is_refused():
     assert vibrometer(delay_s=LONGEST_DELAY_S).delay_steps > 0
 
 
-def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
+def test_a_requested_drop_out_replaces_the_signal_for_its_duration():
     instrument = vibrometer()
     instrument.disturb(Disturbance(150, 160, 1.0))
     first, second = (instrument.volts(np.full(100, 0.01), start) for start in (100, 200))
@@ -94,7 +94,7 @@ def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
     assert np.concatenate([first[60:], second]) == pytest.approx(quiet, rel=1e-6)
 
 
-def test_dropouts_come_at_random_as_often_as_configured():
+def test_drop_outs_occur_at_random_at_the_configured_rate():
     per_s, steps = 50.0, 1_000_000
     found = RandomDropouts(per_s, NoiseStream(2, "dropouts")).between(0, steps)
     begun = [one for one in found if 0 <= one.first_step < steps]
@@ -104,7 +104,7 @@ def test_dropouts_come_at_random_as_often_as_configured():
     assert np.mean(lengths) == pytest.approx(RandomDropouts.MEAN_S * GRID_RATE_HZ, rel=0.15)
 
 
-def test_dropouts_do_not_depend_on_the_blocks_they_are_looked_up_in():
+def test_drop_outs_do_not_depend_on_the_block_size():
     steps = 5 * PAGE  # a multiple of 640
     whole = vibrometer(dropouts_per_s=200.0).volts(np.zeros(steps), 0)
     instrument = vibrometer(dropouts_per_s=200.0)

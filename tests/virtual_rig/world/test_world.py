@@ -94,14 +94,14 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_states(frequency
 
 @settings(deadline=None, max_examples=10)
 @given(st.lists(st.integers(1, 1500), min_size=2, max_size=12))
-def test_two_worlds_agree_bit_for_bit_for_any_block_size(sizes):
+def test_two_simulated_rigs_agree_bit_for_bit_for_any_block_size(sizes):
     rig = changed(RIG, virtual={"vibrometer_dropouts_per_s": 50.0})
     whole = World(rig, Tone(260.0, 2.0)).sample(INPUTS, 25_600.0).read(sum(sizes))
     sampler = World(rig, Tone(260.0, 2.0)).sample(INPUTS, 25_600.0)
     assert np.array_equal(np.concatenate([sampler.read(size) for size in sizes], axis=1), whole)
 
 
-def test_another_seed_gives_other_noise():
+def test_a_different_seed_gives_different_noise():
     other = changed(RIG, virtual={"seed": 2})
     one, two = (World(rig, Silence()).sample(INPUTS, 51_200.0).read(2000) for rig in (RIG, other))
     for row in range(4):
@@ -109,7 +109,7 @@ def test_another_seed_gives_other_noise():
         assert np.std(one[row]) == pytest.approx(np.std(two[row]), rel=0.1)
 
 
-def test_every_sample_is_an_exact_multiple_of_the_converters_step():
+def test_every_sample_is_an_exact_multiple_of_the_converter_step():
     volts = World(RIG, Tone(260.0, 3.0)).sample(INPUTS, 51_200.0).read(5000)
     for row, configured in zip(volts, INPUTS, strict=True):
         count_v = volts_per_count(configured.range_v)
@@ -117,7 +117,7 @@ def test_every_sample_is_an_exact_multiple_of_the_converters_step():
         assert len(np.unique(row)) > 1000
 
 
-def test_an_input_beyond_its_range_clips_and_reports_it_once():
+def test_an_input_beyond_its_range_clips_and_reports_one_overload():
     world = World(QUIET, Tone(100.0, 12.0))
     sampler = world.sample((Input("cDAQ1Mod1/ai0", 5.0, Coupling.DC),), 51_200.0)
     volts = sampler.read(5000)
@@ -138,7 +138,7 @@ def test_reading_the_overloads_clears_them():
     assert not sampler.overloaded()[0]
 
 
-def test_conversions_at_different_rates_show_the_same_voltage_at_the_same_time():
+def test_conversions_at_different_rates_agree_at_equal_times():
     world = World(QUIET, Tone(260.0, 1.0))
     world.advance(0.01)
     rates = (51_200.0, 12_800.0, 44_100.0, 102_400.0)
@@ -151,7 +151,7 @@ def test_conversions_at_different_rates_show_the_same_voltage_at_the_same_time()
         assert measured * RIG.daq.channels[DRIVE].attenuation == pytest.approx(1.0, rel=3e-4)
 
 
-def test_a_later_conversion_sees_the_earlier_signal():
+def test_a_conversion_started_later_sees_the_earlier_signal():
     world = World(QUIET, Tone(260.0, 1.0))
     world.advance(0.5)
     volts = world.sample(INPUTS[:1], 51_200.0).read(100)[0]
@@ -164,7 +164,7 @@ def world_begin(time_s):
     return round(time_s * GRID_RATE_HZ) / GRID_RATE_HZ
 
 
-def test_the_world_is_computed_as_far_as_it_is_requested():
+def test_the_simulation_advances_only_as_far_as_requested():
     world = World(QUIET, Silence())
     world.advance(0.25)
     assert world.time_s == pytest.approx(0.25, abs=STEP_S)
@@ -189,13 +189,13 @@ def test_an_analogue_output_drives_the_amplifier_beside_the_generator():
         assert abs(phasor(volts, frequency_hz, 51_200.0)) * attenuation == pytest.approx(expected_v, rel=2e-2)
 
 
-def test_an_output_that_is_not_wired_moves_nothing():
+def test_an_unwired_analogue_output_has_no_effect():
     world = World(QUIET, Silence())
     world.play("Dev2/ao0", np.ones(1000), 10_240.0)
     assert np.all(world.sample(INPUTS, 51_200.0).read(1000) == 0)
 
 
-def test_truth_shows_unmeasured_motion_and_is_off_by_default():
+def test_the_true_motion_can_be_recorded_and_is_off_by_default():
     world = World(QUIET, Tone(260.0, 3.0))
     world.advance(0.1)
     assert world.truth().shape == (0, len(MOTION_COLUMNS))
@@ -209,7 +209,7 @@ def test_truth_shows_unmeasured_motion_and_is_off_by_default():
     assert world.truth().shape[0] == 0
 
 
-def test_a_disconnected_cable_goes_silent_and_comes_back():
+def test_a_disconnected_channel_reads_zero_until_reconnected():
     world = World(QUIET, Tone(260.0, 1.0))
     sampler = world.sample(INPUTS[:1], 51_200.0)
     levels = []
@@ -219,7 +219,7 @@ def test_a_disconnected_cable_goes_silent_and_comes_back():
     assert levels == pytest.approx([0.5, 0.0, 0.5], abs=1e-3)
 
 
-def test_a_dropout_on_demand_is_seen_by_the_vibrometer_alone():
+def test_a_requested_drop_out_affects_the_vibrometer_alone():
     world = World(QUIET, Tone(260.0, 1.0))
     sampler = world.sample(INPUTS, 51_200.0)
     world.disturb_response(0.01, 1.0)
@@ -228,7 +228,7 @@ def test_a_dropout_on_demand_is_seen_by_the_vibrometer_alone():
     assert np.max(volts[DRIVE]) < 0.6
 
 
-def test_a_fast_converter_clock_shows_every_instrument_slow():
+def test_a_fast_converter_clock_makes_all_other_clocks_appear_slow():
     assert relative_clock_ppm(12.0, 12.0) == pytest.approx(0.0, abs=1e-9)
     assert relative_clock_ppm(12.0, -5.0) == pytest.approx(17.0, abs=1e-3)
     assert USUAL_GRID.physical_step_s(100.0) == pytest.approx(STEP_S * (1 - 1e-4), rel=1e-7)
@@ -244,7 +244,7 @@ def test_a_rig_of_real_instruments_is_not_simulated():
         World(RIG.model_copy(update={"virtual": None}), Silence())
 
 
-def test_threads_that_share_a_world_get_the_same_samples_as_one():
+def test_threads_sharing_a_simulated_rig_read_the_same_samples():
     alone = World(RIG, Tone(260.0, 1.0)).sample(INPUTS, 51_200.0).read(6000)
     world = World(RIG, Tone(260.0, 1.0))
     samplers = [world.sample(INPUTS, 51_200.0) for _ in range(2)]
@@ -262,7 +262,7 @@ def test_threads_that_share_a_world_get_the_same_samples_as_one():
     assert np.array_equal(results[1], alone)
 
 
-def test_a_closed_conversion_no_longer_costs_anything():
+def test_a_conversion_can_be_closed_twice_before_the_rig_advances():
     world = World(QUIET, Silence())
     sampler = world.sample(INPUTS, 51_200.0)
     sampler.close()
@@ -278,7 +278,7 @@ class Broken:
         return np.where(start_s + interval_s * np.arange(count) < 0.5, 0.0, np.nan)
 
 
-def test_a_failed_simulation_is_reported_and_stops_the_world():
+def test_a_failed_simulation_is_reported_and_stops_the_rig():
     world = World(RIG, Broken())
     conversion = world.sample(INPUTS, 51200.0)
     assert np.all(np.isfinite(conversion.read(20000)))
