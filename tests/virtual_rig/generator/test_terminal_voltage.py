@@ -60,7 +60,7 @@ def test_an_output_that_is_off_is_exactly_silent_whatever_is_set():
     ("declared", "load_ohm", "factor"),
     [("50", math.inf, 2.0), ("50", 50.0, 1.0), ("INF", math.inf, 1.0), ("50", 15e3, 2 * 15e3 / 15050)],
 )
-def test_the_voltage_doubles_if_50_ohm_are_declared_without_a_50_ohm_load(
+def test_the_terminal_voltage_doubles_if_50_ohm_are_declared_without_a_50_ohm_load(
     declared, load_ohm, factor
 ):
     rig = Rig(Terminal(load_ohm=load_ohm, noise_v_per_rt_hz=0.0))
