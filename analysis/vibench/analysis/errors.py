@@ -1,4 +1,4 @@
-"""Errors of an analysis; each message states what was given, what is allowed, and what to do next."""
+"""The errors of an analysis: each says what was given, what is allowed, and what to do next."""
 
 
 class AnalysisError(Exception):

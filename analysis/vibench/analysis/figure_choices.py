@@ -1,4 +1,4 @@
-"""Choices for figures; a separate module, so that commands list them without matplotlib."""
+"""Choices for figures, kept apart so that commands can list them without matplotlib installed."""
 
 from enum import StrEnum
 

@@ -1,4 +1,4 @@
-"""Comparison of measurements and predictions as curves over frequency.
+"""Compare measurements and predictions as curves over frequency.
 
 A curve is the ratio of m0's displacement to the base displacement over frequency [Hz], with its relative
 standard deviation. It is a transmission, Response I or Response II, measured, simulated or predicted. The

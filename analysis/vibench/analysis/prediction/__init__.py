@@ -1,4 +1,4 @@
-"""Simulations for the window: requests, their growing results, and their costs.
+"""Simulations for the window: requests, growing results, and costs.
 
 A request has one specimen, one drive over frequency, and up to two models. A separate process computes one
 request after the other, sends results in pieces, and can be cancelled. docs/accuracy.md shows errors and

@@ -1,4 +1,4 @@
-"""Analyse recordings and campaigns, each recording by the kind of excitation in its plan.
+"""Analyse recordings and campaigns, each recording by the excitation in its plan.
 
 The result of a recording is a noise, sweep, dwell or stepped-sine result, with or without an overlaid
 simulation. A recording that cannot be analysed is reported with the reason, and the others continue. Results
