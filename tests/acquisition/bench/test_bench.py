@@ -105,7 +105,7 @@ class TestOpening:
         assert output_of(virtual) == b"0\n"
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
 
-    def test_a_second_bench_on_the_same_converter_gets_an_error_that_it_is_busy(self, laboratory):
+    def test_a_second_bench_on_the_same_converter_is_refused_as_busy(self, laboratory):
         with laboratory_bench(laboratory), pytest.raises(InstrumentBusy):
             open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED)
 
@@ -130,7 +130,7 @@ class TestLeaving:
                 assert output_of(virtual) == b"1\n"
             assert output_of(virtual) == b"0\n"
 
-    def test_closing_twice_is_legal(self, rig):
+    def test_closing_a_bench_twice_is_allowed(self, rig):
         bench = open_bench(rig)
         bench.close()
         bench.close()

@@ -24,7 +24,7 @@ def test_generator_and_converter_are_found_under_the_names_that_a_configuration_
     assert found.remarks == ()
 
 
-def test_a_computer_without_the_driver_lists_the_rest_and_reports_it(virtual):
+def test_a_missing_daq_driver_is_reported_and_other_instruments_are_listed(virtual):
     found = list_instruments()
     assert found.visa_resources
     assert found.daq_devices == ()

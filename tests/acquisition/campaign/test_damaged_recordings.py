@@ -140,7 +140,7 @@ def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, fold
 
 
 @pytest.mark.parametrize("damage", [truncated, with_another_scale, exchanged, replaced_by_a_folder])
-def test_a_resume_lists_its_points_before_it_plays(folder, damage):
+def test_a_resume_lists_its_points_before_output(folder, damage):
     damage(folder)
     planned = planned_recordings(CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert [each.is_complete for each in planned] == [True, False, True]
@@ -381,7 +381,7 @@ def refused_by_the_disk(bench, folder, stop):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_recording_with_a_failed_ending_is_recovered_beside_its_repetition(bench, tmp_path, has_journal):
+def test_a_stopped_recording_not_finished_on_disk_is_recovered_later(bench, tmp_path, has_journal):
     refused_by_the_disk(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
     made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
@@ -399,7 +399,7 @@ def test_a_recording_with_a_failed_ending_is_recovered_beside_its_repetition(ben
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_complete_point_with_a_failed_ending_is_not_recorded_twice(bench, tmp_path, has_journal):
+def test_a_complete_recording_not_finished_on_disk_is_not_repeated(bench, tmp_path, has_journal):
     refused_by_the_disk(bench, tmp_path, None)
     if not has_journal:
         (tmp_path / "c.campaign.sqlite").unlink()

@@ -82,7 +82,7 @@ def _start_and_die(path):
         os._exit(9)
 
 
-def test_a_process_killed_in_a_transaction_keeps_the_previous_one(journal):
+def test_a_kill_during_a_journal_transaction_keeps_the_previous_state(journal):
     path = journal.path
     journal.close()
     child = multiprocessing.get_context("spawn").Process(target=_start_and_die, args=(path,))
@@ -139,7 +139,7 @@ def opened(path):
 @pytest.mark.parametrize(
     "use", [opened, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
 )
-def test_a_refused_file_is_closed(connections, tmp_path, use):
+def test_a_refused_journal_or_catalogue_file_is_closed(connections, tmp_path, use):
     path = tmp_path / "catalogue.sqlite"
     path.write_text("no database " * 100)
     with pytest.raises(RecordingError) as caught:

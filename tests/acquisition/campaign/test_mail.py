@@ -56,7 +56,7 @@ def settings(tmp_path, port, security="none"):
     return load_toml(path, MailSettings)
 
 
-def test_control_characters_do_not_break_a_message(server, tmp_path):
+def test_control_characters_do_not_break_a_mail(server, tmp_path):
     hostile = NOTICE | {"campaign": "c\nBcc: all@lab.example", "folder": "\udcff", "reason": "\x1b[2J\r\n."}
     said = MailMessenger(settings(tmp_path, server.server_address[1])).send(hostile)
     assert said == "mail sent to me@lab.example"

@@ -102,7 +102,7 @@ def test_each_recording_contains_its_own_mass_and_scan_point(kept, tmp_path):
     assert world._beam is Role.M0_VELOCITY
 
 
-def test_the_seal_covers_the_coordinates(kept, tmp_path):
+def test_the_seal_covers_the_scan_coordinates(kept, tmp_path):
     run_campaign(kept.bench, scan(), tmp_path)
     with open_recording(tmp_path / "dwell-side.h5") as recording:
         assert recording.check_seal(SealDepth.WHOLE).state is SealState.INTACT

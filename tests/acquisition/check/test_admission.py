@@ -78,7 +78,7 @@ def test_a_recent_passed_check_is_not_repeated(real, tmp_path, verdict):
     assert virtual.world.time_s == before_s
 
 
-def test_a_check_of_another_configuration_does_not_arm(real, tmp_path):
+def test_a_check_of_another_configuration_does_not_arm_the_bench(real, tmp_path):
     bench, _ = real
     turned = bench.rig.amplifier.model_copy(update={"gain_db": 20.0})
     kept_result(bench.rig.model_copy(update={"amplifier": turned}))
@@ -103,7 +103,7 @@ def test_a_new_check_arms_the_bench_and_is_recorded(real, tmp_path):
         assert recording.bench_check["verdict"] in ("ok", "warn")
 
 
-def test_a_failed_new_check_does_not_arm_and_is_stored(real, tmp_path):
+def test_a_failed_new_check_is_stored_and_does_not_arm_the_bench(real, tmp_path):
     bench, virtual = real
     virtual.faults.turn_amplifier_gain(20.0)
     with pytest.raises(
@@ -191,7 +191,7 @@ class TestKeeping:
         assert check_bench(bench, tmp_path).report[name].verdict is Verdict.OK
 
     @pytest.mark.parametrize("content", ["", "{", '{"rig": 3}', "\x00\xff"])
-    def test_a_damaged_file_counts_as_no_check(self, rig, state_folder, content):
+    def test_a_damaged_check_file_counts_as_no_check(self, rig, state_folder, content):
         kept_result(rig)
         archive_path(rig.name).write_bytes(content.encode("latin-1"))
         assert last_check(rig.name) is None

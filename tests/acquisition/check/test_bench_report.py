@@ -52,7 +52,7 @@ def test_a_healthy_bench_passes_and_matches_its_configuration(checked, rig, tmp_
         ((10.04e-3, 1.134e-3, 2.805e-3), (12976.7, 425.9, 20127.5), (0.276, 0.0094, 0.371), (26.4e-6, 32e-6)),
     ],
 )
-def test_a_heavy_specimen_near_its_resonance_is_no_fault(
+def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
     rig, tmp_path, checked, masses_kg, stiffnesses_n_per_m, dampings_ns_per_m, gap_m
 ):
     own = {
@@ -169,7 +169,7 @@ def test_a_wrong_load_setting_is_found_with_advice(checked, rig, tmp_path):
     assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
 
 
-def test_a_right_load_setting_passes_even_if_it_cannot_be_read(checked, rig, tmp_path):
+def test_a_correct_load_setting_passes_even_if_it_cannot_be_read(checked, rig, tmp_path):
     assert failed(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
 
 
@@ -181,7 +181,7 @@ def test_a_lost_generator_raises_an_error(bench_of, rig, tmp_path):
         virtual.faults.heal()
 
 
-def test_the_report_is_a_table_and_round_trips_through_json(checked, rig, tmp_path):
+def test_the_bench_report_is_a_table_and_round_trips_through_json(checked, rig, tmp_path):
     report = checked(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
     assert BenchReport.model_validate_json(report.model_dump_json()) == report
     lines = report.text().splitlines()

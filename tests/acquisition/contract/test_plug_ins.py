@@ -72,7 +72,7 @@ def test_every_registered_driver_exists():
         assert plug_in(PlugInKind(row.group), row.name) is row.load()
 
 
-def test_an_unknown_driver_is_refused_with_the_known_ones():
+def test_an_unknown_driver_is_refused_with_a_list_of_known_drivers():
     with pytest.raises(ConfigurationError, match=r"'afg' is not a name of vibench\.generators: afg1022x"):
         plug_in(PlugInKind.GENERATOR, "afg")
 
@@ -180,7 +180,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         ),
     ],
 )
-def test_a_wrong_contract_command_gives_one_message(tmp_path, options, sentence):
+def test_a_wrong_contract_command_gives_a_single_error_message(tmp_path, options, sentence):
     bench = CONFIGS / "virtual_rig.toml"
     done = run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),

@@ -46,7 +46,7 @@ def test_samples_without_suspected_drop_outs_are_not_delayed():
         assert np.array_equal(handed_on, [part, 2 * part, 3 * part])
 
 
-def test_a_gap_or_a_changed_tone_restarts_the_bridge():
+def test_a_gap_or_a_changed_tone_restarts_the_drop_out_bridging():
     light, rows = velocity(), BridgedRows(RATE_HZ)
     dark = light[:2_000].copy()
     dark[-15:] = 0.6

@@ -93,7 +93,7 @@ def test_a_hold_during_settling_does_not_change_the_level(bench, tmp_path):
     assert {each["level"] for each in level} == {"within tolerance"}
 
 
-def test_a_detached_sensor_ends_the_run_early(bench, tmp_path):
+def test_a_detached_accelerometer_ends_a_feedback_run_at_a_low_setting(bench, tmp_path):
     run = run_of(bench, tmp_path)
     while next(iter(run)).state is not RunState.RECORDING:
         pass
@@ -132,7 +132,7 @@ def test_limits_are_checked_at_the_largest_setting_of_feedback(bench, tmp_path, 
         list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))
 
 
-def test_an_analogue_output_is_refused(streaming_bench, tmp_path):
+def test_feedback_through_an_analogue_output_is_refused(streaming_bench, tmp_path):
     output = streaming_bench.rig.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
     daq = streaming_bench.rig.daq.model_copy(update={"output": output})
     streaming_bench.rig = streaming_bench.rig.model_copy(update={"daq": daq})
@@ -141,7 +141,7 @@ def test_an_analogue_output_is_refused(streaming_bench, tmp_path):
     assert "write" not in {name for name, *_ in streaming_bench.world.calls}
 
 
-def test_a_rig_without_a_vibrometer_channel_is_refused(bench, tmp_path):
+def test_feedback_without_a_vibrometer_channel_is_refused(bench, tmp_path):
     bench.channels = tuple(each for each in bench.channels if each.role is not Role.M0_VELOCITY)
     with pytest.raises(ConfigurationError, match="m0_velocity"):
         list(run_of(bench, tmp_path))

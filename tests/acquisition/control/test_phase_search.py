@@ -60,7 +60,7 @@ def test_the_phase_search_stays_in_its_range():
     assert search.next_hz() == 270.0
 
 
-def test_phase_errors_beyond_90_degrees_are_no_crossing():
+def test_phase_errors_beyond_90_degrees_do_not_count_as_a_resonance():
     tries = [PhaseError(100.0, 130.0, 1.0), PhaseError(101.0, 120.0, 1.0)]
     found = PhaseSearch(90.0, 110.0, 1.0, tries).resonance(0.3)
     assert found.frequency_hz == 101.0

@@ -99,7 +99,7 @@ class TestLoad:
             AFG1022X.open(panel_load.config)
         assert not panel_load.is_on
 
-    def test_a_right_load_at_the_panel_needs_no_confirmation(self, panel_load):
+    def test_a_correct_load_at_the_panel_needs_no_confirmation(self, panel_load):
         generator = AFG1022X.open(panel_load.config.model_copy(update={"load_ohm": 50.0}))
         assert generator.unconfirmed == ()
         generator.close()
@@ -133,7 +133,7 @@ class TestPlaying:
         generator.set_frequency(261.0)
         assert plugged.log.messages == ["SOUR1:FREQ 261.000000", "SYST:ERR?", "SOUR1:FREQ?"]
 
-    def test_start_turns_on_and_stop_turns_off_and_may_be_repeated(self, plugged, playing):
+    def test_start_and_stop_switch_the_output_and_may_be_repeated(self, plugged, playing):
         assert plugged.is_on
         playing.stop()
         playing.stop()
@@ -169,7 +169,7 @@ class TestPlaying:
             assert generator.query("OUTP1?") == "0"
             generator.close()
 
-    def test_an_uneven_waveform_keeps_its_volts_when_the_amplitude_changes(self, plugged, generator):
+    def test_an_asymmetric_waveform_has_the_right_volts_after_an_amplitude_change(self, plugged, generator):
         values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
         generator.load_waveform(values, 2.0, 1.0)
         generator.set_amplitude(2.0)
@@ -194,7 +194,7 @@ class TestPlaying:
             assert largest_peak_v(plugged.log.states) <= allowed + 1e-9
             assert plugged.is_on
 
-    def test_the_memory_is_never_changed_during_output(self, plugged, generator):
+    def test_the_waveform_memory_is_changed_only_at_the_lowest_amplitude(self, plugged, generator):
         generator.load_waveform(SINE, 1.0, 3.0)
         generator.start()
         plugged.log.forget()
@@ -261,7 +261,7 @@ class TestLimits:
 
 
 class TestFaults:
-    def test_a_silently_replaced_setting_is_a_fault_and_silences(self, plugged, playing):
+    def test_a_silently_replaced_setting_is_a_fault_and_silences_the_output(self, plugged, playing):
         # Somebody turns to 10 ohm at the panel: 10 Vpp is now out of range, and silently becomes 1 Vpp.
         plugged.instrument.execute(b"OUTP1:IMP 10")
         with pytest.raises(SettingRefused, match=r"10\.0000VPP.*reads back '1") as caught:
@@ -269,7 +269,7 @@ class TestFaults:
         assert not plugged.is_on
         assert "The output was switched off." in caught.value.__notes__
 
-    def test_an_instrument_error_is_a_fault_and_silences(self, bus):
+    def test_an_instrument_error_is_a_fault_and_silences_the_output(self, bus):
         plugged = bus.plug_in(Quirks(out_of_range_becomes_default=False))
         generator = AFG1022X.open(plugged.config)
         generator.load_sine(260.0, 0.1)
@@ -298,7 +298,7 @@ class TestFaults:
             (lambda instrument: instrument.delay_next_reply(10.0), "did not answer"),
         ],
     )
-    def test_a_corrupted_or_late_answer_is_an_error_and_silences(self, plugged, playing, spoil, said):
+    def test_a_corrupted_or_late_answer_raises_and_silences_the_output(self, plugged, playing, spoil, said):
         spoil(plugged.instrument)
         with pytest.raises(InstrumentError, match=said):
             playing.set_frequency(261.0)
@@ -333,13 +333,13 @@ class TestFaults:
         playing.stop()
         assert not plugged.is_on
 
-    def test_closing_silences_and_may_be_repeated(self, plugged, playing):
+    def test_closing_a_generator_silences_it_and_may_be_repeated(self, plugged, playing):
         playing.close()
         playing.stop()
         playing.close()
         assert not plugged.is_on
 
-    def test_a_failure_while_opening_leaves_silence_and_a_free_instrument(self, plugged):
+    def test_an_interrupted_opening_leaves_the_output_off_and_the_instrument_free(self, plugged):
         plugged.instrument.execute(b"OUTP1 ON")
         interrupted = []
 

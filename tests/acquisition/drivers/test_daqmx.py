@@ -90,7 +90,7 @@ class TestReading:
         firsts = [digitizer.read(samples).first_sample for samples in (100, 1, 700, 100)]
         assert firsts == [0, 100, 101, 801]
 
-    def test_cutting_the_stream_into_blocks_changes_no_sample(self, digitizer, virtual):
+    def test_the_block_size_of_reads_does_not_change_any_sample(self, digitizer, virtual):
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 1VPP;:OUTP1 ON")
         digitizer.start()
         digitizer.read(5120)
@@ -123,7 +123,7 @@ class TestReading:
         assert block.counts.dtype == np.int32
         assert np.array_equal(block.counts * np.array(digitizer.volts_per_count)[:, np.newaxis], block.volts)
 
-    def test_two_blocks_share_no_memory(self, digitizer):
+    def test_two_blocks_of_samples_share_no_memory(self, digitizer):
         digitizer.start()
         first = digitizer.read(100)
         kept = first.volts.copy()
@@ -257,19 +257,19 @@ class TestFaults:
 
 class TestErrors:
     @pytest.mark.parametrize("code", MEANINGS)
-    def test_every_error_in_the_table_has_action_event_and_advice(self, code):
+    def test_every_daqmx_error_in_the_table_has_action_event_and_advice(self, code):
         error = from_code(DaqError("said", code.value), "reading Dev1")
         assert isinstance(error, AcquisitionError)
         assert str(error).startswith("reading Dev1 failed: ")
         assert f"({code.name}, {code.value}: said" in str(error)
         assert "To do: " in str(error)
 
-    def test_an_error_outside_the_table_keeps_number_and_text(self):
+    def test_a_daqmx_error_outside_the_table_keeps_number_and_text(self):
         error = from_code(DaqError("Something rare", -200001), "reading Dev1")
         assert "Something rare" in str(error)
         assert "-200001" in str(error)
 
-    def test_every_error_of_the_hardware_reference_is_in_the_table(self):
+    def test_every_daqmx_error_of_the_hardware_reference_is_in_the_table(self):
         numbers = (
             -200279, -200361, -200010, -200714, -200284, -200278, -50103, -200022, -200077, -200220,
             -200170, -201003, -88705, -88708, -88710, -200290, -200018, -200621, -200016, -200292,

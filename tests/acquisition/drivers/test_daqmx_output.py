@@ -205,7 +205,7 @@ def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output,
         digitizer.close()
 
 
-def test_the_driver_keeps_the_contract_of_an_analogue_output(output):
+def test_the_daqmx_output_driver_passes_the_contract_tests(output):
     promised: AnalogOutput = output
     assert (promised.sample_rate_hz, promised.ahead_samples) == (RATE_HZ, 6400)
     assert promised.identity.model == "USB-4431"

@@ -72,7 +72,7 @@ def test_a_generator_with_hostile_replies_ends_switched_off(bus, name, query):
 
 
 @pytest.mark.parametrize("name", [name for name in REPLIES if "complaint" not in name])
-def test_an_identity_is_refused_or_bounded(bus, name):
+def test_a_hostile_identity_reply_is_refused_with_a_short_error(bus, name):
     plugged = bus.plug_in(listener=Hostile)
     plugged.log.query, plugged.log.answer = "*IDN?", REPLIES[name]
     with pytest.raises(InstrumentError) as refused:

@@ -158,7 +158,7 @@ class TestACheckIsStopped:
         assert status.check is None
         assert "the bench check was stopped: smoke in the laboratory" in status.messages[-1].what
 
-    def test_a_check_without_attendance_is_stopped(self, client, shared_engine, shipped_rig, tmp_path):
+    def test_a_check_is_stopped_if_its_viewer_is_gone(self, client, shared_engine, shipped_rig, tmp_path):
         as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
         opened(client, shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
         client.check(tmp_path)
@@ -272,7 +272,7 @@ def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, cli
 
 
 class TestNobodyLooks:
-    def test_an_attended_run_is_aborted_without_requests(self, client, shipped_rig, tmp_path):
+    def test_an_attended_run_is_aborted_if_viewer_requests_stop(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         events = kept(
             tmp_path / "run.h5", r"no viewer has sent a request for \d+\.\d s"
@@ -352,7 +352,7 @@ class TestNobodyLooks:
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
 
-    def test_an_armed_engine_disarms_itself_without_requests(
+    def test_an_armed_engine_disarms_if_viewer_requests_stop(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         opened(client, shipped_rig)
@@ -364,7 +364,7 @@ class TestNobodyLooks:
     @pytest.mark.thorough
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
     @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-    def test_a_viewer_killed_or_frozen_leaves_silence_and_a_recording(self, shipped_rig, tmp_path, number):
+    def test_a_killed_or_frozen_viewer_leaves_silence_and_a_recording(self, shipped_rig, tmp_path, number):
         config = tmp_path / "rig.json"
         config.write_text(shipped_rig.model_dump_json())
         viewer = subprocess.Popen(

@@ -184,7 +184,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
 
 
 class TestNoDescriptorIsLeft:
-    def test_a_stop_is_reported_and_a_recording_is_finished(self, running, tmp_path):
+    def test_a_stop_works_without_free_file_descriptors(self, running, tmp_path):
         with without_descriptors(running):
             assert stop_engine(the_engine(None), StopLevel.ABORT, "no descriptors") in StopDelivery
             ended_by(tmp_path, "no descriptors")

@@ -42,7 +42,7 @@ def test_the_played_spectrum_is_flat_in_the_band_and_empty_elsewhere():
     assert np.max(outside) / np.mean(inside) < 1e-10
 
 
-def test_the_mean_of_a_period_is_zero():
+def test_the_mean_of_a_multisine_period_is_zero():
     (values,) = flat_periods(BAND, realisations=1, seed=3)
     assert abs(np.mean(values)) < 1e-15
 
@@ -76,7 +76,7 @@ def test_equal_seeds_give_equal_periods_and_different_seeds_different_ones():
     assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
 
 
-def test_more_realisations_keep_the_phases_of_the_first_ones():
+def test_requesting_more_realisations_does_not_change_the_first_phases():
     alone = flat_periods(BAND, 1, seed=7)[0]
     among = flat_periods(BAND, 4, seed=7)[0]
     np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)
@@ -89,7 +89,7 @@ def test_the_chosen_crest_factor_is_below_the_mean_of_random_phases():
     assert 2.9 < crest < 3.6
 
 
-def test_values_stay_close_to_gaussian():
+def test_multisine_values_are_close_to_gaussian():
     (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
     kurtosis = np.mean(values**4) / np.mean(values**2) ** 2
     assert kurtosis == pytest.approx(3.0, abs=0.3)

@@ -13,7 +13,7 @@ def test_a_bare_name_loads_a_shipped_file(tmp_path, monkeypatch):
     assert load_campaign("quick").name == "quick"
 
 
-def test_a_file_of_the_user_comes_before_a_shipped_one(tmp_path, monkeypatch):
+def test_a_user_file_takes_precedence_over_a_shipped_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "quick").write_text("", encoding="utf-8")
     assert named("quick", "campaigns").resolve() == tmp_path / "quick"
@@ -26,7 +26,7 @@ def test_a_path_never_loads_a_shipped_file(given, tmp_path, monkeypatch):
         load_campaign(given)
 
 
-def test_an_unknown_file_name_is_refused_with_the_known_ones(tmp_path, monkeypatch):
+def test_an_unknown_file_name_is_refused_with_a_list_of_known_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError, match=r"'quik' is neither .* paper, quick, "):
         load_campaign("quik")

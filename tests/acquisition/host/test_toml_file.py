@@ -46,7 +46,7 @@ def test_an_unknown_key_named_like_a_type_is_reported_by_its_own_name(tmp_path, 
         ("3", "give a table"),
     ],
 )
-def test_an_excitation_of_no_known_kind_is_refused_with_the_known_ones(tmp_path, excitation, told):
+def test_an_unknown_kind_of_excitation_is_refused_with_the_known_kinds(tmp_path, excitation, told):
     text = f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n'
     said = refusal(load_campaign, tmp_path / "campaign.toml", text)
     assert f": {told}" in said

@@ -231,7 +231,7 @@ def test_the_paper_campaign_has_the_levels_and_times_of_the_paper():
     assert (sweep.start_hz, sweep.stop_hz, sweep.duration_s, sweep.amplitude_vpp) == (150, 350, 200, 1.5)
 
 
-def test_the_campaigns_page_lists_the_needs_of_every_kind(tmp_path):
+def test_the_campaigns_page_lists_valid_required_keys_of_every_kind(tmp_path):
     page = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (.*=.*) \|$", page, re.MULTILINE)
     assert {kind for kind, _ in rows} == set(EXCITATION_KINDS)

@@ -39,7 +39,7 @@ def test_predicted_loads_of_a_sine_are_amplitude_times_transfer_function(rig):
         assert loads[quantity].rms == pytest.approx(float(expected) / np.sqrt(2), rel=1e-12)
 
 
-def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
+def test_acceleration_far_above_the_suspension_resonance_is_force_over_mass(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=1500, duration_s=1), rig)
     mass = rig.shaker.moving_mass_kg + rig.shaker.fixture_mass_kg
     assert loads[BaseQuantity.ACCELERATION].peak == pytest.approx(
@@ -159,6 +159,6 @@ def test_the_shortest_ramp_is_three_periods_of_the_loaded_suspension(rig):
         ),
     ],
 )
-def test_signals_beyond_the_generator_are_refused_by_its_description(rig, excitation, said):
+def test_signals_beyond_the_described_generator_limits_are_refused(rig, excitation, said):
     with pytest.raises(LimitExceeded, match=said):
         require_within_limits(plan(excitation), rig)

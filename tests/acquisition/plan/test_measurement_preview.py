@@ -20,7 +20,7 @@ def rig():
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_peak_and_size_match_the_signal(rig, name):
+def test_the_previewed_peak_and_file_size_match_the_signal(rig, name):
     seen = preview_measurement(QUICK[name], rig)
     assert seen.is_allowed
     assert float(np.max(np.abs(seen.volts))) == pytest.approx(seen.peak_v, rel=1e-6)

@@ -35,7 +35,7 @@ def plan(kind, until):
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 @pytest.mark.parametrize("name", sorted(NOISE | SINE))
-def test_until_accepts_only_results_of_its_kind(kind, name):
+def test_until_accepts_only_results_of_its_kind_of_excitation(kind, name):
     if name in ALLOWED.get(kind, set()):
         assert plan(kind, {name: "1 %"}).until.wishes == {name: 0.01}
         return

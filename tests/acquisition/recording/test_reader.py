@@ -64,7 +64,7 @@ def test_reading_beyond_the_samples_is_refused(path, start, stop):
         recording.read("m0_velocity", start, stop)
 
 
-def test_an_unknown_channel_is_refused_with_the_known_ones(path):
+def test_an_unknown_channel_is_refused_with_the_known_channels(path):
     with open_recording(path) as recording, pytest.raises(RecordingError, match="drive_voltage, m0_velocity"):
         recording.read("m2_velocity")
 

@@ -239,7 +239,7 @@ def test_a_renamed_finished_recording_is_checked_against_its_seal(recorded):
     assert state_of(path.rename(part_of(path))) is SealState.DAMAGED
 
 
-def test_with_a_key_a_missing_seal_is_an_error(recorded, key_file):
+def test_a_missing_seal_is_an_error_if_a_key_is_given(recorded, key_file):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -284,7 +284,7 @@ def test_samples_changed_before_the_end_of_a_recording_are_not_sealed(tmp_path, 
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5.part"]
 
 
-def test_with_a_key_a_seal_is_signed(recorded, key_file, monkeypatch):
+def test_a_seal_is_signed_if_a_key_is_given(recorded, key_file, monkeypatch):
     path = recorded()
     with h5py.File(path) as file:
         manifest, signature = file["seal/manifest_json"][()], file["seal"].attrs["hmac_sha256"]
@@ -368,7 +368,7 @@ def test_a_result_without_its_seal_is_refused(with_result):
         _ = recording.results
 
 
-def test_a_result_of_a_version_without_result_seals_is_read(with_result):
+def test_an_unsealed_result_of_an_older_version_is_read(with_result):
     with h5py.File(with_result, "r+") as file:
         del file["seal"], file["overview"], file["view"]
         for name in [each for each in file["results/spectrum"].attrs if each.startswith("seal_")]:
@@ -452,7 +452,7 @@ class TestChangedAfterTheCheck:
         with pytest.raises(RecordingError, match="no longer what it was when its seal was checked"):
             open_recording(long)
 
-    def test_samples_read_before_the_check_are_checked(self, long):
+    def test_metadata_read_before_the_seal_check_are_checked(self, long):
         sound = long.read_bytes()
         self.written_over(long, "file.attrs['expected_samples'] = 5")
         with open_recording(long) as recording:

@@ -44,7 +44,7 @@ def test_raw_converter_counts_are_recorded_unchanged(tmp_path, make_header, make
 
 
 @pytest.mark.parametrize("spoil", [lambda counts: counts[:, 1:], lambda counts: counts.astype(float)])
-def test_counts_of_another_shape_or_type_are_refused(tmp_path, make_header, make_block, spoil):
+def test_counts_of_a_wrong_shape_or_type_are_refused(tmp_path, make_header, make_block, spoil):
     counts, block = make_block(0, BLOCK)
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         with pytest.raises(RecordingError, match=r"they must be int32 and of the same shape"):
@@ -59,7 +59,7 @@ def test_only_the_finished_file_remains_after_recording(tmp_path, make_header, m
 
 
 @pytest.mark.parametrize("taken", ["a.h5", "a.h5.part", "a.h5.tmp"])
-def test_an_existing_file_is_never_overwritten(tmp_path, make_header, taken):
+def test_a_recording_never_overwrites_an_existing_file(tmp_path, make_header, taken):
     (tmp_path / taken).write_text("precious")
     with pytest.raises(RecordingError, match=rf"{taken} exists"):
         create_recording(tmp_path / "a.h5", make_header())

@@ -96,7 +96,7 @@ def test_the_bench_check_plays_one_burst_that_ends_by_itself(guarded, monkeypatc
     assert report.verdict is Verdict.OK
 
 
-def test_the_bursts_are_whole_periods_with_short_gaps_between(guarded, tmp_path):
+def test_dead_man_bursts_are_whole_periods_with_short_gaps(guarded, tmp_path):
     _, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         deque(run, maxlen=0)
@@ -113,7 +113,7 @@ def test_the_bursts_are_whole_periods_with_short_gaps_between(guarded, tmp_path)
     assert max(b - a for a, b in gaps) < GUARD_S + 1e-3
 
 
-def test_the_generator_can_play_again_after_the_run(guarded, tmp_path):
+def test_the_generator_can_play_again_after_a_dead_man_run(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         upto(run, RunState.RECORDING)

@@ -35,7 +35,7 @@ def watched(tones, late_s, step_s, **noise):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_any_number_of_lost_cycles_is_counted(seed):
+def test_any_number_of_cycles_lost_by_a_late_drive_is_counted(seed):
     rng = np.random.default_rng(seed)
     tones = np.cumsum(rng.uniform(5.0, 30.0, 6)) + 80.0
     late_s = rng.uniform(0.0, 0.4)
@@ -45,7 +45,7 @@ def test_any_number_of_lost_cycles_is_counted(seed):
     assert found == pytest.approx(-max(0.0, lost - delay), abs=0.06)
 
 
-def test_three_lost_whole_cycles_are_detected():
+def test_three_whole_cycles_lost_by_a_late_drive_are_detected():
     assert watched([150.0, 180.0], 0.1, 1.0, noise_v=0.0) == pytest.approx(-3 + 40 / RATE * 30, abs=0.02)
 
 

@@ -335,7 +335,7 @@ class TestEveryWayOut:
 
     @every_state
     @pytest.mark.parametrize("call", ["digitizer.read", "set_amplitude"])
-    def test_a_keyboard_interrupt_inside_a_driver_silences(self, bench, tmp_path, state, call):
+    def test_a_keyboard_interrupt_inside_a_driver_silences_the_drive(self, bench, tmp_path, state, call):
         run = run_upto(state, bench, tmp_path)
         bench.world.faults[call] = [KeyboardInterrupt]
         with pytest.raises(KeyboardInterrupt):
@@ -618,7 +618,7 @@ class TestTheBenchCheck:
         offset=st.floats(-5, 5),
         drift=st.floats(-1, 1),
     )
-    def test_a_sine_is_measured_beside_offset_and_drift(self, frequency_hz, amplitude, phase, offset, drift):
+    def test_a_sine_is_measured_despite_offset_and_drift(self, frequency_hz, amplitude, phase, offset, drift):
         time_s = np.arange(2000) / RATE
         volts = amplitude * np.sin(2 * np.pi * frequency_hz * time_s + phase) + offset + drift * time_s
         assert sine_amplitude(volts, frequency_hz, RATE) == pytest.approx(amplitude, rel=1e-6, abs=1e-9)
@@ -632,7 +632,7 @@ class TestOverloads:
         assert run.state is RunState.FINISHED
         assert bench.recorder.blocks[0].overloads == bench.world.overloads
 
-    def test_an_overload_ends_the_run_when_the_plan_says_so(self, bench, tmp_path):
+    def test_an_overload_ends_the_run_if_the_plan_says_so(self, bench, tmp_path):
         strict = with_(limits=InRunLimits(on_overload=OnOverload.STOP))
         run = run_upto(RunState.RECORDING, bench, tmp_path, strict)
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
