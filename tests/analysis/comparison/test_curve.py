@@ -29,7 +29,7 @@ def mode(frequency_hz, scale=1.0, source="run", sd=0.01, origin=CurveOrigin.MEAS
     )
 
 
-def test_a_peak_is_placed_between_the_points_with_its_width():
+def test_a_peak_between_points_gets_the_right_frequency_and_damping():
     (peak,) = curve_peaks(mode(np.arange(50.0, 600.0, 0.7)))
     assert peak.frequency_hz == pytest.approx(MODE_HZ * np.sqrt(1 - DAMPING**2), abs=0.1)
     assert peak.magnitude == pytest.approx(50.0, rel=0.01)

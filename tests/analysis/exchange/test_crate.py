@@ -37,7 +37,7 @@ def described(crate):
     return {each["@id"]: each for each in graph}
 
 
-def test_every_byte_is_packed_and_described(folder, crate):
+def test_every_file_of_a_folder_is_packed_unchanged_and_described(folder, crate):
     graph = described(crate)
     with ZipFile(crate) as archive:
         for name in ("known.h5", "report/table.csv", "broken.h5"):

@@ -127,7 +127,7 @@ def test_data_that_exceeds_a_format_is_refused_before_writing(known, tmp_path, t
 
 
 @pytest.mark.parametrize("to", list(Format))
-def test_a_refused_export_overwrites_and_leaves_nothing(known, tmp_path, to):
+def test_a_refused_export_overwrites_nothing_and_leaves_no_file(known, tmp_path, to):
     taken = tmp_path / f"a.{to.value}"
     taken.write_text("mine")
     with pytest.raises(InvalidRequest, match="nothing is ever overwritten"):

@@ -710,7 +710,7 @@ def test_sensors_on_m0_need_no_unit_in_the_mapping(tmp_path, role, unit):
     assert meaning.channels[1].kind == (role.removeprefix("m0_"), unit)
 
 
-def test_one_channel_of_a_file_can_be_imported_as_two(tmp_path):
+def test_one_channel_of_a_file_can_be_imported_as_two_channels(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))
     _, values = imported(tmp_path / "a.wav", meaning)

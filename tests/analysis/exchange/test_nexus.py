@@ -52,7 +52,7 @@ def test_a_nexus_file_follows_the_definitions(nexus):
         assert list(faults(file)) == []
 
 
-def test_values_are_physical_and_errors_are_half_a_step(nexus, known, known_values):
+def test_nexus_values_are_physical_and_errors_are_half_a_step(nexus, known, known_values):
     with h5py.File(nexus) as file:
         for role in known.roles:
             data = file["entry"][role]

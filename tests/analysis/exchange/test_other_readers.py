@@ -52,7 +52,7 @@ def test_xarray_opens_named_scaled_dimensioned_variables(with_result, known_valu
         ("results/noise", "frequency", {"transmission_real", "transmission_imag", "settings_json"}),
     ],
 )
-def test_xarray_opens_the_groups_too(with_result, group, dimension, names):
+def test_xarray_opens_the_groups_of_a_recording(with_result, group, dimension, names):
     xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
     pytest.importorskip("h5netcdf", reason="pip install vibench[exchange] brings h5netcdf")
     with xarray.open_dataset(with_result, engine="h5netcdf", group=group) as data:

@@ -80,7 +80,7 @@ def test_sdypy_reads_mode_shapes_that_agree_with_the_model(folder, tmp_path, qua
     assert [each["id1"].split()[0] for each in functions] == ["m0", "m0", "m1", "m2"]
 
 
-def test_the_report_has_one_figure_over_the_points(results, tmp_path):
+def test_a_scan_report_has_one_figure_over_all_points(results, tmp_path):
     report = write_report(results, tmp_path / "report.html", tmp_path / "figures")
     text = report.read_text(encoding="utf-8")
     assert text.count("Scan noise: shapes at the resonances") >= 1
@@ -118,7 +118,7 @@ def test_a_folder_without_a_scan_is_refused(folder, tmp_path):
     assert "holds no recording" in str(run.exception)
 
 
-def test_one_point_is_exported_with_its_node(folder, tmp_path):
+def test_a_single_scan_point_is_exported_with_its_node(folder, tmp_path):
     path = tmp_path / "one.uff"
     order = ["export", str(folder / "noise-m2.h5"), "--to", "uff", "--spectra", "--out", str(path)]
     run = CliRunner().invoke(app, order)

@@ -84,7 +84,7 @@ def test_a_record_continued_on_the_next_day_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("sign", ".,")
-def test_separators_of_thousands_are_refused(tmp_path, sign):
+def test_thousands_separators_in_numbers_are_refused(tmp_path, sign):
     volts, base, velocity = signal(TIMES)
     grouped = [f"{round(1e3 * each):,d}".replace(",", sign) for each in base]
     with pytest.raises(UnusableData, match="seems to be one of thousands"):
@@ -144,7 +144,7 @@ def test_time_stamps_of_a_tdms_file_show_lost_samples(tmp_path):
     is_right(imported(tmp_path / "a.tdms"), lost=37)
 
 
-def test_units_and_rates_beside_matrices_of_matlab_are_used(tmp_path):
+def test_units_and_rates_stored_beside_matlab_matrices_are_used(tmp_path):
     volts, base, velocity = signal(TIMES)
     content = {"data": np.stack((1e3 * volts, base / G, 1e3 * velocity)).T, "Ts": 1 / RATE_HZ}
     units = np.array(["mV", "g", "mm/s"], dtype=object)
@@ -271,7 +271,7 @@ def test_a_time_increment_is_read_in_its_stated_unit(tmp_path, suffix, name):
         tuple({"start_time": f"01/03/2026 12:00:0{second}"} for second in (0, 0, 1)),
     ],
 )
-def test_starts_that_cannot_be_compared_are_refused(tmp_path, suffix, facts):
+def test_channel_start_times_that_cannot_be_compared_are_refused(tmp_path, suffix, facts):
     imported_with = with_facts(tmp_path, suffix, signal(TIMES), facts)
     with pytest.raises(
         InvalidRequest, match=r"(give delay_s|states when some channels start).*time = \"even\""
@@ -282,7 +282,7 @@ def test_starts_that_cannot_be_compared_are_refused(tmp_path, suffix, facts):
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-def test_counts_need_a_scale(tmp_path, suffix):
+def test_integer_counts_without_a_scale_are_refused(tmp_path, suffix):
     scales = np.array([1e-4, 1e-2, 1e-4])
     counts = np.rint(signal(TIMES) / scales[:, None]).astype(np.int16)
     with pytest.raises(InvalidRequest, match=r"counts without a unit.*V per count as scale"):

@@ -90,7 +90,7 @@ def test_files_saved_with_a_figure_contain_its_numbers(noise_file, tmp_path):
     assert numbers(sines)["response_i"].size == found.overlay.prediction.frequency_hz.size
 
 
-def test_the_same_figure_drawn_twice_is_the_same_file(noise_file):
+def test_drawing_a_figure_twice_gives_identical_files(noise_file):
     found = result(noise_file(), Simulation.LEFT_OUT)
     drawn = [transmission_figure(found.analysis).svg for _ in range(2)]
     assert drawn[0] == drawn[1]
@@ -172,7 +172,7 @@ def test_the_largest_column_of_a_dwell_spectrum_is_response_ii(dwell_file):
     assert frequency_hz[np.argmax(size)] == pytest.approx(260.0, abs=1.0)
 
 
-def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
+def test_a_stepped_sine_figure_has_one_marker_per_step(stepped_file):
     found = result(stepped_file)
     drawn = stepped_sine_figure(found.analysis, found.overlay, STEPPED_FREQUENCIES)
     measured = line(drawn.figure.axes[1], "measured, up")
@@ -188,7 +188,7 @@ def test_more_parts_than_planned_are_explained_by_feedback(dwell_file):
     assert said[1] == "78 parts were recorded whole; feedback decided how many"
 
 
-def test_levels_of_all_channels_carry_their_units(dwell_file):
+def test_levels_of_all_channels_are_shown_with_units(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     drawn = bench_levels_figure(facts)
     labels = [each.get_ylabel() for each in drawn.figure.axes]
@@ -207,7 +207,7 @@ def test_levels_of_all_channels_carry_their_units(dwell_file):
     ],
     ids=lambda plan: plan.kind,
 )
-def test_every_excitation_can_be_shown_before_it_plays(plan):
+def test_every_excitation_can_be_drawn_before_output(plan):
     drawn = excitation_figure(Measurement(name="plan", excitation=plan))
     signal, spectrum = drawn.figure.axes
     assert signal.get_ylabel().startswith("planned voltage [")

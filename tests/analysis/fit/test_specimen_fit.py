@@ -66,7 +66,7 @@ def true():
     return with_values(NOMINAL, TRUE)
 
 
-def test_parameters_round_trip(true):
+def test_specimen_parameters_round_trip(true):
     for name, value in TRUE.items():
         assert parameter_value(true, name) == pytest.approx(value, rel=1e-12)
     assert true.masses == NOMINAL.masses
@@ -133,7 +133,7 @@ def test_fit_intervals_hold_with_scatter_from_three_realisations(true):
     assert sum(held) > 0.95 * len(held) - 3 * math.sqrt(0.95 * 0.05 * len(held))
 
 
-def test_noisy_lines_do_not_reject_a_right_model_or_diverge(true):
+def test_noisy_lines_neither_reject_a_true_model_nor_diverge(true):
     rng, said = np.random.default_rng(3), []
     for sd in np.geomspace(0.03, 0.5, 30):
         try:
@@ -255,7 +255,7 @@ def test_a_fit_finds_a_specimen_far_from_its_description():
     assert fit.reduced_chi_square < 1.5
 
 
-def test_the_gap_cannot_be_reported_from_a_transmission(true):
+def test_parameters_that_a_transmission_cannot_determine_are_refused(true):
     clean = measured(true, np.random.default_rng(4))
     with pytest.raises(InvalidRequest, match="determines any of"):
         fit_specimen(clean, NOMINAL, (Parameter.GAP,))
@@ -265,7 +265,7 @@ def test_the_gap_cannot_be_reported_from_a_transmission(true):
         fit_specimen(clean, NOMINAL, (*LINEAR, Parameter.M0, Parameter.M1))
 
 
-def test_too_few_lines_are_refused(true):
+def test_a_fit_to_too_few_lines_is_refused(true):
     few = measured(true, np.random.default_rng(5), lines_hz=LINES_HZ[:6])
     with pytest.raises(NotEnoughData, match="6 lines"):
         fit_specimen(few, NOMINAL)

@@ -317,7 +317,7 @@ def test_requests_without_a_result_are_refused_in_a_sentence(world_recording):
         told(slow)
 
 
-def test_the_figures_hold_the_motion_and_its_impacts(world_recording):
+def test_the_hidden_motion_figures_show_the_motion_and_its_impacts(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
     zoom = hidden_motion_figure(motion).tables[0]

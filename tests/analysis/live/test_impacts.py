@@ -39,7 +39,7 @@ def test_noise_alone_has_no_impacts():
     assert counter.count == 0
 
 
-def test_lost_samples_are_no_impacts():
+def test_lost_samples_are_not_counted_as_impacts():
     velocity = kinked((), 1.0)
     velocity[20_000:20_500] = np.nan
     counter = ImpactCounter(RATE)

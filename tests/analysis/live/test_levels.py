@@ -43,7 +43,7 @@ def test_a_channel_is_quiet_after_three_seconds_and_not_before():
     assert meters.add(block([0.06]))[0].verdict is LevelVerdict.GOOD
 
 
-def test_lost_samples_keep_the_meters_unchanged():
+def test_lost_samples_leave_the_level_meters_unchanged():
     meters = LevelMeters(np.array([5.0]), RATE)
     before = meters.add(block([1.0]))
     assert meters.add(np.full((1, 10), np.nan, dtype=np.float32)) == before

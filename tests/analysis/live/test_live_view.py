@@ -39,7 +39,7 @@ def test_time_histories_show_the_newest_seconds_in_channel_units(view):
     assert time_histories.high[3].max() == pytest.approx(3 * A0 * 2 * np.pi * 260, rel=1e-3)
 
 
-def test_responses_grow_as_the_run_continues(view):
+def test_live_response_curves_gain_points_during_the_run(view):
     history = view.history()
     assert history.frequency_hz.size >= 10
     assert np.allclose(history.frequency_hz, 260.0, atol=0.01)
@@ -61,7 +61,7 @@ def test_the_transmission_at_the_drive_is_the_ratio_of_displacements(view):
 
 
 @pytest.mark.parametrize(("role", "power"), [("m0_acceleration", 1), ("m0_displacement", -1)])
-def test_another_sensor_on_m0_shows_the_same_responses(role, power):
+def test_any_sensor_on_m0_gives_the_same_live_responses(role, power):
     channels = (*CHANNELS[:3], LiveChannel(role, "m/s²", 0.25, 5.0))
     found = LiveView(channels, RATE, band_hz=(150.0, 350.0))
     for first in range(0, 102_400, 2560):

@@ -28,7 +28,7 @@ def test_a_ring_buffer_returns_only_received_samples():
     assert ring.newest(10).first_sample == 5
 
 
-def test_repeated_samples_are_stored_once():
+def test_repeated_samples_are_stored_once_in_a_ring_buffer():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 20))
     ring.add(10, numbered(10, 20))
@@ -36,7 +36,7 @@ def test_repeated_samples_are_stored_once():
     assert np.array_equal(ring.newest(50).values, numbered(0, 30))
 
 
-def test_lost_samples_are_nan_and_older_ones_remain():
+def test_lost_samples_are_nan_in_a_ring_buffer_and_older_samples_remain():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 20))
     ring.add(30, numbered(30, 5))

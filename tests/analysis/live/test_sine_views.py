@@ -112,7 +112,7 @@ def test_drive_periods_begin_at_the_drive_maximum_even_in_a_sweep(rate_hz_per_s)
     assert np.abs(at - np.rint(at)).max() < 5e-4
 
 
-def test_a_motion_of_the_drives_period_has_one_poincare_point():
+def test_a_motion_with_the_drive_period_has_one_poincare_point():
     count = max(portrait_samples(260.0, RATE), look_samples(RATE))
     window = sine(260.0, count, first=10_000)
     found = portrait(window, 0, 2, RATE)

@@ -20,7 +20,7 @@ def overlay_of(path, **how):
         return analysis, overlay(recording, analysis, **how)
 
 
-def test_a_weak_dwell_and_its_simulation_differ_by_less_than_a_hundredth_of_a_decibel(dwell_file):
+def test_a_weak_dwell_and_its_simulation_differ_by_less_than_0_01_db(dwell_file):
     analysis, overlay = overlay_of(dwell_file("weak"))
     assert isinstance(overlay, DwellOverlay)
     assert overlay.run.impacts == 0

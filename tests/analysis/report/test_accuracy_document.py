@@ -88,7 +88,7 @@ def test_the_accuracy_page_names_motions_that_a_higher_level_does_not_improve(be
     assert "is no better" not in page_of(replace(benchmark, motions=(gained,)))
 
 
-def test_the_page_in_docs_has_the_motions_and_columns_that_this_code_writes(benchmark, page_of):
+def test_the_accuracy_page_in_docs_has_the_motions_and_columns_of_the_code(benchmark, page_of):
     kept = headings(PAGE.read_text(encoding="utf-8"))
     made = headings(page_of(benchmark))
     assert set(made) <= set(kept)

@@ -171,7 +171,7 @@ def test_an_empty_report_is_refused(tmp_path):
         recordings_in(tmp_path)
 
 
-def test_recordings_in_a_folder_come_in_the_order_they_were_started(dwell_file, noise_file, tmp_path):
+def test_recordings_of_a_folder_are_reported_in_order_of_their_start(dwell_file, noise_file, tmp_path):
     shutil.copy(dwell_file("weak", name="b", started_utc="2026-02-28T12:00:00+00:00"), tmp_path)
     shutil.copy(noise_file(name="a"), tmp_path)
     (tmp_path / "broken.h5").write_bytes(b"nothing")

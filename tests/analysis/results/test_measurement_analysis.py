@@ -86,7 +86,7 @@ def test_a_sweep_finds_where_the_simulated_masses_began_to_collide(sweep_file):
     assert found.response.drive_amplitude_m[20:-5] == pytest.approx(5e-6, rel=1e-3)
 
 
-def test_every_step_of_a_stepped_sine_is_its_own_dwell(stepped_file):
+def test_every_step_of_a_stepped_sine_is_analysed_like_a_dwell(stepped_file):
     found = analysed(stepped_file)
     assert isinstance(found, SteppedSineAnalysis)
     assert found.response.frequency_hz == pytest.approx([150.0, 180.0], rel=1e-7)
@@ -181,7 +181,7 @@ def test_a_calibration_after_the_measurement_is_not_called_old(dwell_file):
     assert "days" not in found.text
 
 
-def test_a_channels_level_is_its_largest_magnitude_and_its_root_mean_square(dwell_file, dwell_motions):
+def test_a_channel_level_states_peak_and_rms(dwell_file, dwell_motions):
     found = analysed(dwell_file("weak"))
     velocity = dwell_motions["weak"][1]
     level = found.facts.level("m0_velocity")

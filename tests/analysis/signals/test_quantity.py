@@ -18,7 +18,7 @@ def test_a_conversion_and_its_inverse_cancel(given_, wanted):
     np.testing.assert_allclose(both, 1, rtol=1e-14)
 
 
-def test_an_integral_at_zero_frequency_does_not_exist():
+def test_integration_at_zero_frequency_gives_nan():
     factor = derivative_factor(np.array([0.0, 1.0]), Quantity.VELOCITY, Quantity.DISPLACEMENT)
     assert np.isnan(factor[0])
     assert factor[1] == pytest.approx(1 / (2j * np.pi))
@@ -61,7 +61,7 @@ def test_integration_of_a_260_hz_line_has_no_gain_error_and_no_drift():
 
 
 @given(frequency_hz=st.floats(40, 1000), steps=st.sampled_from(list(Quantity)))
-def test_amplitude_and_phase_follow_the_factor(frequency_hz, steps):
+def test_a_converted_sine_has_the_amplitude_and_phase_of_the_factor(frequency_hz, steps):
     time = np.arange(8192) / RATE
     result = converted_signal(
         np.cos(2 * np.pi * frequency_hz * time),

@@ -114,7 +114,7 @@ def test_stated_noise_bias_and_spread_match_repeated_dwells():
 
 
 @pytest.mark.thorough
-def test_twice_the_uncertainty_of_a0_covers_it_in_95_percent():
+def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent():
     """Ten tenths of a window tell their own scatter to a quarter only: twice it held A0 in 92."""
     rng, draws, held = np.random.default_rng(4), 1000, 0
     for _ in range(draws):
@@ -126,7 +126,7 @@ def test_twice_the_uncertainty_of_a0_covers_it_in_95_percent():
 
 
 @pytest.mark.parametrize("count", [3, 10])
-def test_twice_the_uncertainty_of_a_complex_mean_covers_it_in_95_percent(count):
+def test_twice_the_error_of_a_complex_mean_covers_its_true_value_in_95_percent(count):
     values = np.random.default_rng(5).standard_normal((4000, count, 2)).view(complex)[..., 0]
     held = np.mean([abs(each.mean().real) < 2 * standard_uncertainty(each) for each in values])
     assert held == pytest.approx(0.954, abs=0.012)
