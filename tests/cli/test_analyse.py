@@ -79,7 +79,7 @@ def test_a_growing_recording_is_analysed_up_to_its_last_sample(vibench_here, noi
 
 
 @pytest.mark.thorough
-def test_a_bad_recording_does_not_prevent_analysis_of_the_others(vibench, good, tmp_path):
+def test_a_bad_recording_does_not_prevent_the_analysis_of_other_recordings(vibench, good, tmp_path):
     folder = tmp_path / "night[red]"
     folder.mkdir()
     shutil.copy(good, folder / "good.h5")

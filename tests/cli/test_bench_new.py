@@ -176,7 +176,7 @@ def test_a_partly_written_configuration_is_removed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_target_that_is_no_folder_is_reported_before_any_question(tmp_path):
+def test_a_target_that_is_not_a_folder_is_reported_before_any_question(tmp_path):
     done = new(tmp_path, "no/mine.toml")
     assert isinstance(done.exception, ConfigurationError)
     assert "is not a folder" in str(done.exception)

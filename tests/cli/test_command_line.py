@@ -63,7 +63,7 @@ def test_measure_export_and_pack_report_their_files_as_json(vibench_here, tmp_pa
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
-def test_a_stopped_campaign_still_reports_failed_points(tmp_path):
+def test_a_stopped_campaign_reports_its_failed_points(tmp_path):
     text = QUICK + QUICK.split("\n", 2)[2].replace('"dwell"\nramp', '"long"\nramp').replace(
         "= 1.5 }", "= 900 }"
     )
@@ -197,7 +197,7 @@ def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_p
         (("analyse", "x.h5", "--draws", "many"), "'many' is not a number"),
     ],
 )
-def test_an_invalid_word_or_number_is_refused_with_the_given_value(vibench_here, tmp_path, words, said):
+def test_an_invalid_option_value_is_refused_and_quoted(vibench_here, tmp_path, words, said):
     result = vibench_here(*words, cwd=tmp_path)
     assert result.returncode == 1
     assert said in " ".join(result.stderr.replace("│", " ").split())

@@ -80,7 +80,7 @@ def test_hold_requires_a_program(vibench_here, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-def test_a_hanging_program_is_named_and_the_others_are_stopped(vibench_here, tmp_path):
+def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_here, tmp_path):
     with driving("hangs") as hangs, driving("south") as south:
         with frozen(hangs.pid):
             told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
