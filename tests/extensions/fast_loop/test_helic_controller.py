@@ -87,7 +87,7 @@ def pd(kp, kd, tau_s, step_s):
     )
 
 
-def test_frames_match_the_protocol_documents(installed):
+def test_controller_frames_match_the_protocol_documents(installed):
     from helic_link import frame
 
     assert frame(1, 1, b"\0\0").hex(" ") == "48 4c 01 01 02 00 00 00 89 0c"

@@ -94,7 +94,7 @@ def wired():
 SERIES = ((0.5, 0.0), (0.1, -0.2), (0.0, 0.05))
 
 
-def test_returned_coefficients_match_the_played_ones(wired):
+def test_returned_fourier_coefficients_match_the_played_signal(wired):
     frequency_hz = 97.313
     wired.tell("play", program=LoopProgram(frequency_hz=frequency_hz, reference_v=SERIES, glide_s=0.05))
     wired.run(0.4)
