@@ -163,7 +163,7 @@ def read_and_start(qtbot, window):
 
 
 @pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
-def test_the_whole_job_can_be_done_by_keyboard(bench, qtbot, tmp_path, qapp, width, height, points):
+def test_measuring_to_export_works_by_keyboard(bench, qtbot, tmp_path, qapp, width, height, points):
     """Make a measurement, open it, compare it with earlier ones and export it."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
@@ -205,7 +205,7 @@ def test_the_whole_job_can_be_done_by_keyboard(bench, qtbot, tmp_path, qapp, wid
     qapp.setFont(font)
 
 
-def test_the_whole_job_can_be_done_by_mouse(bench, qtbot, tmp_path):
+def test_measuring_to_export_works_by_mouse(bench, qtbot, tmp_path):
     """Only the file name is typed."""
 
     def point_at(widget, place=None):
@@ -401,7 +401,7 @@ def test_the_cancel_button_is_visible_when_armed_and_disarms(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
 
 
-def test_the_death_of_the_engine_is_reported_promptly(bench, qtbot):
+def test_a_dead_engine_is_reported_promptly(bench, qtbot):
     os.kill(bench.context.bridge.engine_pid, signal.SIGKILL)
     qtbot.waitUntil(lambda: bench.context.bridge.status is None, timeout=5_000)
     assert bench.strip.notices[-1].code == "EngineGone"

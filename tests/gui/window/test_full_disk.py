@@ -54,7 +54,7 @@ def test_saving_a_plot_on_a_full_disk_gives_one_dialog(lasting_window, own, monk
 
 
 @pytest.mark.parametrize("ending", ["csv", "uff", "mat", "nxs", "note"])
-def test_exports_and_notes_on_a_full_disk_give_one_sentence(own, ending):
+def test_exports_and_notes_on_a_full_disk_give_one_sentence_errors(own, ending):
     path = own / "dwell.h5"
     path.write_bytes(good_recordings()["dwell.h5"])
     before = content(own)
@@ -64,7 +64,7 @@ def test_exports_and_notes_on_a_full_disk_give_one_sentence(own, ending):
     assert content(own) == before
 
 
-def test_settings_on_a_full_disk_are_reported_and_the_old_ones_kept(qapp, own):
+def test_saving_settings_on_a_full_disk_is_reported_and_keeps_the_old_file(qapp, own):
     settings = Settings(own / "window.ini")
     settings.keep_text(SettingKey.TEST, "older")
     assert settings.complaint == ""

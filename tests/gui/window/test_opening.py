@@ -68,7 +68,7 @@ def test_unsupported_files_are_reported_and_change_nothing(window, tmp_path, nam
 
 
 @pytest.mark.thorough
-def test_a_file_that_is_no_recording_is_reported_on_the_files_page(window, qtbot, tmp_path):
+def test_a_file_that_is_not_a_recording_is_reported_on_the_files_page(window, qtbot, tmp_path):
     (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
     dropped(window, tmp_path / "broken.h5")
     assert window.page is window.pages[COMPARE]

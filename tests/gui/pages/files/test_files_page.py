@@ -305,7 +305,7 @@ def test_a_recording_may_finish_while_it_is_displayed(page, begin_recording, tmp
     assert said == []
 
 
-def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
+def test_time_histories_follow_the_theme_and_name_channels_and_units(opened):
     page = opened("whole.h5")
     page.retheme(DARK)
     assert [plot.accessibleName() for plot in page.time_histories.plots] == [

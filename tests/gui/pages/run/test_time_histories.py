@@ -27,7 +27,7 @@ def time_histories(qapp, qtbot):
 
 
 @pytest.mark.parametrize("channels", [(FOUR,), (FOUR, OTHERS), (OTHERS, FOUR)])
-def test_each_lane_is_labelled_with_its_channel(time_histories, qapp, channels):
+def test_each_time_history_is_labelled_with_its_channel(time_histories, qapp, channels):
     for shown in channels:
         time_histories.show_channels(shown)
         qapp.processEvents()
@@ -36,7 +36,7 @@ def test_each_lane_is_labelled_with_its_channel(time_histories, qapp, channels):
     assert all(plot.up.label.isVisible() for plot in time_histories.plots)
 
 
-def test_only_the_last_lane_has_a_time_axis(time_histories, qapp):
+def test_only_the_last_time_history_has_a_time_axis(time_histories, qapp):
     for channels in (OTHERS, FOUR, OTHERS):
         time_histories.show_channels(channels)
         qapp.processEvents()

@@ -69,7 +69,7 @@ def test_branches_are_drawn_with_error_and_cost(page, wait_for):
 
 
 @pytest.mark.parametrize("along", list(Parameter))
-def test_stable_branches_are_solid_and_unstable_ones_dashed(page, along):
+def test_stable_branches_are_solid_and_unstable_branches_dashed(page, along):
     view = page.branches
     start = 1e-6 if along is Parameter.AMPLITUDE else 100.0
     start_request(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
