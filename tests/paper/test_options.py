@@ -110,7 +110,7 @@ def test_every_option_accepts_its_own_example():
 
 @pytest.mark.parametrize("name", ["zeta", "gap", "fit", "compared", "sweep-amplitude", "sweep-falls"])
 @pytest.mark.parametrize("value", ["-1", "nan", "inf", "", "much"])
-def test_a_forbidden_number_gives_one_sentence_that_names_it(name, value):
+def test_an_invalid_number_is_refused_in_one_sentence_that_quotes_it(name, value):
     with pytest.raises(InvalidRequest) as refused:
         parse_option(f"{name}={value}")
     said = str(refused.value)
@@ -128,7 +128,7 @@ def test_a_forbidden_number_gives_one_sentence_that_names_it(name, value):
         ("sweep=sideways", "up or down"),
     ],
 )
-def test_an_unknown_word_is_refused_with_the_known_words(said, answer):
+def test_an_unknown_option_value_is_refused_with_the_allowed_values(said, answer):
     with pytest.raises(InvalidRequest, match=answer):
         parse_option(said)
 

@@ -31,7 +31,7 @@ def energy_kept(method, speed, late_s):
     return ((after[:, 4] - after[:, 5]) / speed) ** 2
 
 
-def test_the_classical_method_is_of_fourth_order():
+def test_the_classical_runge_kutta_method_has_order_four():
     specimen = gong2025(contact="linear")
     truth = independent_state(specimen, DRIVE, 0.02, MOVING)
     coarse, fine = (state_error(end_of(specimen, runge_kutta(h), 0.02), truth) for h in (5e-5, 2.5e-5))
