@@ -134,7 +134,7 @@ def odd(_number):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("function", [lambda_of, odd])
-def test_an_unpicklable_answer_is_an_error_and_the_next_job_runs(patient_pool, function):
+def test_a_result_that_cannot_be_pickled_is_an_error_and_the_next_job_runs(patient_pool, function):
     errors, answers = [], []
     patient_pool.ask(function, answers.append, errors.append, 0)
     polled(patient_pool, lambda: errors)

@@ -135,7 +135,7 @@ def test_a_linear_stop_gives_the_bilinear_frequency():
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1e-2, 1.0), st.floats(0.0, 2.0))
-def test_the_speed_after_a_lossy_collision_solves_its_closed_form(speed, loss):
+def test_the_speed_after_a_lossy_collision_matches_the_closed_form(speed, loss):
     specimen = replace(pair(HuntCrossley(4.9e9, loss)), lower_gap_m=math.inf)
     m1, m2 = specimen.masses[1:]
     p = 44.999e-6

@@ -73,7 +73,7 @@ def test_an_unreached_stop_has_no_effect(contact, place, gap_m, is_upper, drive)
 
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, place=places, speed=speeds, seed=st.integers(0, 1000))
-def test_a_mirrored_drive_and_start_give_the_mirrored_motion_to_the_bit(contact, place, speed, seed):
+def test_a_mirrored_drive_and_start_mirror_the_motion_bit_for_bit(contact, place, speed, seed):
     start, drive, still = np.array([*place, *speed]), noise(seed), Harmonic(100.0, 0.0)
     mirrored = Sampled(-drive.displacement_m, drive.sample_rate_hz)
     for one, other, duration_s in ((drive, mirrored, 0.02), (still, still, 0.05)):
@@ -166,7 +166,7 @@ def test_motion_scales_with_mass_and_stiffness(contact, log_scale):
 
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, rate=st.floats(10.0, 3e5))
-def test_no_sampling_rate_changes_a_bit_of_any_motion(contact, rate):
+def test_the_output_sampling_rate_does_not_change_the_motion(contact, rate):
     for drive in (DRIVE, LinearSweep(150.0, 250.0, 0.1, 30e-6)):
         plain = integrate(paper(contact), drive, 0.1)
         sampled = integrate(paper(contact), drive, 0.1, sample_rate_hz=rate)

@@ -29,7 +29,7 @@ def followed(start, until, tolerance, drive=DRIVE):
     return run.state, seen
 
 
-def test_a_free_collision_has_duration_and_depth_of_hertz():
+def test_a_free_collision_has_the_duration_and_depth_of_hertz_theory():
     shapes, durations = collision_shapes()
     place = round(-SOFTEST / SPACING)
     lasts = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)

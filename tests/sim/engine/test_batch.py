@@ -86,7 +86,7 @@ def test_a_periodic_motion_reaches_the_same_states_repeatedly():
     assert off(found.states, alone).max() < 1e-6
 
 
-def test_a_motion_that_ends_in_contact_continues_from_there():
+def test_a_motion_that_ends_in_contact_continues_from_that_state():
     drives, starts = random_scenes(24, 7)
     drives, starts = [drives[0]] * 64, [starts[0] * (1.0 + 1e-3 * k) for k in range(64)]
     found = followed(SPECIMEN, drives, starts, [12] * 64)

@@ -96,7 +96,7 @@ def test_structures_match_the_compiled_header():
         parse_structures(["Inner { double a-b; }"])
 
 
-def test_arrays_of_wrong_size_are_refused_and_may_be_omitted():
+def test_arrays_of_wrong_size_or_type_are_refused_by_the_engine():
     engine = native_engine()
     arrays = {"samples": np.ones(9), "positions": np.ones(5), "table": np.ones((4, 64)), "values": np.ones(5)}
     for name, found in (("positions", np.ones(4)), ("table", np.ones(256 + 1)), ("samples", np.ones(9))):

@@ -32,7 +32,7 @@ def test_block_means_scatter_within_their_stated_errors():
     assert np.mean(np.abs(scores) > 2.0) < 0.12
 
 
-def test_a_series_shorter_than_its_memory_is_not_trusted():
+def test_a_series_shorter_than_its_correlation_is_marked_as_too_short():
     assert not block_mean(autoregression(0.999, 512, 1)).is_long_enough
     assert not block_mean(np.arange(64.0)).is_long_enough
 

@@ -49,7 +49,7 @@ def test_exponents_agree_with_the_statements_of_the_paper_on_chaos():
         assert still.exponent_per_s < 4.0
 
 
-def test_a_periodic_motion_has_the_exponent_of_its_multipliers_and_of_its_average():
+def test_the_exponent_of_a_periodic_motion_by_multipliers_matches_its_average():
     found = lyapunov_exponent(gong2025(), Harmonic(130.0, 20e-6), duration_s=10.0)
     assert found.source is Source.MULTIPLIERS
     assert found.standard_error_per_s < 1e-3

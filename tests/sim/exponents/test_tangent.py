@@ -93,7 +93,7 @@ def test_a_higher_accuracy_gives_a_tangent_closer_to_the_reference(contact):
         assert standard < 0.2 * quick
 
 
-def test_an_impact_with_restitution_shrinks_volume_by_its_square():
+def test_an_impact_shrinks_phase_space_volume_by_restitution_squared():
     specimen = gong2025(contact="rigid:0.8")
     tangent, _, impacts = run_with_tangent(specimen)
     rate = -np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))

@@ -45,7 +45,7 @@ def test_continuing_from_a_state_equals_the_whole_run():
     np.testing.assert_allclose(decayed.states, free.states, rtol=0, atol=1e-12)
 
 
-def test_an_overflowing_motion_stops_at_its_last_sample():
+def test_an_overflowing_motion_stops_at_its_last_finite_sample():
     samples = np.zeros(1000)
     samples[500:] = 1e280
     followed = follow_samples(gong2025(), Sampled(samples, RATE_HZ))

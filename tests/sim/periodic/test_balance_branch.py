@@ -107,7 +107,7 @@ def test_a_branch_over_amplitude_grazes_where_linear_p_equals_the_gap():
     assert branch.events[1].kind is BifurcationKind.FOLD
 
 
-def test_a_strong_power_law_is_reached_by_raising_the_drive():
+def test_a_branch_over_amplitude_reaches_a_strongly_nonlinear_motion():
     structure, spring = oscillator(0.1), PowerSpring(1.0, ((3, 1.0),))
     branch = raised(structure, spring, 2.0 / (2 * math.pi), 0.1, 5.0)
     assert branch.end is ArcEnd.REACHED_BOUND

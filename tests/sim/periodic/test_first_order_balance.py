@@ -23,7 +23,7 @@ def test_the_fundamental_of_a_power_of_a_cosine_is_its_fourier_integral(exponent
     assert fundamental_share(exponent) == pytest.approx(integral / math.pi, rel=1e-11)
 
 
-def test_an_even_power_is_refused():
+def test_first_order_balance_refuses_an_even_power():
     with pytest.raises(ValueError, match="Exponent 4 is not allowed"):
         fundamental_share(4)
 

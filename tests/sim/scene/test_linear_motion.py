@@ -51,7 +51,7 @@ def test_the_transient_has_decayed_at_the_stated_time():
     assert motion.share_left(0.5 * when_s) > 1e-5
 
 
-def test_a_stop_is_untouched_only_if_proven():
+def test_contact_is_excluded_only_if_proven():
     quiet, loud = Harmonic(200.0, 1e-6), Harmonic(200.0, 1e-4)
     for contact in ("hertz", "linear_gap", "rigid:0.8"):
         specimen = gong2025(contact=contact)

@@ -15,7 +15,7 @@ def test_provably_contact_free_motion_is_planned_in_closed_form(contact, duratio
     assert "closed form" in plan.explain()
 
 
-def test_possible_contact_of_the_transient_is_integrated():
+def test_a_transient_that_may_touch_a_stop_is_integrated():
     specimen = gong2025()
     begins_fast = Given((0.0, 0.0, 0.0, 0.0, 0.5, 0.0))
     plan = plan_scene(Scene(specimen, QUIET, start=begins_fast))

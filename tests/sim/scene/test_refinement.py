@@ -74,7 +74,7 @@ def test_a_mean_over_starts_reaches_one_percent():
     assert again.response_ii == found.response_ii
 
 
-def test_the_error_of_a_mean_over_starts_contains_that_of_the_runs():
+def test_the_error_of_a_mean_over_starts_includes_the_error_of_the_runs():
     """The motion hardly depends on the start: its starts scatter by less than the tolerance of a run."""
     specimen = gong2025(8.1e-6, 5.965e-6, "power:3")
     drive = Harmonic(125.89780847473365, 2.120822403280049e-05)

@@ -27,7 +27,7 @@ def test_too_few_blocks_give_no_scatter():
 
 
 @pytest.mark.parametrize("blocks", [1, 5, 10])
-def test_two_windows_differ_by_at_most_the_stated_error_in_19_cases_of_20(blocks):
+def test_two_windows_differ_by_at_most_the_stated_error_in_95_percent(blocks):
     """Normal extremes, where one block is a window; with more, what is said errs on the large side."""
     random = np.random.default_rng(6)
     inside = 0

@@ -159,7 +159,7 @@ def test_a_prediction_as_json_lists_every_motion(lottery):
     assert said["motions"][said["asked"]]["motion"] == str(lottery.motion)
 
 
-def test_number_and_draw_of_starts_can_be_chosen():
+def test_number_and_seed_of_random_starts_can_be_chosen():
     """The same motions, in shares that the other draw's intervals hold."""
     fast = scene("linear_gap", 562.8, 20e-6)
     many = solve_ensemble(fast, starts=24, seed=5)

@@ -16,7 +16,7 @@ def test_the_interval_of_a_share_is_the_wilson_interval(count, trials):
 
 
 @pytest.mark.parametrize("shares", [(0.3, 0.7), (0.5, 0.3, 0.2), (0.4, 0.3, 0.2, 0.1)])
-def test_the_intervals_of_all_shares_together_hold_about_19_times_in_20(shares):
+def test_joint_share_intervals_cover_the_true_shares_in_95_percent(shares):
     random = np.random.default_rng(11)
     drawn = random.multinomial(32, shares, 4000)
     held = 0

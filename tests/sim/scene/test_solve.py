@@ -241,7 +241,7 @@ def test_exchange_of_displacement_and_velocity_is_not_taken_for_growth():
     assert found.motion is MotionKind.QUASI_PERIODIC
 
 
-def test_a_scene_of_too_many_steps_ends_with_a_sentence(monkeypatch):
+def test_a_scene_with_too_many_steps_ends_with_an_explanation(monkeypatch):
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 10_000_000)
     found = solve_scene(Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
     assert found.outcome is Outcome.TOO_LONG

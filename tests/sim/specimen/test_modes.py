@@ -28,7 +28,7 @@ def test_the_transmissibility_satisfies_the_equations_of_motion():
     np.testing.assert_allclose(m2 * s**2 * z, (k1 + c1 * s) * p - upper, rtol=1e-10)
 
 
-def test_the_peaks_lie_at_the_modes():
+def test_transmissibility_peaks_are_at_the_natural_frequencies():
     frequency = np.arange(50.0, 600.0, 0.1)
     size = np.abs(base_transmissibility(gong2025(), frequency)[:, 0])
     peaks = frequency[1:-1][(size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])]
@@ -56,11 +56,11 @@ def test_the_decay_rates_add_up_to_the_trace_of_the_damping():
     assert 2.0 * form.rates.real.sum() == pytest.approx(-390.081, abs=1e-3)
 
 
-def test_a_specimen_without_damping_has_modes_that_do_not_decay():
+def test_modes_of_an_undamped_specimen_do_not_decay():
     assert np.abs(modal_form(gong2025(damping_time_s=0.0)).rates.real).max() < 1e-10
 
 
-def test_modes_that_coincide_are_refused_with_a_remedy():
+def test_coinciding_modes_are_refused_with_advice():
     # m0 alone, critically damped: c2 and c1 of zero leave it coupled only through a vanishing spring.
     k0, m0 = 1000.0, 1e-3
     critical = dataclasses.replace(

@@ -8,7 +8,7 @@ from vibench.sim import Hertz, Specimen, gong2025
 from vibench.sim.specimen.hertz import Elasticity, hertz_stiffness
 
 
-def test_the_papers_materials_give_the_stiffness_of_its_contact():
+def test_the_materials_of_the_paper_give_its_contact_stiffness():
     stiffness = hertz_stiffness(Elasticity(206e9, 0.27), Elasticity(67e9, 0.3), 4.4e-3)
     assert stiffness == pytest.approx(4.891e9, rel=1e-4)
     assert gong2025().contact == Hertz(stiffness)

@@ -174,7 +174,7 @@ def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
 
 
 @pytest.mark.thorough
-def test_unreachable_and_empty_clusters_give_one_sentence(tmp_path):
+def test_unreachable_and_empty_clusters_give_a_one_sentence_error(tmp_path):
     with pytest.raises(ClusterLost, match=r"No Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         ClusterExecutor("tcp://127.0.0.1:9", patience_s=0.5)
     with pytest.raises(ClusterLost, match=r"No Dask scheduler answers at 'nonsense:what'"):

@@ -161,7 +161,7 @@ def test_resuming_computes_only_missing_points(study, tmp_path, require_equal):
     require_equal(open_study(path), solve_study(study))
 
 
-def test_identities_match_the_scenes(small, tmp_path):
+def test_stored_scene_identities_match_the_scenes(small, tmp_path):
     results = solve_study(small, tmp_path / "a.h5")
     kept = [bytes(each).decode() for each in results.arrays[IDENTITY]]
     assert len(set(kept)) == small.grid.size - 4, "a chain's first point is the scene that starts at rest"

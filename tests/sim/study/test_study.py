@@ -85,7 +85,7 @@ def test_differences_of_two_studies_name_the_changed_fields():
         ("frequencys", [1.0], "frequencys"),
     ],
 )
-def test_invalid_study_values_are_named(key, value, said):
+def test_invalid_study_values_are_named_in_the_error(key, value, said):
     with pytest.raises(ValidationError, match=said):
         Study.model_validate({**LEAST, key: value})
 
