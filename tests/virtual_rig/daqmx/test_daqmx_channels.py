@@ -60,7 +60,7 @@ def test_excitation_needs_ac_coupling(task):
         verify(task)
 
 
-def test_an_unsupported_sensor_current_is_refused_with_the_supported_ones(task):
+def test_an_unsupported_sensor_current_is_refused_with_the_supported_values(task):
     excited(task, 0.004)
     with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"0\.004\nPossible Values: 0, 0\.002"):
         verify(task)
@@ -75,7 +75,7 @@ def test_the_smallest_sufficient_input_range_is_used(task):
     ("limits", "allowed"),
     [((-10, 10), "5 on cDAQ1Mod1/ai1"), ((1, 1), "below AI_Max"), ((2, -2), "below AI_Max")],
 )
-def test_limits_beyond_every_range_are_refused_with_the_allowed_ones(task, limits, allowed):
+def test_limits_beyond_every_input_range_are_refused_with_the_allowed_ranges(task, limits, allowed):
     task.ai_channels.add_ai_voltage_chan(MODULE, min_val=limits[0], max_val=limits[1])
     with pytest.raises(DaqError, match=allowed) as caught:
         verify(task)

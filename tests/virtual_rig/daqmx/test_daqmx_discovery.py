@@ -56,12 +56,12 @@ def test_missing_device_features_are_refused_by_name(system):
         _ = system.devices["Dev1"].pci_bus_num
 
 
-def test_an_unknown_device_is_refused_with_the_devices_there_are(system):
+def test_an_unknown_device_is_refused_with_a_list_of_devices(system):
     with refused(DAQmxErrors.INVALID_DEVICE_ID, "Dev1"):
         _ = system.devices["Dev9"].product_type
 
 
-def test_a_device_can_have_the_name_a_configuration_gives_it(connect):
+def test_a_device_can_be_given_the_name_in_a_configuration(connect):
     daq = connect(catalogue=catalogue_with("NI 9234", "cDAQ2Mod5"))
     system = System.remote(daq.options)
     assert system.devices["cDAQ2Mod5"].product_type == "NI 9234"

@@ -89,7 +89,7 @@ def test_a_finite_task_gives_its_samples_and_no_more(daq):
         task.read(1)
 
 
-def test_a_finite_task_that_a_read_starts_can_be_read_again_and_again(daq):
+def test_a_finite_task_started_by_a_read_can_be_read_repeatedly(daq):
     task = daq.inputs("Dev1/ai1", RATE_HZ, samples=200)
     first = task.read(200)
     second = task.read(200)
@@ -115,7 +115,7 @@ def test_polling_for_the_end_advances_the_simulated_time(daq):
         assert questions < 10
 
 
-def test_a_task_without_a_clock_reads_on_demand_where_the_device_can(daq):
+def test_a_task_without_a_clock_reads_single_samples_on_demand(daq):
     task = daq.inputs("Dev2/ai1:2")
     assert task.timing.samp_timing_type is SampleTimingType.ON_DEMAND
     assert task.read() == pytest.approx([0.5, 0.5])
@@ -140,7 +140,7 @@ def test_raw_counts_scale_back_to_volts(daq):
     np.testing.assert_allclose(counts * step_v, expected((1,), 0, 50), atol=step_v)
 
 
-def test_waveforms_carry_samples_times_names_and_units(task):
+def test_waveforms_contain_samples_times_names_and_units(task):
     waveforms = task.read_waveform(64)
     np.testing.assert_allclose([w.scaled_data for w in waveforms], expected((1, 2, 3), 0, 64), atol=1e-9)
     later = task.read_waveform(10)[0].timing
@@ -188,7 +188,7 @@ def test_stopping_a_task_stops_the_conversion(task, daq):
     assert not daq.world.conversions
 
 
-def test_two_devices_sample_the_same_stretch_of_rig_time(daq):
+def test_two_devices_sample_the_same_interval_of_simulated_time(daq):
     tasks = []
     for name in ("Dev1/ai1", "cDAQ1Mod1/ai1"):
         task = daq.inputs(name, 25600)

@@ -22,7 +22,7 @@ def task(daq):
     return task
 
 
-def test_a_device_in_use_is_refused_and_the_holder_named(daq, task):
+def test_a_device_in_use_is_refused_with_the_name_of_its_task(daq, task):
     task.start()
     rival = daq.task("rival")
     rival.ai_channels.add_ai_voltage_chan("Dev1/ai3")
@@ -32,14 +32,14 @@ def test_a_device_in_use_is_refused_and_the_holder_named(daq, task):
     rival.start()
 
 
-def test_inputs_and_outputs_of_one_device_do_not_disturb_each_other(daq, task):
+def test_inputs_and_outputs_of_one_device_are_independent(daq, task):
     task.start()
     output = daq.outputs("Dev1/ao0", 1)
     output.timing.cfg_samp_clk_timing(1000)
     output.write(np.zeros(1000), auto_start=True)
 
 
-def test_a_task_without_channels_can_do_nothing(daq):
+def test_a_task_without_channels_cannot_be_started_or_timed(daq):
     empty = daq.task()
     with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
         empty.start()
@@ -82,7 +82,7 @@ def test_a_second_task_with_the_same_name_is_refused_or_attached(daq, task):
         Task("nothing", grpc_options=join)
 
 
-def test_waiting_for_a_task_that_does_not_end_reports_it(task):
+def test_waiting_for_a_task_that_does_not_end_times_out(task):
     task.start()
     with refused(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE):
         task.wait_until_done(timeout=0.01)
@@ -97,7 +97,7 @@ def test_a_missing_trigger_times_out_without_samples(daq, task):
     assert np.shape(task.read(10)) == (2, 10)
 
 
-def test_a_task_on_the_clock_of_another_task_starts_with_it(daq, task):
+def test_a_task_on_the_clock_of_another_task_starts_with_that_task(daq, task):
     output = daq.outputs("Dev1/ao0", 1)
     output.timing.cfg_samp_clk_timing(1000, source="/Dev1/ai/SampleClock")
     output.write(np.ones(1000), auto_start=True)
@@ -121,7 +121,7 @@ def test_a_chassis_shows_its_trigger_terminal_once_its_task_is_reserved(daq):
     assert task.triggers.start_trigger.term == "/cDAQ1/ai/StartTrigger"
 
 
-def test_a_world_that_cannot_start_leaves_the_device_free(daq):
+def test_a_simulation_that_cannot_start_leaves_the_device_free(daq):
     daq.world.slowest_hz = 2000.0
     task = daq.inputs("Dev1/ai0")
     task.timing.cfg_samp_clk_timing(1000)
@@ -154,7 +154,7 @@ def test_calls_that_are_not_simulated_are_refused_by_name(daq):
         assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
 
 
-def test_error_texts_are_looked_up(daq, task):
+def test_the_text_of_an_error_code_can_be_looked_up(daq, task):
     assert task._interpreter.get_error_string(-200018) == "Dac underflow."
 
 

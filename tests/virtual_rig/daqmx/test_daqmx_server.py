@@ -95,7 +95,7 @@ def test_an_address_in_use_is_refused_in_a_sentence(daq):
         DaqServer(daq.world, address=daq.server.address)
 
 
-def test_the_default_address_is_this_computer_only(daq):
+def test_the_simulated_daq_listens_on_loopback_by_default(daq):
     assert daq.server.address.startswith("127.0.0.1:")
 
 

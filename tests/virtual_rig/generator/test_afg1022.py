@@ -113,7 +113,7 @@ def test_a_setting_reads_back_and_leaves_no_error(command, query, answer):
         ("DATA:DATA EMEM,#14\x00\x01~~", -222),
     ],
 )
-def test_a_refused_command_queues_its_number_and_changes_nothing(command, code):
+def test_a_refused_command_queues_its_error_number_and_changes_nothing(command, code):
     device = generator()
     *before, last = command.split(";")
     device.execute(";".join(before).encode())
@@ -170,7 +170,7 @@ def test_several_queries_in_one_message_answer_in_one_line():
     assert ask(generator(), "*OPC?;SOUR1:FREQ?;VOLT?") == "1;1.0E+06;1.0E+00"
 
 
-def test_reset_is_a_sine_of_one_megahertz_and_one_volt_with_the_output_off():
+def test_reset_selects_a_sine_of_1_mhz_and_1_v_with_the_output_off():
     device = generator()
     device.execute(b"OUTP ON;:FUNC RAMP;:FREQ 5;:VOLT 3;:VOLT:OFFS 1;:OUTP2 ON")
     device.execute(b"*RST")
@@ -247,7 +247,7 @@ class TestQuirks:
         assert ask(device, "OUTP?") == "1"
 
 
-def test_a_corrupted_reply_is_followed_by_a_sound_one():
+def test_a_corrupted_reply_is_followed_by_a_correct_reply():
     device = generator()
     sound = device.execute(b"*IDN?").data
     device.corrupt_next_reply()

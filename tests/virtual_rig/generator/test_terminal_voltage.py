@@ -39,14 +39,14 @@ def sine_means(amplitude_v, frequency_hz, start_s, count, interval_s=INTERVAL_S,
     return -amplitude_v * np.diff(np.cos(edges)) / (2 * np.pi * frequency_hz * interval_s)
 
 
-def test_a_sine_has_the_amplitude_and_phase_it_was_set_to():
+def test_a_rendered_sine_has_the_set_amplitude_and_phase():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 3;:VOLT:OFFS 0.5;:PHAS 30DEG;:PHAS:INIT;:OUTP ON")
     expected = 0.5 + sine_means(1.5, 100.0, 0.0, 2000, phase=math.radians(30))
     assert rig.render(2000) == pytest.approx(expected, abs=1e-11)
 
 
-def test_an_output_that_is_off_is_exactly_silent_whatever_is_set():
+def test_an_output_that_is_off_is_exactly_silent_for_any_setting():
     rig = Rig(Terminal(noise_v_per_rt_hz=1e-3))
     rig.send("FREQ 100;:VOLT 3;:VOLT:OFFS 2")
     assert not rig.render(1000).any()
@@ -142,7 +142,7 @@ MODES = {
 
 
 @pytest.mark.parametrize("mode", MODES.values(), ids=MODES)
-def test_blocks_of_any_size_give_the_same_samples(mode):
+def test_rendered_samples_do_not_depend_on_the_block_size(mode):
     def rendered(sizes):
         rig = Rig(Terminal(seed=3, clock_error_ppm=20))
         rig.upload(np.random.default_rng(3).integers(0, 16384, 500))
@@ -156,7 +156,7 @@ def test_blocks_of_any_size_give_the_same_samples(mode):
 
 
 @given(seed=st.integers(0, 2**31), density=st.floats(1e-8, 1e-3))
-def test_the_noise_has_the_rms_of_its_density_in_half_the_sample_rate(seed, density):
+def test_the_terminal_noise_has_the_rms_of_its_density_up_to_nyquist(seed, density):
     rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=density, seed=seed))
     rig.send("FUNC DC;:OUTP ON")
     noise = rig.render(20_000)
@@ -179,7 +179,7 @@ def test_the_phase_has_not_drifted_after_ten_hours():
     assert rig.render(500) == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_burst_plays_its_cycles_once_for_each_trigger_and_then_rests():
+def test_a_burst_plays_its_cycles_once_per_trigger_and_then_stays_silent():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:BURS:NCYC 3;:BURS ON;:OUTP ON")
     assert not rig.render(1000).any()

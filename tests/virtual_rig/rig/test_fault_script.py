@@ -53,7 +53,7 @@ def read_for(bench, duration_s):
 
 
 class TestTheScript:
-    def test_the_shipped_night_has_twenty_faults_that_all_end_within_eight_hours(self):
+    def test_the_shipped_night_script_has_20_faults_that_end_within_8_hours(self):
         faults = load_fault_script(NIGHT).faults
         assert len(faults) == 20
         assert max(each.at_s + (each.for_s or 0.0) for each in faults) < 8 * 3600

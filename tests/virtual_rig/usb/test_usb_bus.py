@@ -102,7 +102,7 @@ def test_a_reply_beyond_the_timeout_is_a_visa_timeout_and_then_arrives(plugged):
     assert plugged.instrument.read().strip() == "1"
 
 
-def test_reading_without_a_query_is_a_visa_timeout_with_minus_420(plugged):
+def test_reading_without_a_query_is_a_visa_timeout_with_error_420(plugged):
     with pytest.raises(VisaIOError):
         plugged.instrument.read()
     assert plugged.instrument.query("SYST:ERR?").startswith("-420,")
@@ -123,7 +123,7 @@ def test_a_lost_device_raises_on_every_call(plugged, how):
             call()
 
 
-def test_a_cable_put_back_works_with_the_session_that_was_open(plugged):
+def test_a_reconnected_cable_works_with_the_open_session(plugged):
     plugged.cable.pull_cable()
     plugged.cable.plug_cable()
     assert plugged.instrument.query("*OPC?").strip() == "1"

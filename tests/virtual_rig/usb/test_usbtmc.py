@@ -125,7 +125,7 @@ def test_an_aborted_read_ends_with_a_short_packet_and_leaves_the_reply():
     assert host.read()[0] == b"1\n"
 
 
-def test_aborting_a_read_that_is_not_there_is_refused():
+def test_aborting_a_read_that_was_not_started_is_refused():
     assert Host().control(3, value=9, length=2, kind=CLASS_IN_ENDPOINT)[0] == 0x81
 
 

@@ -42,7 +42,7 @@ def test_a_signal_queued_in_parts_plays_without_a_gap():
     assert np.concatenate([first, output.render(3, 6)]) == pytest.approx([1, 1, 2, 2, 3, 3, 4, 4, 0])
 
 
-def test_the_output_counts_its_unplayed_steps():
+def test_an_analogue_output_counts_its_unplayed_steps():
     output = AnalogueOutput()
     output.queue(np.ones(4), GRID_RATE_HZ / 2, 0)
     assert [output.unplayed(step) for step in (0, 1, 2, 7, 8, 9)] == [4, 4, 3, 1, 0, 0]
@@ -51,7 +51,7 @@ def test_the_output_counts_its_unplayed_steps():
     assert np.all(output.render(2, 4) == 0)
 
 
-def test_a_signal_after_a_pause_begins_at_once():
+def test_an_output_signal_after_a_pause_begins_at_once():
     output = AnalogueOutput()
     output.queue(np.ones(1), GRID_RATE_HZ, 0)
     output.render(0, 50)
