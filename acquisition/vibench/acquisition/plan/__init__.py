@@ -2,8 +2,8 @@
 
 A `Measurement` is one excitation with its ramps and the limits during its run. A `Campaign` is an ordered
 list of measurements and nested sweeps, read from TOML. Before anything moves, a model of the rig predicts the
-loads of a plan (`predicted_loads`), and they are compared with the rig's limits (`MeasurementPreview`). Plans
-are frozen and validated. Frequencies are in Hz, times in s, amplitudes peak to peak in V. This package opens
+loads of a plan (`predicted_loads`). `MeasurementPreview` compares the loads with the rig's limits. Plans are
+frozen and validated. Frequencies are in Hz, times in s, amplitudes peak to peak in V. This package opens
 no instrument and does not depend on bench or run. Chains of points:
 docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 

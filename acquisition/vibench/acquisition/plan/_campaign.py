@@ -1,4 +1,4 @@
-"""Campaigns: measurements and nested sweeps in order, their TOML file, and the rules for retries."""
+"""Campaigns: an ordered list of measurements and nested sweeps, its TOML file, and rules for retries."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -21,27 +21,27 @@ class Retryable(StrEnum):
     DATA_LOST = "data_lost"
     """Samples were overwritten before they were read."""
     INSTRUMENT_LOST = "instrument_lost"
-    """Cable, power or server failed: the bench is closed and opened again before the next attempt."""
+    """Cable, power or server failed; the bench is closed and opened again before the next attempt."""
     INSTRUMENT_FAULT = "instrument_fault"
-    """An instrument refused a command or is in use elsewhere; the bench is reopened before a new attempt."""
+    """An instrument refused a command or is used by another program; the bench is reopened before a retry."""
     CHECK_FAILED = "check_failed"
     """The check at low level before the recording failed."""
     LIMIT = "limit"
-    """A measured value passed a limit."""
+    """A measured value exceeded a limit."""
     OVER_RANGE = "over_range"
     """The recording is complete, but an input was near its full scale in a recorded segment."""
 
 
 class RetryPolicy(FrozenModel):
-    """Number of attempts at a point, and the failures after which it is tried again."""
+    """Number of attempts at a point, and the failures after which another attempt is made."""
 
     attempts: PositiveInt = Field(default=1, le=100)
-    """Attempts at each point, including the first; every attempt has a separate file."""
+    """Number of attempts at each point, including the first; every attempt has a separate file."""
     on: tuple[Retryable, ...] = Field(
         default=(Retryable.DATA_LOST, Retryable.INSTRUMENT_LOST, Retryable.INSTRUMENT_FAULT), min_length=1
     )
     reopen_for_s: NonNegativeFloat = Field(default=60.0, le=86400)
-    """How long to search for a lost instrument before the campaign ends [s]."""
+    """Longest search for a lost instrument, after which the campaign ends [s]."""
 
 
 BYTES_PER_SAMPLE = 4
@@ -49,22 +49,22 @@ BYTES_PER_SAMPLE = 4
 
 
 class Campaign(FrozenModel):
-    """Measurements to be made one after the other, and sweeps after them.
+    """Measurements to be made one after another, and sweeps after them.
 
-    In a file, ``[defaults]`` contains values for all measurements, and ``[defaults.<kind>]`` for all
-    excitations of one kind; a measurement's or sweep's own values have priority. The campaign itself
-    contains every value. A file contains values and nothing that could be executed.
+    In a file, ``[defaults]`` contains values for all measurements, and ``[defaults.<kind>]`` values for all
+    excitations of one kind. Values given in a measurement or sweep have priority. The loaded campaign has all
+    values filled in. A file contains only values, nothing that could be executed.
     """
 
     name: Name
     notes: str = ""
     retry: RetryPolicy = RetryPolicy()
     rest_s: NonNegativeFloat = Field(default=0.0, le=86400)
-    """Pause between two recordings [s], in which specimen and amplifier cool."""
+    """Pause between two recordings, in which specimen and amplifier cool [s]."""
     measurements: tuple[Measurement, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
     scan: tuple[ScanPoint, ...] = ()
-    """Points to which the vibrometer moves; each gets all measurements and sweeps."""
+    """Points to which the vibrometer moves; all measurements and sweeps are made at each point."""
 
     @model_validator(mode="before")
     @classmethod
@@ -126,7 +126,7 @@ class Campaign(FrozenModel):
         return self
 
     def points(self) -> tuple[Point, ...]:
-        """All planned recordings, in order: measurements, then sweeps; a scan repeats both at each point."""
+        """Return all planned recordings: measurements, then sweeps; a scan repeats both at each point."""
         listed = (Point(name, each) for each in self.measurements for name in _names(each))
         alone = (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
         return tuple(_at(place, each) for place in self._numbered_scan() for each in alone) or alone
@@ -138,7 +138,7 @@ class Campaign(FrozenModel):
         )
 
     def recordings(self) -> tuple[tuple[str, Measurement], ...]:
-        """Name and measurement of each recording, in order."""
+        """Return name and measurement of each recording, in order."""
         return tuple((point.name, point.measurement) for point in self.points())
 
     @property
@@ -147,29 +147,29 @@ class Campaign(FrozenModel):
         return max(1, len(self.scan))
 
     def recording_names(self) -> tuple[str, ...]:
-        """Names of all recordings, in order, without ``.h5``."""
+        """Return the names of all recordings in order, without ``.h5``."""
         return tuple(point.name for point in self.points())
 
     @property
     def duration_s(self) -> float:
-        """Time of all measurements with their ramps, one bench check each, and pauses in between [s]."""
+        """Duration of all measurements with ramps, bench checks and the pauses in between [s]."""
         points = self.points()
         return _recorded_s(points) + self.rest_s * (len(points) - 1)
 
     def size_bytes(self, sample_rate_hz: float, channels: int) -> int:
-        """Return the disk space of all recordings while they are made [bytes]; finished ones need less."""
+        """Return the disk space of all recordings while they grow [bytes]; finished recordings need less."""
         return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
 
 
 def _at(place: ScanPoint, point: Point) -> Point:
-    """Return a point of a campaign at a point of a scan."""
+    """Return a point of a campaign, measured at the scan point ``place``."""
     measurement = point.measurement.model_copy(update={"point": place})
     chain = f"{point.chain}-{place.name}" if point.chain else ""
     return Point(f"{point.name}-{place.name}", measurement, chain)
 
 
 def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    """Return one point for each different drive; its limit checks hold for all points with that drive."""
+    """Return one point for each different drive; its limit checks apply to all points with this drive."""
     first: dict[str, Point] = {}
     for point in points:
         first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats", "point"}), point)
@@ -183,7 +183,7 @@ def _recorded_s(points: tuple[Point, ...]) -> float:
 def load_campaign(path: Path | str) -> Campaign:
     """Read a campaign from a TOML file, or a shipped campaign by its name (``"quick"``).
 
-    Raises ConfigurationError with file, key, what was given and what is allowed.
+    Raises ConfigurationError with file, key, given value and allowed values.
     """
     return load_toml(named(path, "campaigns"), Campaign)
 
@@ -195,7 +195,7 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
 
 
 def _listed(content: Mapping[Any, Any], key: str) -> list[Any]:
-    """Return a list unchanged; for other types an empty one, so that the validation refuses them."""
+    """Return the value of ``key`` as a list; any other type becomes an entry, which validation refuses."""
     given = content.get(key, [])
     return list(given) if isinstance(given, list | tuple) else [given]
 
@@ -213,7 +213,7 @@ def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
 
 
 def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
-    """Return the defaults of one kind of excitation; ValueError if they are not a table."""
+    """Return the defaults of one kind of excitation; raise ValueError if they are not a table."""
     match defaults.get(present_word(str(kind)), {}):
         case dict(shared):
             return shared

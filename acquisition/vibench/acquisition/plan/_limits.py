@@ -1,4 +1,4 @@
-"""Predicted effect of a plan on the rig, compared with the rig's limits."""
+"""Compare the predicted effect of a plan on the rig with the limits of the rig."""
 
 import math
 from collections.abc import Iterator
@@ -46,11 +46,11 @@ from ._schedule import (
 )
 
 _PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
-"""Fields of a plan that determine its recording."""
+"""Fields of a plan that determine the recorded signals."""
 
 
 def require_own_plan(measurement: Measurement, rig: Rig) -> None:
-    """Refuse to replay a recording with a plan other than the one that it was made with.
+    """Refuse to play back a recording with a plan that differs from its own plan.
 
     Raises ConfigurationError. Imported recordings, and plans of another version, are not checked.
     """
@@ -70,13 +70,13 @@ def require_own_plan(measurement: Measurement, rig: Rig) -> None:
 
 
 RAMP_PERIODS = 3.0
-"""Smallest number of periods of the shaker's suspension in a ramp; a shorter one acts like a step."""
+"""Smallest length of a ramp, in periods of the shaker on its suspension; shorter ramps act like steps."""
 USABLE_BANDWIDTH = 0.45
-"""Share of the sample rate below which a converter with an anti-alias filter is flat (NI 9234: 0.45)."""
+"""Usable bandwidth of a converter with an anti-alias filter, over the sample rate (NI 9234: 0.45)."""
 
 
 class LimitSide(StrEnum):
-    """Which side of the limit is allowed."""
+    """Side of a limit on which values are allowed."""
 
     AT_MOST = "at most"
     AT_LEAST = "at least"
@@ -88,16 +88,16 @@ class Consequence(StrEnum):
     REFUSED = "refused"
     """The plan is not played."""
     TOLD = "told"
-    """The plan is played; the excess is reported beforehand, and marked in the recording if it occurs."""
+    """The plan is played. The excess is reported beforehand and, if it occurs, marked in the recording."""
 
 
 _DIGITS = 6
-"""Digits of a value beside its limit, enough to distinguish 8200 points from 8192."""
+"""Number of digits of a value and its limit in messages, enough to tell 8200 from 8192 points."""
 
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """One predicted value, with its limit."""
+    """One predicted value and its limit."""
 
     what: str
     value: float
@@ -106,15 +106,15 @@ class LimitCheck:
     source: str
     """Source of the limit."""
     remedy: str
-    """What to change when it is exceeded."""
+    """What to change when the limit is exceeded."""
     side: LimitSide = LimitSide.AT_MOST
     consequence: Consequence = Consequence.REFUSED
     load: BaseQuantity | None = None
-    """Quantity of rig or specimen if `value` is its predicted peak; otherwise None."""
+    """Quantity of rig or specimen whose predicted peak is `value`; None for other checks."""
 
     @property
     def use(self) -> float:
-        """Used share of the limit; above 1 the limit is exceeded."""
+        """Used fraction of the limit; above 1, the limit is exceeded."""
         match self.side:
             case LimitSide.AT_MOST:
                 return self.value / self.limit if self.limit else math.inf
@@ -128,11 +128,11 @@ class LimitCheck:
 
     @property
     def is_kept(self) -> bool:
-        """Whether the value is within the limit, or beyond it only by rounding."""
+        """Whether the value is within the limit, apart from rounding errors."""
         return self.use <= 1 + 1e-9
 
     def complaint(self) -> str:
-        """Return the violation in one clause."""
+        """Return a clause that describes the violation of the limit and its remedy."""
         return (
             f"{self.what} would be {self.value:.{_DIGITS}g} {self.unit}, allowed is {self.side.value} "
             f"{self.limit:.{_DIGITS}g} {self.unit} ({self.source}): {self.remedy}"
@@ -140,7 +140,7 @@ class LimitCheck:
 
 
 def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
-    """Compare every setting and predicted load of ``measurement`` with its limit on ``rig``."""
+    """Return every setting and predicted load of ``measurement`` with its limit on ``rig``."""
     loads = predicted_loads(measurement.excitation, rig)
     return (
         *_settings(measurement, rig),
@@ -150,12 +150,12 @@ def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
 
 
 def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
-    """Refuse a measurement that would exceed any limit of the rig.
+    """Refuse a measurement that would exceed a limit of the rig; return all checks if it is allowed.
 
     Raises
     ------
     LimitExceeded
-        Names every violation with value, limit, source and remedy. Nothing was played.
+        Names every violation with value, limit, source and remedy. Nothing has been played.
     ConfigurationError
         When the rig plays back a recording that was made with another plan.
     """
@@ -168,7 +168,7 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
 
 
 def shortest_ramp_s(rig: Rig) -> float:
-    """Three periods of the loaded shaker on its suspension [s]."""
+    """Return the shortest allowed ramp: three periods of the loaded shaker on its suspension [s]."""
     shaker = rig.shaker
     resonance = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     return float(RAMP_PERIODS / resonance)
@@ -263,7 +263,7 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
 
 
 def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
-    """Compare the predicted setting that holds the base's level with the plan's largest, `amplitude_vpp`."""
+    """Check that the setting that holds the base level stays within `amplitude_vpp` of the plan."""
     needed = [
         (needed_vpp(rig, acceleration, frequency_hz), frequency_hz)
         for frequency_hz, acceleration in measurement.excitation.held_accelerations()
@@ -329,7 +329,7 @@ def _loads(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCh
 
 
 def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
-    """Check the estimated motion of the specimen against its springs and the sensors of m0."""
+    """Compare the estimated motion of the specimen with the limits of its springs and of the m0 sensors."""
     amplitude = loads[BaseQuantity.AMPLITUDE]
     limit = rig.specimen.amplitude_limit_m
     yield LimitCheck(
@@ -357,7 +357,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
 
 
 def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck]:
-    """Compare the predicted signals with the ranges of the converter's inputs and of the sensors."""
+    """Compare the predicted signals with the ranges of the sensors and of the converter's inputs."""
     peaks = {
         Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
         Role.AMPLIFIER_VOLTAGE: loads[BaseQuantity.AMPLIFIER_VOLTAGE].peak,
@@ -378,18 +378,18 @@ def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck
 
 
 TOUCH_SHARE = 0.25
-"""Share of the gap that p may reach in a check: a sine without ramp overshoots, and impacts may persist."""
+"""Largest p in a check, over the gap: a sine without ramp overshoots, and impacts may then persist."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""Check frequency within 3 %: a resonance known to some per cent shifts the base by decibels (0072)."""
+"""Frequencies within 3 % of the check: an uncertain resonance changes the base by decibels (0072) [Hz]."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
-    """Lower a check's sine until p stays within a quarter of the gap, but not below 10 mV [V].
+    """Return a setting for a check at which p stays within a quarter of the gap; 10 mV or more [Vpp].
 
     Parameters
     ----------
     wanted_vpp
-        Setting that would be used without stops; never exceeded [V].
+        Setting that would be used without stops; never exceeded [Vpp].
     rig
         Rig whose model includes the specimen on the table.
     """
@@ -400,12 +400,12 @@ def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
 
 
 def run_check_vpp(planned_vpp: float, rig: Rig) -> float:
-    """Return the amplitude of the check before a run at ``planned_vpp``; never above that setting [V]."""
+    """Return the setting of the check before a run at ``planned_vpp``; never above that setting [Vpp]."""
     return min(planned_vpp, check_amplitude_vpp(max(CHECK_FRACTION * planned_vpp, CHECK_LOWEST_VPP), rig))
 
 
 def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phase]:
-    """Return the phases of the check: measure silence, let a small sine settle, measure it."""
+    """Return the phases of the check: measure silence, let a small sine settle, measure the sine."""
     planned_vpp = measurement.excitation.amplitude_vpp
     amplitude_vpp = run_check_vpp(planned_vpp, rig)
     tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)
@@ -422,15 +422,15 @@ def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phas
 def expected_under_check(
     rig: Rig, terminal_v: float, quantity: BaseQuantity = BaseQuantity.ACCELERATION
 ) -> ComplexArray:
-    """Return the expected phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
+    """Return the possible phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
 
-    Each phasor belongs to a specimen with resonances up to 3 % higher or lower. If p may come near a stop,
-    the phasors with m1 bound to m2 are added.
+    Each phasor assumes resonances of the specimen shifted by up to 3 %. If p may come near a stop, phasors
+    for m1 bound to m2 are added.
 
     Parameters
     ----------
     terminal_v
-        Peak at the generator's terminal [V].
+        Peak voltage at the generator's terminal [V].
     quantity
         Quantity of base or specimen, in SI units, such as m/s2 for an acceleration.
     """
@@ -443,14 +443,14 @@ def expected_under_check(
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
-    """Return the measured amplitude, limited to the range of the expected ones [m/s2].
+    """Return the measured amplitude, limited to the range of the expected amplitudes [m/s2].
 
     Parameters
     ----------
     measured
-        Amplitude of the base [m/s2].
+        Acceleration amplitude of the base [m/s2].
     expected
-        From `expected_under_check`, shape (n,) [m/s2].
+        Phasors from `expected_under_check`, shape (n,) [m/s2].
     """
     sizes = np.abs(expected)
     return float(np.clip(measured, np.min(sizes), np.max(sizes)))

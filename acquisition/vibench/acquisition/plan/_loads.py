@@ -1,7 +1,7 @@
-"""Predicted peaks of a plan on the rig, from the rig's model.
+"""Predict the peak loads of a plan on the rig, with the rig's model.
 
-The prediction is exact while p stays inside the gap. Otherwise it is the fundamental of a motion with p
-limited to the gap; impacts add to it (amounts: tests/acquisition/plan/test_specimen_loads.py). The real
+The prediction is exact while p stays inside the gap. Otherwise it gives the fundamental of a motion with p
+limited to the gap. Impacts add to this (amounts: tests/acquisition/plan/test_specimen_loads.py). The real
 motion is monitored during the run.
 """
 
@@ -28,19 +28,19 @@ from ..excitation.steps import (
 from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4
-"""A held waveform is computed up to twice its playback rate. Higher images are below 1/20 of the band's
-level, and the table responds to them less.
+"""Number of spans of half the playback rate up to which a held waveform is computed: twice the playback rate.
+Higher images are below 1/20 of the level of the band, and the table responds to them less.
 """
 PASSED_LEVELS = np.arange(1, 17) / 16
-"""Shares of a tone's level at which loads are computed: ramps pass through them, and with stops a lower level
-may cause the larger motion.
+"""Fractions of a tone's level at which loads are computed. Ramps pass through them, and with stops a lower
+level may cause a larger motion.
 """
 BAND_POINTS = 2000
-"""Number of frequencies for the mean square of streamed noise."""
+"""Number of frequencies at which the mean square of streamed noise is computed."""
 
 Floats: TypeAlias = NDArray[np.float64]
 Transfer: TypeAlias = Callable[[Floats], ComplexArray]
-"""Phasor of a quantity at the plan's largest setting, by frequency [Hz]."""
+"""Function that returns the phasors of a quantity at the largest setting, for frequencies [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class Load:
     """Largest value of a quantity while a plan plays."""
 
     peak: float
-    """SI unit of the quantity."""
+    """Peak value, in the SI unit of the quantity."""
     rms: float
-    """Over the largest steady stretch; SI unit of the quantity."""
+    """Largest rms value of a steady part, in the SI unit of the quantity."""
     cause: str
-    """Part of the plan that causes it: ``"at 150 Hz"``."""
+    """Part of the plan that causes the largest value: ``"at 150 Hz"``."""
 
 
 Loads: TypeAlias = Mapping[BaseQuantity, Load]
@@ -60,15 +60,15 @@ Loads: TypeAlias = Mapping[BaseQuantity, Load]
 
 
 def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
-    """Return peak and rms of every quantity of rig and specimen while ``excitation`` plays, steady state.
+    """Return peak and rms of every quantity of rig and specimen in the steady state of ``excitation``.
 
-    Sines are computed by frequency; periodic waveforms as a sum of Fourier lines, with the images of the
-    generator's hold. Streamed noise is Gaussian: its peak is its crest factor times its rms value. Ramps
-    stay below the steady state because of their half-cosine shape.
+    Sines are computed frequency by frequency, periodic waveforms as a sum of Fourier lines, including the
+    images of the generator's hold. Streamed noise is Gaussian: its peak is the crest factor times the rms
+    value. Ramps stay below the steady state because of their half-cosine shape.
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
-    # All different tones, waveforms and sources of streams of a plan, at their highest level.
+    # All different tones, waveforms and stream sources of the plan, at their highest level.
     tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
     broad = [
         _BroadPlay(
@@ -89,7 +89,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
 
 
 def terminal_volts(excitation: Excitation, rig: Rig) -> float:
-    """Return the peak at the generator's terminal at the largest setting of the plan [V]."""
+    """Return the peak voltage at the generator's terminal for the largest setting of the plan [V]."""
     return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
 
 
@@ -119,7 +119,7 @@ def _of_tones(model: RigModel, quantity: BaseQuantity, tones: list[Tone], termin
 
 
 class _BroadPlay:
-    """A waveform or stream: free motion if its p stays inside the gap, otherwise limited by the stops."""
+    """Motion under a waveform or stream: free if p stays inside the gap, otherwise limited by the stops."""
 
     def __init__(
         self, model: RigModel, terminal_v: float, follow: Callable[[Transfer], Load], band_hz: Floats
@@ -134,7 +134,7 @@ class _BroadPlay:
         if not self._touches:
             return self._through(self._model.transfer, quantity)
         stuck = self._through(self._model.stuck_transfer, quantity)
-        # Add the mean effect, over the band, of a p with the amplitude of the gap.
+        # Add the effect, averaged over the band, of a p whose amplitude equals the gap.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
@@ -153,7 +153,7 @@ def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
     lines = held_lines(waveform.values, HELD_SPANS)
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(waveform.repetition_hz)
     answer = lines * transfer(frequency_hz)
-    # Twice the samples that the highest line needs, so that no peak is missed between samples.
+    # Use twice the samples that the highest line needs, so that no peak between samples is missed.
     points = 4 * len(lines)
     one_sided = np.zeros(points // 2 + 1, dtype=np.complex128)
     one_sided[: len(lines)] = answer * (points / 2)
@@ -171,18 +171,18 @@ def _of_source(source: SampleSource, transfer: Transfer) -> Load:
 def needed_vpp(
     rig: Rig, acceleration: float, frequency_hz: float, on_table: OnTable = OnTable.SPECIMEN
 ) -> float:
-    """Return the setting, peak to peak [V], at which the base reaches ``acceleration``.
+    """Return the setting at which the base reaches ``acceleration``, peak to peak [V].
 
     Parameters
     ----------
     rig
         Rig whose model is used.
     acceleration
-        Amplitude of the base [m/s2].
+        Acceleration amplitude of the base [m/s2].
     frequency_hz
         Frequency of the sine.
     on_table
-        Feedback uses the bare table, whose response is smooth, and measures the effect of the specimen.
+        Load on the table. Feedback uses the bare table, whose response is smooth, and corrects the rest.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()
@@ -190,7 +190,7 @@ def needed_vpp(
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """Amplitude of the base's sine at each frequency."""
+    """Displacement amplitude of the base at each frequency [m]."""
 
     amplitude_m: NDArray[np.float64]
     basis: str
@@ -198,9 +198,9 @@ class BaseMotion:
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
-    """Predict the base's amplitude at each of ``frequency_hz``; a level held by feedback is exact.
+    """Return the predicted base amplitude at each of ``frequency_hz``; exact for levels held by feedback.
 
-    For other plans it follows from the rig's model with specimen; noise counts as a sine of the same rms.
+    For other plans it follows from the rig's model with specimen; noise is treated as a sine of equal rms.
     """
     levels = [excitation.level_at(float(each)) for each in frequency_hz]
     model, terminal_v = RigModel(rig), terminal_volts(excitation, rig)

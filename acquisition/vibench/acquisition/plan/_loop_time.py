@@ -3,17 +3,17 @@
 from ..rig import Rig
 
 LOOK_S = 0.2
-"""Averaging time of one measurement of the feedback [s]; ten periods at least."""
+"""Averaging time of one measurement by the feedback loop [s]; longer if ten periods take longer."""
 LOOK_PERIODS = 10
 _COMMANDS = 2
 """Number of commands that change the drive: amplitude and frequency."""
 
 
 def look_s(frequency_hz: float) -> float:
-    """Return the averaging time of one measurement of the feedback [s]."""
+    """Return the averaging time of one measurement by the feedback loop [s]."""
     return max(LOOK_S, LOOK_PERIODS / frequency_hz)
 
 
 def loop_time_s(rig: Rig, frequency_hz: float) -> float:
-    """Return the delay from a motion to the changed drive: averaging time and generator commands [s]."""
+    """Return the delay from a motion to the corrected drive: averaging and generator commands [s]."""
     return look_s(frequency_hz) + _COMMANDS * rig.generator.settle_s

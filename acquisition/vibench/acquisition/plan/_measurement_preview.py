@@ -1,4 +1,4 @@
-"""Preview of a measurement: signal, loads with their limits, time, size."""
+"""Preview of a measurement: signal, loads and limits, duration, size of the recording."""
 
 from dataclasses import dataclass
 
@@ -16,48 +16,48 @@ from ._loop_time import loop_time_s
 from ._schedule import DriveSource, Measurement, drive_source_of, duration_s
 
 MOST_SAMPLES = 1_000_000
-"""Most samples of the displayed signal: a long sweep is displayed at a lower rate."""
+"""Largest number of samples of the displayed signal; a long sweep is displayed at a lower rate."""
 SPECTRUM_POINTS = 4000
 _LOWEST_RATE = 2.1
-"""Smallest number of samples per period of the highest frequency."""
+"""Smallest number of samples per period at the highest frequency."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPreview:
-    """Predictions for a measurement on a rig, without touching it."""
+    """Predictions for a measurement on a rig, made without using its instruments."""
 
     measurement: Measurement
     volts: Samples
     """Signal as set at the generator's panel, shape (samples,) [V]."""
     sample_rate_hz: float
     spectrum_hz: Samples
-    """Frequency of the highest line in each interval, at most `SPECTRUM_POINTS` of them [Hz]."""
+    """Frequency of the highest line in each interval; at most `SPECTRUM_POINTS` intervals [Hz]."""
     spectrum_v: Samples
-    """Peak amplitude of the sine at each frequency [V]."""
+    """Peak amplitude of the sine at each of ``spectrum_hz`` [V]."""
     rms_v: float
     peak_v: float
     checks: tuple[LimitCheck, ...]
-    """Limit checks, the one nearest to its limit first."""
+    """Limit checks, sorted by use of the limit, the highest first."""
     duration_s: float
     """Duration from the first ramp to the last [s]."""
     size_bytes: int
-    """Size [bytes] of the recording while it is made."""
+    """Size of the recording while it grows [bytes]."""
     least_growth_time_s: float | None
-    """Shortest growth time (factor e) of a motion that the computer's feedback can hold [s], or None."""
+    """Shortest growth time (factor e) of an unstable motion that feedback can hold [s]; None if unknown."""
 
     @property
     def is_allowed(self) -> bool:
-        """Whether it may be played."""
+        """Whether the measurement may be played."""
         return not any(check.forbids for check in self.checks)
 
     @property
     def crest_factor(self) -> float:
-        """Peak over rms."""
+        """Peak value divided by rms value."""
         return self.peak_v / self.rms_v
 
 
 def preview_measurement(measurement: Measurement, rig: Rig) -> MeasurementPreview:
-    """Compute a measurement's preview; raises ConfigurationError when it cannot be sampled."""
+    """Return the preview of a measurement; raises ConfigurationError when the signal cannot be sampled."""
     excitation = measurement.excitation
     affordable = MOST_SAMPLES / max(excitation.playing_s, 1.0)
     rate_hz = max(min(rig.daq.sample_rate_hz, affordable), _LOWEST_RATE * excitation.highest_frequency_hz)
@@ -91,7 +91,7 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
 
 
 def _highest_lines(preview: SignalPreview) -> tuple[Samples, Samples]:
-    """Keep the highest line of each logarithmic interval, so that no excited line is lost."""
+    """Return the highest line of each logarithmic frequency interval: frequencies and amplitudes."""
     frequency_hz, amplitude_v = preview.frequency_hz[1:], preview.spectrum_v[1:]
     if len(frequency_hz) <= SPECTRUM_POINTS:
         return frequency_hz, amplitude_v

@@ -1,4 +1,4 @@
-"""A measurement as a sequence of phases with a state, a signal, and a duration."""
+"""A measurement as a sequence of phases, each with a state, a signal and a duration."""
 
 import re
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from ..recording import SegmentLabel
 from ..rig import OutputUse, Rig, Role, generator_driver
 from ._until import SHORTEST_S, Until
 
-# A measurement is a plan: excitation, ramps, limits during the run. A point is one recording of a campaign.
+# A measurement is a plan: excitation, ramps, limits during the run. A point is one recording in a campaign.
 
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
@@ -32,21 +32,21 @@ def _is_of_a_file(value: object) -> object:
 
 
 Name = Annotated[str, Field(pattern=_NAME), BeforeValidator(_is_of_a_file)]
-"""Part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
+"""Name that is part of a file name: at most 64 letters, digits, ``_`` and ``-``."""
 
 LONGEST_S = 30 * 86400.0
-"""Longest duration of one recording: a month [s]."""
+"""Longest duration of one recording: 30 days [s]."""
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 FEWEST_STAIRS = 4
-"""Fewest stairs of a ramp; fewer would act like steps."""
+"""Smallest number of steps (stairs) in a ramp; fewer would act as one large step."""
 
 
 class OnOverload(StrEnum):
     """What the run does when an input or the vibrometer exceeds 95 % of its range."""
 
     FLAG = "flag"
-    """Mark the samples in the recording and continue: nothing is damaged, and the analysis omits them."""
+    """Mark the samples in the recording and continue; nothing is damaged, and the analysis omits them."""
     STOP = "stop"
     """Ramp down and end the run."""
 
@@ -55,30 +55,30 @@ class OnChange(StrEnum):
     """What the run does when the live twin finds a change of the specimen."""
 
     NOTE = "note"
-    """Note it as an event in the recording and continue."""
+    """Note the change as an event in the recording and continue."""
     STOP = "stop"
     """Ramp down and end the run; the live twin is started if needed."""
 
 
 class InRunLimits(FrozenModel):
-    """Limits during a measurement, as fractions of the rig's own limits."""
+    """Limits during a measurement, as fractions of the limits of the rig."""
 
     base_acceleration: Fraction = 1.0
     """Fraction of the shaker's acceleration limit, measured at the base."""
     base_velocity: Fraction = 1.0
-    """Fraction of the shaker's velocity limit, integrated from the acceleration at the base."""
+    """Fraction of the shaker's velocity limit; the velocity is integrated from the base acceleration."""
     stroke: Fraction = 1.0
-    """Fraction of the shaker's stroke limit, integrated twice."""
+    """Fraction of the shaker's stroke limit; the stroke is integrated twice from the base acceleration."""
     force: Fraction = 1.0
-    """Fraction of the shaker's force limit: for the coil, from its current, and for the force on the
-    table."""
+    """Fraction of the shaker's force limit, for the force of the coil (from its current) and the force on
+    the table."""
     amplifier_voltage: Fraction = 1.0
     """Fraction of the amplifier's clipping voltage, measured at its output."""
     current: Fraction = 1.0
-    """Fraction of the coil's peak current and of the amplifier's limiter (rms); the current is the amplifier
-    voltage, minus the moving coil's induced voltage, over the coil's resistance."""
+    """Fraction of the coil's peak current limit and of the amplifier's rms limiter. The current is computed
+    as amplifier voltage minus induced voltage of the moving coil, over the resistance of the coil."""
     specimen_amplitude: Fraction = 1.0
-    """Fraction of the specimen's amplitude limit: the main mass relative to the base, from the vibrometer."""
+    """Fraction of the specimen's amplitude limit: m0 relative to the base, from the sensor of m0."""
     on_overload: OnOverload = OnOverload.FLAG
     on_changed_specimen: OnChange = OnChange.NOTE
 
@@ -87,11 +87,11 @@ class ScanPoint(FrozenModel):
     """Point on the specimen at which the vibrometer's beam measures."""
 
     name: Name
-    """Name of the point, which ends the names of its recordings."""
+    """Name of the point; it is appended to the names of its recordings."""
     body: Literal["m0", "m1", "m2"]
     """Mass on which the point lies."""
     node: PositiveInt | None = Field(default=None, le=999_999_999)
-    """Number in universal files; absent: its place in the list, from 1."""
+    """Node number in universal files; if absent, the position in the list, from 1."""
     x_m: float
     """Coordinate along x [m]."""
     y_m: float
@@ -99,7 +99,7 @@ class ScanPoint(FrozenModel):
     z_m: float
     """Coordinate along z [m]."""
     direction: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
-    """Direction of a positive velocity."""
+    """Direction in which the velocity counts as positive."""
 
     @property
     def role(self) -> Role:
@@ -108,7 +108,7 @@ class ScanPoint(FrozenModel):
 
     @property
     def text(self) -> str:
-        """Name, mass and coordinates in words."""
+        """Description of the point: name, mass and coordinates."""
         return f"{self.name} on {self.body} (x {self.x_m:g}, y {self.y_m:g}, z {self.z_m:g} m)"
 
 
@@ -118,17 +118,17 @@ class Measurement(FrozenModel):
     name: Name
     excitation: Excitation
     ramp_s: PositiveFloat = Field(default=1.0, le=60)
-    """Time of a half-cosine ramp from silence to full amplitude, and back [s]."""
+    """Duration of the half-cosine ramp from silence to full amplitude, and of the ramp back [s]."""
     ramp_step_s: PositiveFloat = 0.05
-    """Duration of one stair: the ramp is a staircase of amplitude settings [s]."""
+    """Duration of one step of a ramp, which is a staircase of amplitude settings [s]."""
     repeats: PositiveInt = Field(default=1, le=1000)
     """Number of recordings of this measurement in a campaign."""
     limits: InRunLimits = InRunLimits()
     notes: str = ""
     until: Until | None = None
-    """Required bounds of results, which end the recording; if absent, the plan's time is recorded."""
+    """Required accuracy of results, which ends the recording; if absent, the planned time is recorded."""
     point: ScanPoint | None = None
-    """Point of a scan at which the vibrometer measures; absent: m0."""
+    """Point of a scan at which the vibrometer measures; if absent, m0."""
 
     @model_validator(mode="after")
     def _until_fits(self) -> Self:
@@ -173,10 +173,10 @@ class Point:
     """One recording of a campaign."""
 
     name: str
-    """Name of its recording, without ``.h5``; different from every other point's."""
+    """Name of the recording, without ``.h5``; unique in the campaign."""
     measurement: Measurement
     chain: str = ""
-    """Name of its chain, a series of points on one branch; empty for a single point."""
+    """Name of the chain (a series of points on one branch) to which the point belongs; empty for none."""
 
 
 class RunState(StrEnum):
@@ -211,11 +211,11 @@ class RunState(StrEnum):
 CHECK_FREQUENCY_HZ = 160.0
 """Sine of the bench check, near the calibration of accelerometers (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
 CHECK_FRACTION = 0.02
-"""Amplitude of the bench check divided by the planned amplitude."""
+"""Amplitude of the bench check over the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""Lowest setting of a check, so that it exceeds hum; a plan with a lower setting limits it [V]."""
+"""Smallest setting of a check, to exceed hum; a plan with a lower setting reduces it further [Vpp]."""
 CHECK_QUIET_S = 0.1
-"""Duration of silence in the check before anything plays [s]."""
+"""Duration of the silence that a check measures before anything plays [s]."""
 CHECK_SETTLE_S = 0.2
 CHECK_LISTEN_S = 0.3
 """Measuring time of the check: 48 periods [s]."""
@@ -226,26 +226,26 @@ CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of time with one state and one signal."""
+    """Part of a run with one state and one signal."""
 
     state: RunState
     play: Play | None
-    """None for silence."""
+    """Signal that is played; None for silence."""
     duration_s: float
     segment: Segment | None = None
-    """The named range of the recording that this phase belongs to."""
+    """Segment of the recording to which this phase belongs."""
 
     @property
     def end_level(self) -> float:
-        """Level at the end of the phase, from 0 (silent) to 1 (as planned); only ramps change it."""
+        """Level at the end of the phase, from 0 (silent) to 1 (as planned); only ramps change the level."""
         return 0.0 if self.play is None or self.state is RunState.RAMPING_DOWN else 1.0
 
 
 def phases(measurement: Measurement) -> Iterator[Phase]:
     """Yield the phases from the first ramp up to the last ramp down, without the bench check.
 
-    A change of waveform happens in silence, between a ramp down and a ramp up. A change of frequency keeps
-    phase and amplitude, and needs no ramp.
+    A waveform is changed in silence, between a ramp down and a ramp up. A frequency is changed without a
+    ramp, with continuous phase.
     """
     previous: Step | None = None
     for step in measurement.excitation.steps():
@@ -262,7 +262,7 @@ def phases(measurement: Measurement) -> Iterator[Phase]:
 
 
 def known_phases(measurement: Measurement) -> Iterator[Phase]:
-    """Yield the phases known before the measurement: all of them, or with feedback none."""
+    """Yield the phases known before the measurement: all phases; none for a measurement with feedback."""
     return iter(()) if isinstance(measurement.excitation, AbstractFeedback) else phases(measurement)
 
 
@@ -282,9 +282,9 @@ def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
     state
         Ramp up or ramp down.
     play
-        Signal at full level.
+        Signal that the ramp starts or ends.
     measurement
-        Plan with the duration of a ramp, and its stairs.
+        Plan that gives the duration of the ramp.
     """
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
@@ -296,7 +296,7 @@ _RAMP_LABELS = {
 
 
 def duration_s(measurement: Measurement) -> float:
-    """Time from the first ramp up to the end of the last ramp down, without the bench check [s].
+    """Return the time from the first ramp up to the last ramp down, without the bench check [s].
 
     With feedback, this is the longest time that the measurement may take.
     """
@@ -306,7 +306,7 @@ def duration_s(measurement: Measurement) -> float:
 
 
 def lead_in_s(measurement: Measurement) -> float:
-    """Return the time from the first sample to the measurement proper: bench check, ramp and settling [s].
+    """Return the time before the first sample with results: bench check, ramp and settling [s].
 
     With feedback, this time ends with the ramp, because settling is part of the measurement.
     """
@@ -321,17 +321,17 @@ def lead_in_s(measurement: Measurement) -> float:
 
 
 def measured_s(measurement: Measurement) -> float:
-    """Return the longest time of a measurement with its bench check [s]."""
+    """Return the longest possible duration of a measurement, including its bench check [s]."""
     return CHECK_S + duration_s(measurement)
 
 
 def stairs(measurement: Measurement) -> int:
-    """Return the number of amplitude settings of one ramp."""
+    """Return the number of amplitude settings in one ramp."""
     return ceil(measurement.ramp_s / measurement.ramp_step_s * (1 - 1e-9))
 
 
 def half_cosine(progress: float) -> float:
-    """Return the level of a ramp from 0 to 1, with zero slope at both ends.
+    """Return the level of a half-cosine ramp from 0 to 1, whose slope is zero at both ends.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; for a stream the output, even if the rig has none."""
+    """Return the source that plays a measurement; for a stream the analogue output, even if missing."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
@@ -363,7 +363,7 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; raises ConfigurationError if the rig lacks it."""
+    """Return the source that plays a measurement; raises ConfigurationError if the rig does not have it."""
     source = drive_source_of(measurement, rig)
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:
@@ -381,7 +381,7 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 LEAST_SHARE = 1e-4
-"""Smallest setting of an analogue output divided by its largest; the smallest is some tens of counts."""
+"""Smallest over largest setting of an analogue output; the smallest equals some tens of counts."""
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:

@@ -1,4 +1,4 @@
-"""Nested sweeps: one template, several axes, and the resulting named points in order."""
+"""Nested sweeps: a template and several axes, which give an ordered list of named points."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -24,17 +24,17 @@ class RangeSpacing(StrEnum):
     """Spacing of the values of a range."""
 
     LINEAR = "linear"
-    """At equal distances."""
+    """Equal differences between values."""
     LOGARITHMIC = "logarithmic"
-    """At equal ratios; give ``count``."""
+    """Equal ratios between values; needs ``count``."""
 
 
 class Range(FrozenModel):
-    """Values from ``start`` to ``stop``: ``step`` apart, or ``count`` of them."""
+    """Values from ``start`` to ``stop``, given by their distance ``step`` or their number ``count``."""
 
     start: PositiveFloat
     stop: PositiveFloat
-    """The last value, if whole steps reach it."""
+    """Upper bound of the values, included if whole steps reach it."""
     step: PositiveFloat | None = None
     count: PositiveInt | None = Field(default=None, ge=2, le=MOST_VALUES)
     spacing: RangeSpacing = RangeSpacing.LINEAR
@@ -56,7 +56,7 @@ class Range(FrozenModel):
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Values in rising order."""
+        """Values in ascending order."""
         count = self._count()
         match self.spacing:
             case RangeSpacing.LINEAR:
@@ -78,17 +78,17 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 
 
 def values_of(given: Values) -> tuple[float, ...]:
-    """Return the values of an axis: of a range in rising order, of a list as given."""
+    """Return the values of an axis: a range in ascending order, a list in the given order."""
     return given.values if isinstance(given, Range) else given
 
 
 MOST_POINTS = 10_000
-"""Largest number of points of one sweep; more is a mistake."""
+"""Largest number of points in one sweep; a larger number is taken for an error."""
 LONGEST_NAME = 64
 
 
 class SweepAxis(StrEnum):
-    """Axes of a sweep; the words of ``order``."""
+    """Axes of a sweep, as named in ``order``."""
 
     REPETITION = "repetition"
     EXCITATION = "excitation"
@@ -110,49 +110,48 @@ _TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
 
 @dataclass(frozen=True)
 class _Place:
-    """Position of a point: its value on each given axis."""
+    """Position of a point in a sweep: its value on each given axis."""
 
     values: Mapping[SweepAxis, Any]
     words: Mapping[SweepAxis, str]
-    """Each value as part of a name, in the order of the axes."""
+    """Each value as part of the point's name, in the order of the axes."""
 
     def name(self, sweep: str) -> str:
         return "-".join([sweep, *self.words.values()])
 
     def with_words(self, **words: str) -> "_Place":
-        """Return the place with other words for some of its values."""
+        """Return the same position with other name parts for some of its values."""
         return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
 class Sweep(FrozenModel):
-    """Every combination of the given axes, each a measurement made from ``measurement``.
+    """All combinations of values on the given axes; each is a measurement based on ``measurement``.
 
     A point is named after the sweep and its values: ``line-0p5vpp-up-205hz``. With
-    ``continue_from_previous`` the points along that axis form a chain: each is a dwell that begins with all
-    earlier points, so that the specimen stays on its branch, and a point that is measured again, days later,
-    is on the same one.
+    ``continue_from_previous`` the points along that axis form a chain. Each is a dwell that starts by playing
+    all earlier points, so that the specimen stays on its branch, even if a point is repeated days later.
     """
 
     name: Name
     measurement: dict[str, Any]
-    """Values that all points share: a measurement without its name."""
+    """Template of all points: the values of a measurement, without its name."""
     excitations: tuple[dict[str, Any], ...] = ()
-    """Excitations that replace the template's, one after the other; their values have priority."""
+    """Excitations used one after another; their values have priority over those of the template."""
     repetitions: PositiveInt = Field(default=1, le=1000)
     amplitude_vpp: Values | None = None
     direction: tuple[Direction, ...] = ()
     frequency_hz: Values | None = None
     order: tuple[SweepAxis, ...] = Field(default=USUAL_ORDER, min_length=1)
-    """The axes, the outermost (slowest) first."""
+    """Axes from the outermost (slowest) to the innermost."""
     continue_from_previous: SweepAxis | None = None
-    """``frequency_hz`` or ``amplitude_vpp``: the innermost axis, along which the specimen stays on its
-    branch."""
+    """Axis along which the specimen stays on its branch: ``frequency_hz`` or ``amplitude_vpp``. It must be
+    the innermost axis."""
     lead_s: PositiveFloat = 0.5
-    """Time at each earlier point of a chain in a lead-in [s]."""
+    """Time at each earlier point of the chain in a lead-in [s]."""
 
     lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
-    """Largest number of earlier points in a lead-in, the nearest ones; absent: the whole chain. A shorter
-    lead-in takes less time, and reaches the wrong branch if it begins behind the jump."""
+    """Largest number of earlier points in a lead-in, counted from the nearest; if absent, the whole chain. A
+    shorter lead-in saves time, but reaches the wrong branch if it starts behind the jump."""
 
     @model_validator(mode="after")
     def _order_names_every_axis(self) -> Self:
@@ -203,9 +202,9 @@ class Sweep(FrozenModel):
         return self
 
     def points(self) -> tuple[Point, ...]:
-        """Return the points, in order.
+        """Return all points in order.
 
-        Raises ValueError when a combination is not a valid measurement; the text names the point and the key.
+        Raises ValueError when a combination is not a valid measurement; the message names point and key.
         """
         return tuple(self._led()) if self.continue_from_previous else tuple(self._alone())
 
@@ -242,7 +241,7 @@ class Sweep(FrozenModel):
             yield Point(name, measurement)
 
     def _led(self) -> Iterator[Point]:
-        """Yield the points of each chain; the earlier points are the lead-in of the later ones."""
+        """Yield the points of each chain; earlier points are the lead-in of later ones."""
         axes = self._axes()
         along = SweepAxis(str(self.continue_from_previous))
         rising = sorted(axes.pop(along))
@@ -268,7 +267,7 @@ class Sweep(FrozenModel):
         return {**self.measurement, "name": name, "excitation": excitation}
 
     def _word(self, axis: SweepAxis, value: Any) -> str:
-        """Return a value as part of a name: ``0p5vpp``, ``205hz``, ``up``, ``r2``."""
+        """Return a value as part of a point's name: ``0p5vpp``, ``205hz``, ``up``, ``r2``."""
         match axis:
             case SweepAxis.REPETITION:
                 return f"r{value}"
@@ -284,7 +283,7 @@ class Sweep(FrozenModel):
 
 
 def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
-    """Yield a chain's values in the order of ``way``, each with the word for its direction."""
+    """Yield the values of a chain in the order of ``way``, each with the name of its direction."""
     up = [("" if way is None else "up", value) for value in rising]
     down = [("down", value) for value in reversed(rising)]
     match way:

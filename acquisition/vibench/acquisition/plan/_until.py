@@ -1,4 +1,4 @@
-"""Recording until results reach a required accuracy: targets, and times of the analyses."""
+"""Record until results reach a required accuracy: targets, and times of the analyses."""
 
 from typing import Annotated
 
@@ -9,7 +9,7 @@ from vibench.sim import NumberWith
 from ..host.toml_file import FrozenModel
 
 FEWEST_REALISATIONS = 4
-"""Number of realisations before the first analysis: fewer have too little scatter for a bound."""
+"""Number of realisations before the first analysis; fewer do not suffice to estimate the scatter."""
 SHORTEST_S = 2.0
 """Default time before the first analysis [s]; a shorter plan is analysed at its end."""
 LOOK_FACTOR = 2.0**0.5
@@ -17,27 +17,27 @@ LOOK_FACTOR = 2.0**0.5
 
 
 Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
-"""Half width of the 95 % interval over the value."""
+"""Required accuracy of a result: half width of its 95 % interval over its value."""
 
 
 class Until(FrozenModel):
-    """Record until the bound of every result named here is small enough, at most for the plan's time.
+    """Record until the bound on the error of every result named here is small enough.
 
-    The bounds hold in 95 % of recordings, also if they end a recording. They contain noise and chance, which
-    recording time reduces, but no calibrations.
+    The planned time is never exceeded. The bounds hold in 95 % of recordings, also in those that they end.
+    They include noise and chance, which recording time reduces, but not the uncertainty of calibrations.
     """
 
     resonance_hz: Wish | None = None
-    """Bound of the frequency of every resonance found in noise: ``"0.1 %"``."""
+    """Required bound on the frequency of every resonance found in noise: ``"0.1 %"``."""
     transmissibility: Wish | None = None
-    """Bound of the transmissibility at every resonance found in noise: ``"2 %"``."""
+    """Required bound on the transmissibility at every resonance found in noise: ``"2 %"``."""
     response_i: Wish | None = None
-    """Bound of Response I of a dwell or of each step: ``"1 %"``."""
+    """Required bound on Response I of a dwell or of each step: ``"1 %"``."""
     response_ii: Wish | None = None
-    """Bound of Response II of a dwell or of each step: ``"1 %"``."""
+    """Required bound on Response II of a dwell or of each step: ``"1 %"``."""
     shortest_s: PositiveFloat = SHORTEST_S
-    """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; at most its planned
-    time."""
+    """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; the planned time if
+    that is shorter."""
 
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":
@@ -47,9 +47,9 @@ class Until(FrozenModel):
 
     @property
     def wishes(self) -> dict[str, float]:
-        """Targets by the name of the result."""
+        """Required bounds by name of the result."""
         return {name: wish for name in WISHES if (wish := getattr(self, name)) is not None}
 
 
 WISHES = ("resonance_hz", "transmissibility", "response_i", "response_ii")
-"""Results that a plan may name."""
+"""Names of the results that `Until` may require."""
