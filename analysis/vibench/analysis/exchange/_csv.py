@@ -1,6 +1,6 @@
-"""Write CSV files with one row per sample, and read tables of text.
+"""Write CSV files with one row per sample, and read tables of numbers from text files.
 
-Columns to read may be separated by commas, semicolons, bars, tabs or blanks; all are read into memory.
+Columns may be separated by commas, semicolons, bars, tabs or blanks. The whole table is read into memory.
 """
 
 import codecs
@@ -37,7 +37,7 @@ _HOUR_S, _DAY_S = 3600, 86400
 
 
 class ClockTimes:
-    """Converter of the dates and times of a file, read in order, to seconds since its first midnight."""
+    """Converter of the dates and times in a file, in order, to seconds since midnight of the first day."""
 
     def __init__(self) -> None:
         self._last_s: float | None = None
@@ -45,7 +45,7 @@ class ClockTimes:
         self._date = ""
 
     def in_seconds(self, text: str) -> str:
-        """Replace times in a text by seconds, and dates without a time by days."""
+        """Replace times of day in a text by seconds, and dates without a time by days."""
         return _CLOCK.sub(self._number, text)
 
     def _number(self, found: re.Match[str]) -> str:
@@ -68,7 +68,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Advance to a date, in the order of parts nearest to the last date; return whether it is valid."""
+        """Advance to a date, read in the order nearest to the last date; return whether it is valid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)
@@ -79,7 +79,7 @@ class ClockTimes:
 
 
 def _orders(text: str) -> Iterator[date | None]:
-    """Yield the date as read with the year, the day or the month first; None if invalid."""
+    """Yield the date read in three orders (year, day or month first); None for an invalid date."""
     parts = [
         int(each) if each.isdecimal() else _MONTHS.get(each[:3].casefold(), 0)
         for each in re.split("[-/.]", text)
@@ -95,11 +95,11 @@ def _orders(text: str) -> Iterator[date | None]:
 TIME_FORMAT = "%.9f"
 """Format of the seconds since the recording's first sample, to nanoseconds."""
 VALUE_FORMAT = "%.10g"
-"""Format of values, one digit more than 2^-30 of the range needs; lost samples are ``nan``."""
+"""Format of values, with one digit more than steps of 2^-30 of the range need; lost samples: ``nan``."""
 
 
 def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write time and channels in blocks."""
+    """Write a time column and one column per channel, in blocks."""
     headings = ["time [s]", *(f"{each.role} [{each.unit}]" for each in excerpt.channels)]
     row = ",".join([TIME_FORMAT, *(VALUE_FORMAT for _ in excerpt.channels)]) + "\n"
     rate = excerpt.recording.sample_rate_hz
@@ -114,58 +114,58 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 
 
 LONGEST_HEAD = 200
-"""Most lines of a heading."""
+"""Maximum number of heading lines."""
 DELIMITERS = (";", "\t", "|", ",", None)
-"""Separators, in the order of trying; None means blanks. Other separators make commas decimal marks."""
+"""Separators in order of trial; None means blanks. With any except the comma, commas are decimal marks."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
     r"|[mk]?m(?:/s| s-?)(?:2|\^2|\*\*2|\u00b2)|[Ss]econds?|[Vv]olts?|[dmyhsDMYHS.:/ f-]{8,})?"
 )
-"""One cell of a row that gives units, or formats of dates and times."""
+"""Cell of a row that states units, or formats of dates and times."""
 TITLE = re.compile(r"\W*(?:(?:y[ _])?units?(?:[ _]labels?)?|einheit(?:en)?|names?|channels?)\W*", re.I)
 """First cell of a heading row that names the content of the row, such as "Units"."""
 NAME_AND_UNIT = re.compile(r"[^\s\[\]()]+(?:\s*[\[(][^\[\]()]*[\])])?")
 STATEMENT = re.compile(
     r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
 )
-"""A name, a number and its unit in a line of a heading: ``"Sample rate: 51.2 kHz"``."""
+"""Name, number and unit in a line of the heading: ``"Sample rate: 51.2 kHz"``."""
 SENTENCE = re.compile(
     r"(?:sampled|recorded|acquired) (?:at|with) ([\d.]+) ?(k?hz)|([\d.]+) ?(k?s)(?:a|amples?)?(?:/| per )s",
     re.I,
 )
-"""A sample rate in a sentence: ``"recorded at 5120 Hz"``, ``"51.2 kS/s"``."""
+"""Sample rate in a sentence: ``"recorded at 5120 Hz"``, ``"51.2 kS/s"``."""
 FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
-"""Letter D before the exponent of a double-precision number in Fortran's notation."""
+"""Letter D before the exponent of a double-precision number in Fortran notation."""
 GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
-"""A number whose separator may be decimal or may group thousands, such as ``1,234``."""
+"""Number whose separator may be a decimal mark or may group thousands, such as ``1,234``."""
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Format of the rows of numbers in a text file."""
+    """Format of the rows that contain numbers in a text file."""
 
     delimiter: str | None
     columns: int
     empty: int
-    """Empty cells after the last number of each line, as spreadsheets write them."""
+    """Number of empty cells after the last number of each line, as spreadsheets write them."""
     has_text: bool
     """Whether cells are dates, times or numbers in Fortran's notation."""
 
     @property
     def width(self) -> int:
-        """Number of cells of a line."""
+        """Number of cells in a line."""
         return self.columns + self.empty
 
     def cells(self, line: str, clock: ClockTimes | None = None) -> list[str]:
-        """Split a line; times become seconds."""
+        """Return the cells of a line, with times in seconds."""
         found = _cells(line, self.delimiter, clock or ClockTimes())
         while len(found) > self.columns and len(found) > 1 and not found[-1].strip():
             found.pop()
         return found
 
     def plain(self, line: str, clock: ClockTimes) -> str:
-        """Return a line in the form that numpy reads; empty for comments and lines of empty cells."""
+        """Return a line in the form that numpy reads; empty for comments and for lines of empty cells."""
         if line.startswith(("#", "%")):
             return ""
         is_plain = '"' not in line and not self.empty and not self.has_text
@@ -180,9 +180,9 @@ BLANK = " \t\r\n"
 
 @contextmanager
 def open_csv(path: Path) -> Iterator[TableSource]:
-    """Open a file; columns are named ``"1"``, ``"2"``, ... or by their heading.
+    """Open a text file; its channels are named ``"1"``, ``"2"``, ..., with labels from the heading.
 
-    Raises ValueError when the first 200 lines have no numbers, or a later line differs.
+    Raises ValueError when the first 200 lines contain no numbers, or a later line has another format.
     """
     encoding = _encoding(path)
     head, first, layout = _beginning(path, encoding)
@@ -223,7 +223,7 @@ def _may_be_grouped(column: Reals) -> bool:
 
 
 def _require_decimals(place: int, cells: Sequence[str]) -> None:
-    """Raise ValueError if the separators in a column seem to group thousands."""
+    """Raise ValueError if the separators in a column probably group thousands."""
     marked = [each for each in cells if "." in each or "," in each]
     whole = next((each for each in cells if each.lstrip("+-0").isdigit()), "")
     if whole and all(GROUPED.fullmatch(each) for each in marked):
@@ -234,14 +234,14 @@ def _require_decimals(place: int, cells: Sequence[str]) -> None:
 
 
 def _encoding(path: Path) -> str:
-    """Guess the encoding of text from its start, since files do not state it."""
+    """Return the probable encoding of a text from its start, because files do not state it."""
     with path.open("rb") as file:
         head = b"".join(islice(file, LONGEST_HEAD))
     if head.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
-    # Text has no zero bytes, except in UTF-16 in nearly every other place.
+    # Text has no zero bytes, except UTF-16, which has one in nearly every second place.
     zeros = [2 * head[place::2].count(0) / max(len(head), 1) for place in (0, 1)]
     if max(zeros) > 0.9 and min(zeros) == 0.0:
         return "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"
@@ -257,7 +257,7 @@ def _encoding(path: Path) -> str:
 
 
 def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
-    """Describe the first line that does not fit the table; empty if all fit."""
+    """Describe the first line that does not fit the table; empty if all lines fit."""
     for number, line in enumerate(file, start=1):
         if number <= first or not layout.plain(line, ClockTimes()).strip():
             continue
@@ -274,9 +274,9 @@ def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
 
 
 def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
-    """Return the heading, its length, and the format of the numbers.
+    """Return the lines of the heading, their number, and the format of the rows of numbers.
 
-    A line of numbers belongs to the heading if the next line has another number of columns.
+    A line of numbers belongs to the heading if the next line has a different number of columns.
     """
     found: tuple[list[str], int, _Layout] | None = None
     with path.open(encoding=encoding, errors="replace") as file:
@@ -307,7 +307,7 @@ def _layout(line: str) -> _Layout | None:
 
 
 def _cells(line: str, delimiter: str | None, clock: ClockTimes | None = None) -> list[str]:
-    """Split a line; times become seconds if there is a clock."""
+    """Return the cells of a line; with a clock, times become seconds."""
     if delimiter is None:
         line = line if clock is None else clock.in_seconds(line)
         return [each.strip('"') for each in line.split()]
@@ -316,7 +316,7 @@ def _cells(line: str, delimiter: str | None, clock: ClockTimes | None = None) ->
 
 
 def _number(cell: str) -> str:
-    """Return a number with a decimal point, and E before its exponent."""
+    """Return a number as text with a decimal point, and with E before its exponent."""
     return FORTRAN.sub("e", cell.strip().replace(",", "."))
 
 
@@ -328,9 +328,9 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
-    """Return labels and units from one heading row, or from one row each; empty texts if there are none.
+    """Return labels and units from one heading row or from one row each; empty texts if not stated.
 
-    Raises ValueError for a row with too few units, which may belong to any columns.
+    Raises ValueError for a row with fewer units than columns, because their columns are unknown.
     """
     for line in head:
         cells = [each.strip() for each in layout.cells(line.strip())]
@@ -350,13 +350,13 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether all cells are units, except a title in the first cell."""
+    """Return whether all cells are units; the first cell may be a title."""
     cells = row[1:] if TITLE.fullmatch(row[0]) else row
     return any(cells) and all(UNIT_CELL.fullmatch(each) for each in cells)
 
 
 def _row(line: str, layout: _Layout) -> list[str]:
-    """Split a line of a heading into one cell per column; empty if that fails."""
+    """Return a heading line as one cell per column; empty if it cannot be split that way."""
     line = line.strip("\r\n ").lstrip("#% ")
     tries = [layout.cells(line), *(replace(layout, delimiter=each).cells(line) for each in DELIMITERS)]
     tries += [re.split(r"\s{2,}|\t", line), NAME_AND_UNIT.findall(line)]
@@ -367,7 +367,7 @@ def _row(line: str, layout: _Layout) -> list[str]:
 
 
 def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]]:
-    """Yield the facts of each column (as LabVIEW's ``Delta_X``) and those that all columns share."""
+    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``) and those of all columns."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:
@@ -384,7 +384,7 @@ def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]
 
 def _statements(line: str) -> Iterator[tuple[str, float]]:
     if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
-        # A cell after the number may be its unit, or another name.
+        # The cell after the number may be its unit, or another name.
         unit = found[3] if found[3].casefold() in UNITS else ""
         yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))
     elif (found := SENTENCE.search(line)) and _are_numbers([number := found[1] or found[3]]):

@@ -14,7 +14,7 @@ from vibench.acquisition.recording import Origin
 from ..signals.arrays import Reals
 
 EXACT_KINDS = {"i": 4, "u": 2}
-"""Most bytes of signed and unsigned integers that a recording can store exactly."""
+"""Largest size in bytes of signed and unsigned integers that a recording can store exactly."""
 LEAST_INTERVAL_S = 1e-100
 """Shortest accepted interval between samples, so that its inverse is finite."""
 SECONDS = {
@@ -26,18 +26,18 @@ SECONDS = {
     **dict.fromkeys(("h", "hour", "hours", "stunden"), 3600.0),
     **dict.fromkeys(("d", "day", "days", "tage"), 86400.0),
 }
-"""Length in seconds of each unit of time; texts are compared without regard to case."""
+"""Length in seconds of each unit of time; upper and lower case are equal."""
 
 
 def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, float] | None:
-    """Convert an interval between samples, in a unit of time, to bounds of the rate [Hz]; None if invalid."""
+    """Return bounds of the sample rate [Hz] for an interval in a unit of time; None if invalid."""
     second = SECONDS.get(unit.casefold(), 0.0)
     shortest, longest = second * (interval - uncertainty), second * (interval + uncertainty)
     return (1 / longest, 1 / shortest) if LEAST_INTERVAL_S < shortest <= longest < inf else None
 
 
 def text_of(raw: bytes) -> str:
-    """Decode text as UTF-8, or else as Latin-1, since files do not state the encoding."""
+    """Decode a text as UTF-8, or else as Latin-1, because files do not state the encoding."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
@@ -57,16 +57,16 @@ _SCALE = re.compile(
 
 
 MOST_CHANNELS = 64
-"""Most values of one fact for the channels of a table; more numbers are samples."""
+"""Maximum number of values of one fact for the channels of a table; larger arrays are samples."""
 _COUNT_SCALE = re.compile(
     rf"{_SCALE.pattern}|sens\w*|conv\w*|mult\w*|resol\w*|calib\w*|coeff\w*|sf|c1|to_\w+|units?_per_\w+", re.I
 )
 
 
 def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0, label: str = "") -> str:
-    """Return the stated unit, or the one at a place of a list of units; empty if there is none.
+    """Return the stated unit, or the unit at ``place`` in a list of units; empty if not stated.
 
-    ``LABEL_unit`` is the unit of the channel of that label only. Several units are joined by "or".
+    ``LABEL_unit`` is only the unit of the channel with that label. Several units are joined by "or".
     """
     own = re.compile(rf"{re.escape(label)}[ _.-]?units?", re.I)
     named = [(name, value) for name, value in facts if label and own.fullmatch(name)]
@@ -77,7 +77,7 @@ def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0, label: str = ""
 
 
 def _text_at(texts: NDArray[Any], place: int) -> str:
-    """Return the text at a place of a list, or the only one; empty for numbers."""
+    """Return the text at ``place`` in a list, or the only text; empty for numbers."""
     if not texts.size or texts.dtype.kind not in "SUO":
         return ""
     text = texts[place if texts.size > 1 and place < texts.size else 0]
@@ -86,9 +86,9 @@ def _text_at(texts: NDArray[Any], place: int) -> str:
 
 
 def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -> str:
-    """Return a stated scale, such as ``"gain = 0.001"``, that may or may not be applied to the numbers.
+    """Return a stated scale, such as ``"gain = 0.001"``, which may or may not be applied to the numbers.
 
-    A sensitivity or calibration is usually applied, except to integers.
+    A sensitivity or a calibration is usually already applied, except to integers.
     """
     scale = _COUNT_SCALE if are_counts else _SCALE
     for name, value in facts:
@@ -109,7 +109,7 @@ class SourceChannel:
     """A channel as described by its file."""
 
     name: str
-    """Unique name in the file, for mappings."""
+    """Unique name in the file, used in mappings."""
     samples: int
     label: str = ""
     """Label in the file; not unique."""
@@ -117,37 +117,37 @@ class SourceChannel:
     """Sample rate; None if the file does not state it exactly."""
     unit: str = ""
     quantity: str = ""
-    """Quantity in the file, if its numbers may have any unit of it."""
+    """Quantity stated in the file, if its unit is not stated."""
     step: float | None = None
-    """Step between values that were stored as integers, to store them exactly."""
+    """Step between values that the file stores as integers; it allows exact storage."""
     origin: Origin | None = None
-    """Whether it was measured or simulated; None if unknown."""
+    """Whether the channel was measured or simulated; None if unknown."""
     full_scale: float | None = None
-    """Largest value in the file format, if that is the converter's range."""
+    """Largest value of the file format, if it is the range of the converter."""
     rate_bounds_hz: tuple[float, float] | None = None
-    """Bounds of the sample rate, from times with few digits."""
+    """Bounds of the sample rate, if the times have few digits [Hz]."""
     start_s: float | None = None
-    """Time of its first sample, on the common clock of the file."""
+    """Time of the first sample on the common clock of the file [s]."""
     start_error_s: float = 0.0
     runs: tuple[tuple[int, int], ...] = ()
-    """For each regular stretch: first sample and its time in sample intervals; empty without jumps."""
+    """First sample of each regular stretch, and its time in sample intervals; empty without jumps."""
     time_unit: str | None = None
     """Unit of the channel's times, empty if not stated; None without times."""
     stated_scale: str = ""
-    """Scale stated in the file, which its numbers may or may not include; empty if there is none."""
+    """Scale stated in the file; the numbers may or may not include it. Empty if not stated."""
     shifts: tuple[tuple[str, str], ...] = ()
-    """Facts that may shift its times in an unknown way, such as a delay: names and values."""
+    """Names and values of facts that may shift the times in an unknown way, such as a delay."""
     time_trouble: str = ""
     """Contradiction in the file's time information; empty if there is none."""
 
     @property
     def are_counts(self) -> bool:
-        """Whether its numbers are counts, or fractions of a full scale."""
+        """Whether the numbers are counts, or fractions of full scale."""
         return self.step == 1.0 or self.full_scale is not None
 
     @property
     def rates_hz(self) -> tuple[float, float]:
-        """Bounds of the sample rate."""
+        """Bounds of the sample rate [Hz]."""
         exact = self.sample_rate_hz
         return (self.rate_bounds_hz or (0.0, inf)) if exact is None else (exact, exact)
 
