@@ -8,6 +8,7 @@ from vibench.acquisition import Overload, open_recording
 from vibench.acquisition.plan import WhiteNoise
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.errors import UnusableData
+from vibench.analysis.recordings.channel_levels import channel_levels
 from vibench.analysis.recordings.channels import RecordedChannels
 from vibench.analysis.recordings.response import ResponseChannel, derivative_kernel, integral_kernel
 
@@ -143,3 +144,13 @@ def test_samples_near_a_gap_are_excluded(dwell_motions, tmp_path):
     with open_recording(path) as recording:
         lost = np.isnan(ResponseChannel(recording).read(0, recording.samples))
     assert np.flatnonzero(lost)[[0, -1]].tolist() == [16_000 - RATE, 16_009 + RATE]
+
+
+def test_channel_levels_are_those_of_the_samples_that_were_not_lost(dwell_motions, tmp_path):
+    motion, velocity, _ = dwell_motions["weak"]
+    hole = (16_000, 32_000)
+    path = synthetic.write_recording(tmp_path, dwell_plan(0.5e-6), motion, velocity, [DWELL_PART], hole=hole)
+    with open_recording(path) as recording:
+        levels = channel_levels(recording)
+        rows = [recording.read(each.header.role) for each in levels]
+    assert [each.rms for each in levels] == pytest.approx([np.sqrt(np.nanmean(row**2)) for row in rows])

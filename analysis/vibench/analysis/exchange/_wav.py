@@ -89,7 +89,7 @@ class WavSource:
 @contextmanager
 def open_wav(path: Path) -> Iterator[WavSource]:
     """Open a WAV file; raises ValueError when it is not WAV, compressed or truncated."""
-    _require_whole(path)
+    bits = _valid_bits(path)
     rate, data = _read(path)
     table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
     is_integer = table.dtype.kind in "iu"
@@ -111,8 +111,9 @@ def open_wav(path: Path) -> Iterator[WavSource]:
     )
 
 
-def _require_whole(path: Path) -> None:
-    """Raise ValueError for a truncated file or for several chunks of samples."""
+def _valid_bits(path: Path) -> int:
+    """Return the stated bits of a sample; raises ValueError for a truncated file or several data chunks."""
+    bits = 8 * BYTES
     with path.open("rb") as file:
         order = ORDERS.get(file.read(4))
         file.seek(FIRST_CHUNK)

@@ -87,10 +87,10 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
         ChannelLevel(
             header=header,
             envelope=Envelope(time_s, lower[row], upper[row]),
-            rms=float(np.sqrt(np.nansum(power[row]) / recording.samples)),
+            rms=float(np.sqrt(np.nansum(power[row]) / counts[row].sum())),
             peak=float(np.nanmax(np.maximum(np.abs(lower[row]), np.abs(upper[row])))),
             full_scale=float(full_scale[row, 0]),
-            share_at_full_scale=int(cut[row]) / recording.samples,
+            share_at_full_scale=int(cut[row]) / int(counts[row].sum()),
             flat_tops=tuple(
                 float(offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0])
                 for side, highest in zip((1, -1), lasting[row], strict=True)
