@@ -1,12 +1,12 @@
 """The hardware configuration of a rig: signal chain, channels, limits, linear model, knobs set by hand.
 
-`load_rig` reads it from TOML; the table ``[virtual]`` makes it a simulated one. `RigModel` is the chain
-from a volt at the generator's terminal to amplifier, coil, table and the specimen that pushes back on it
-(`vibench.sim.shaker`), without clipping and the table's stops. `KnobSheet` is what an operator confirmed
-by hand. Only values and arithmetic: nothing here opens an instrument or knows a plan. See
-docs/hardware.md.
+`load_rig` reads the configuration from TOML; with the table ``[virtual]`` the rig is simulated. `RigModel`
+describes the chain from voltage at the generator's terminal to amplifier, coil, table and specimen, which
+acts back on the table (`vibench.sim.shaker`), without clipping and the table's stops. `KnobSheet` lists the
+manual settings that an operator has confirmed. This package opens no instrument and does not depend on plans.
+See docs/hardware.md.
 
-The peak acceleration of the table [m/s2] for one volt at the generator, at 260 Hz:
+Peak acceleration of the table [m/s2] per volt at the generator, at 260 Hz:
 
 >>> from vibench.acquisition import shipped
 >>> from vibench.acquisition.rig import BaseQuantity, RigModel, channels_of, load_rig

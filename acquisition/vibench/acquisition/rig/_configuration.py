@@ -1,4 +1,4 @@
-"""Hardware configuration: the chain from generator to converter, with its limits and manual settings."""
+"""Hardware configuration: the chain from generator to converter, with limits and manual settings."""
 
 import os
 from datetime import date
@@ -36,52 +36,52 @@ from ._sensors import (
 TOKEN_KEY = "vibench-token"  # noqa: S105 - a name, not a password
 """Metadata key of the token in a gRPC call."""
 TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"  # noqa: S105 - as above
-"""Environment variable of the token; other users can read a command line."""
+"""Environment variable for the token; a command line would be visible to other users."""
 
 
 def given_token() -> str:
-    """Return the token from the environment; empty if none is needed."""
+    """Return the token from the environment; empty if no token is set."""
     return os.environ.get(TOKEN_VARIABLE, "")
 
 
 USUAL_GRID_RATE_HZ = 102_400.0
-"""Default steps per second of the simulated analogue world."""
+"""Default number of computed steps per second on the virtual rig (its grid)."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""Coarsest grid: the base moves by 0.8 % too little at `WATCHED_HZ`, see `level_error`."""
+"""Smallest number of steps per second; the base motion is then 0.8 % too small at `WATCHED_HZ`."""
 WATCHED_HZ = 500.0
-"""The highest resonance of the specimen, and the top of the paper's sines."""
+"""Frequency at which the grid is judged: highest resonance of the specimen and top of the paper's range."""
 _MEASURED = 0.55
-"""Factor of `level_error`, from a comparison with 409,600 steps per second at 60 Hz to 1 kHz."""
+"""Factor in `level_error`, from a comparison with 409,600 steps per second between 60 Hz and 1 kHz."""
 LARGEST_LEVEL_ERROR = 0.01
-"""Largest level error of a plan on a coarser grid than the default."""
+"""Largest allowed level error of a plan on a grid coarser than the default."""
 STEPS_PER_SAMPLE = 2
-"""Fewest steps per sample on a coarser grid, for the transition band of the converter's filter."""
+"""Smallest number of steps per sample on a coarser grid, due to the converter filter's transition band."""
 
 
 class VirtualConfig(FrozenModel):
-    """Properties that only a simulated rig needs."""
+    """Properties needed only by a virtual rig."""
 
     seed: int = Field(ge=0)
     pace: Literal["free", "wall"] = "free"
     """``"free"``: as fast as possible. ``"wall"``: ``speed`` times real time."""
     speed: PositiveFloat = 1.0
     grid_rate_hz: float = USUAL_GRID_RATE_HZ
-    """Computed steps per second: 12.8 to 102.4 kHz, and at least twice the sample rate. A coarser grid is
-    faster and less exact (docs/decisions/0006-virtual-rig.md)."""
+    """Number of computed steps per second: 12,800 to 102,400, and at least twice the sample rate. A coarser
+    grid is faster but less accurate (docs/decisions/0006-virtual-rig.md)."""
     generator_clock_ppm: float = Field(ge=-200, le=200)
     converter_clock_ppm: float = Field(ge=-200, le=200)
     generator_noise_v: NonNegativeFloat
-    """White, rms from zero to 25.6 kHz, at the terminal while the output is on [V]."""
+    """White noise at the terminal while the output is on, rms from 0 to 25.6 kHz [V]."""
     amplifier_noise_v: NonNegativeFloat
-    """White, rms in the same band, at the output [V]."""
+    """White noise at the amplifier's output, rms from 0 to 25.6 kHz [V]."""
     accelerometer_noise_m_per_s2: NonNegativeFloat
-    """White, rms in the same band [m/s2]."""
+    """White noise of the accelerometer, rms from 0 to 25.6 kHz [m/s2]."""
     vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
     vibrometer_dropouts_per_s: NonNegativeFloat
     faults: str | None = None
-    """Path of a script of faults, relative to this file's folder; see docs/campaigns.md."""
+    """Path of a fault script, relative to the folder of this file; see docs/campaigns.md."""
     converter_noise_v: NonNegativeFloat
-    """rms of each input, at any sample rate [V]."""
+    """Noise of each converter input, rms at any sample rate [V]."""
 
     @field_validator("grid_rate_hz")
     @classmethod
@@ -97,23 +97,23 @@ class VirtualConfig(FrozenModel):
 
 
 def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
-    """Return the largest relative shortfall of the base motion in a sine.
+    """Return the largest relative error by which the base motion of a sine is too small.
 
-    Averaging and holding the drive over a step causes (pi f h)^2 / 3. Extrapolating the specimen's force on
-    the table over the step causes the rest. The specimen's response to the base is exact.
+    Averaging and holding the drive over a step h contributes (pi f h)^2 / 3. The extrapolation of the
+    specimen's force on the table over the step contributes the rest. The specimen's response is exact.
     """
     return _MEASURED * (pi * frequency_hz / grid_rate_hz) ** 2
 
 
 def highest_carried_hz(grid_rate_hz: float) -> float | None:
-    """Return the highest frequency with correct levels on a grid; None for no limit, on the default grid."""
+    """Return the highest frequency with correct levels on a grid [Hz]; None (no limit) on the default one."""
     if grid_rate_hz >= USUAL_GRID_RATE_HZ:
         return None
     return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
-    """Return a converter's fastest rate on a grid; None for no limit, on the default grid."""
+    """Return the highest sample rate on a grid [samples/s]; None (no limit) on the default grid."""
     return None if grid_rate_hz >= USUAL_GRID_RATE_HZ else grid_rate_hz / STEPS_PER_SAMPLE
 
 
@@ -121,47 +121,47 @@ class OutputUse(StrEnum):
     """Excitations that an analogue output plays; the function generator plays the others."""
 
     STREAMS = "streams"
-    """Only signals that do not repeat, and so do not fit into a generator."""
+    """Only signals that do not repeat and therefore do not fit into a generator's memory."""
     TONES_AND_STREAMS = "tones_and_streams"
-    """Sines too: dwells, steps and sweeps, for a bench with a permanently connected output."""
+    """Also sines (dwells, steps and sweeps), for a bench with a permanently connected output."""
 
 
 class OutputConfig(FrozenModel):
-    """An analogue output that plays into the amplifier signals too long for a function generator.
+    """An analogue output that drives the amplifier with signals too long for a function generator.
 
-    It plays the voltage of the generator's terminal at the same setting, so ``amplitude_vpp`` means the
-    same for both. Connect only one of the two to the amplifier: even at zero volts, an output of 50 ohm
-    in parallel would halve the generator's voltage. The check at low level before every run finds a wrong
-    connection.
+    The output plays the voltage that a generator's terminal has at the same setting, so ``amplitude_vpp``
+    has the same meaning for both. Connect only one of the two to the amplifier: even at 0 V, an output of
+    50 ohm in parallel would halve the generator's voltage. The check at low level before every run detects
+    a wrong connection.
     """
 
     physical: str = Field(pattern=r"^ao\d+$")
-    """Name on the device: ``"ao0"``."""
+    """Name of the output on the device: ``"ao0"``."""
     plays: OutputUse = OutputUse.STREAMS
     device: str | None = None
-    """The output's module in the driver, if it is not the converter's; both must be able to share a start
-    trigger, as modules of one chassis can."""
+    """Device name of the output's module, if it differs from the converter's. Both must be able to share a
+    start trigger, as modules in one chassis can."""
     limit_v: PositiveFloat = Field(le=10.0)
-    """Largest allowed voltage of either sign [V]."""
+    """Largest allowed magnitude of the voltage [V]."""
     sample_rate_hz: PositiveFloat
-    """Rate of the output, which the hardware must support exactly."""
-    # Three blocks of a run at least: one plays, one is ready, and one is being written.
+    """Sample rate of the output, which the hardware must support exactly [samples/s]."""
+    # At least three blocks of a run: one is played, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
-    """Buffered time [s]: the longest tolerated pause of this computer, and the delay of an early ramp
-    down."""
+    """Time written in advance [s]. It is the longest tolerated pause of this computer, and the delay of an
+    early ramp down."""
     source: str = Field(min_length=1)
-    """Source of limit and rate."""
+    """Source of ``limit_v`` and ``sample_rate_hz``."""
 
 
 _LARGEST = 1e250
-"""Largest value of a shaker, in SI units; products of several must not overflow."""
+"""Largest value of a shaker parameter, in SI units; products of several must not overflow."""
 HIGH_Z: Literal["high-z"] = "high-z"
 SOURCE_OHM = 50.0
 """Output impedance of a function generator."""
 
 
 Options = dict[str, str | int | float]
-"""Settings of a plug-in; only the plug-in checks them."""
+"""Settings of a plug-in, checked only by the plug-in."""
 
 
 class GeneratorConfig(FrozenModel):
@@ -172,21 +172,21 @@ class GeneratorConfig(FrozenModel):
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
     """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver; the shipped drivers have none."""
+    """Further settings of the driver; the drivers of this package have none."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
     load_ohm: Literal["high-z"] | PositiveFloat = HIGH_Z
-    """Load set at the generator; its display shows volts into this load."""
+    """Load setting of the generator [ohm]; its display shows the voltage for this load."""
     connected_ohm: PositiveFloat
-    """Connected input impedance: the amplifier's [ohm]."""
+    """Impedance connected to the output: the input impedance of the amplifier [ohm]."""
     amplitude_limit_vpp: PositiveFloat
     """Largest allowed setting, peak to peak [V]."""
     settle_s: NonNegativeFloat = 0.0
     """Pause that the instrument needs after each command [s]."""
     dead_man_s: float | None = Field(default=None, ge=0.2, le=60.0)
-    """Length of bursts [s]: a sine plays as bursts that the run must trigger, so the drive ends with a
-    burst if this computer hangs. docs/safety.md describes the effect on the signal."""
+    """Length of a burst [s]. A sine is played in bursts that the run must trigger; if this computer hangs,
+    the drive ends with the burst. docs/safety.md describes the effect on the signal."""
 
     @model_validator(mode="after")
     def _has_bursts(self) -> Self:
@@ -198,22 +198,22 @@ class GeneratorConfig(FrozenModel):
 
     @property
     def shown_fraction(self) -> float:
-        """Displayed voltage for the declared load, relative to the open-circuit voltage."""
+        """Displayed voltage for the load setting, over the open-circuit voltage."""
         ohm = inf if self.load_ohm == HIGH_Z else self.load_ohm
         return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
     def terminal_factor(self) -> float:
-        """Return volts at the terminal per displayed volt: 2 for a setting of 50 ohm without a load."""
+        """Return the terminal voltage per displayed volt: 2 for a load setting of 50 ohm without a load."""
         return self.connected_ohm / (self.connected_ohm + SOURCE_OHM) / self.shown_fraction
 
 
 class AmplifierConfig(FrozenModel):
-    """The power amplifier. Its settings cannot be read: the operator confirms them."""
+    """The power amplifier. Its settings cannot be read back, so the operator confirms them."""
 
     model: str
     serial: str = ""
     gain_db: float = Field(ge=-60, le=60)
-    """Voltage gain at the position of the knob [dB]."""
+    """Voltage gain at the present position of the knob [dB]."""
     clip_v: PositiveFloat
     """Largest output voltage, peak [V]."""
     current_limit_a: Sourced
@@ -233,7 +233,7 @@ class AmplifierConfig(FrozenModel):
 
     @property
     def gain(self) -> float:
-        """Output volts per input volt."""
+        """Output voltage per input voltage [V/V]."""
         return float(10 ** (self.gain_db / 20))
 
 
@@ -248,7 +248,7 @@ class ShakerLimits(FrozenModel):
 
 
 class ShakerConfig(FrozenModel):
-    """An electrodynamic shaker as a coil and a suspended mass, with its fixture."""
+    """An electrodynamic shaker, modelled as a coil and a suspended mass, with its fixture."""
 
     model: str
     serial: str = ""
@@ -259,7 +259,7 @@ class ShakerConfig(FrozenModel):
     suspension_damping_ns_per_m: PositiveFloat
     force_constant_n_per_a: PositiveFloat
     coil_resistance_ohm: PositiveFloat
-    """Coil and cable [ohm]."""
+    """Resistance of coil and cable [ohm]."""
     coil_inductance_h: PositiveFloat
     source: str = Field(min_length=1)
     limits: ShakerLimits
@@ -277,40 +277,40 @@ class ChannelConfig(FrozenModel):
 
     role: Role
     physical: str
-    """Name on the device: ``"ai0"``."""
+    """Name of the input on the device: ``"ai0"``."""
     range_v: PositiveFloat
     coupling: Literal["AC", "DC"]
     terminal: Literal["default", "pseudo_differential", "differential", "single_ended"] = "default"
     iepe_current_a: NonNegativeFloat = 0.0
     attenuation: PositiveFloat = 1.0
-    """Voltage divider in front of the input: volts at the source per volt at the input."""
+    """Voltage divider in front of the input: source voltage per input voltage [V/V]."""
     sensor: str | None = None
-    """Name of an entry point of ``vibench.sensors``; absent: the default of the role."""
+    """Name of an entry point of ``vibench.sensors``; if absent, the default of the role."""
     options: Options = Field(default_factory=dict)
     """Further settings of the sensor."""
     calibrated: date
     """Date of the converter's last calibration."""
     uncertainty: StatedUncertainty | None = None
-    """Uncertainty of the voltage, divider included; absent: not stated."""
+    """Uncertainty of the voltage, including the divider; absent if not stated."""
 
 
 class DaqConfig(FrozenModel):
-    """The converter."""
+    """The analogue-to-digital converter with its channels."""
 
     driver: str = "daqmx"
-    """Name of an entry point of ``vibench.digitizers``; also of ``vibench.outputs`` for an output."""
+    """Name of an entry point of ``vibench.digitizers``, and of ``vibench.outputs`` for an output."""
     options: Options = Field(default_factory=dict)
     """Further settings of the driver."""
     product: str
     device: str
     """Device name in the driver: ``"cDAQ1Mod1"``."""
     server: str | None = None
-    """Address of a gRPC device server, ``"host:port"``; absent: a converter on this computer."""
+    """Address of a gRPC device server, ``"host:port"``; if absent, the converter is on this computer."""
     sample_rate_hz: PositiveFloat
-    """Requested rate; the actual rate is read back and stored as well."""
+    """Requested sample rate [samples/s]; the actual rate is read back and stored too."""
     buffer_s: PositiveFloat = 10.0
     clock_ppm: Sourced | None = None
-    """Largest error of the sample clock [parts per million]; absent: not stated."""
+    """Largest error of the sample clock [parts per million]; absent if not stated."""
     channels: tuple[ChannelConfig, ...] = Field(min_length=1)
     output: OutputConfig | None = None
     """Analogue output for streamed noise; optional."""
@@ -335,62 +335,62 @@ class DaqConfig(FrozenModel):
 
 
 class SpecimenConfig(SpecimenTable):
-    """The specimen on the shaker: a named one, and the values that differ from it."""
+    """The specimen on the shaker: a named specimen, and values that differ from it."""
 
     amplitude_limit_m: Sourced
-    """Largest displacement of a mass that the springs survive."""
+    """Largest displacement of a mass that does not damage the springs [m]."""
 
 
 class LoopInput(StrEnum):
-    """Channels that a controller samples, in the order of its inputs."""
+    """Channels sampled by a real-time controller, in the order of its inputs."""
 
     BASE = "base_acceleration"
     M0 = "m0_velocity"
 
 
 class ControllerConfig(FrozenModel):
-    """A real-time controller: sensors of base and m0 at its inputs, its output at the amplifier's input.
+    """A real-time controller with base and m0 sensors at its inputs and the amplifier at its output.
 
-    While it plays, its output replaces the generator's.
+    While the controller plays, its output replaces the output of the generator.
     """
 
     driver: str = "lines"
     """Name of an entry point of ``vibench.controllers``."""
     resource: str = Field(default="", pattern=r"^$|^TCPIP.*::SOCKET$")
-    """VISA resource name of its socket; empty on a virtual rig."""
+    """VISA resource name of the controller's socket; empty on a virtual rig."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     options: Options = Field(default_factory=dict)
     """Further settings of the driver."""
     rate_hz: float = Field(ge=1_000, le=25_600)
-    """Samples per second; 1 to 20 kHz are usual."""
+    """Sample rate of the controller [samples/s]; 1 to 20 kHz are usual."""
     latency_s: float = Field(ge=0, le=5e-3)
     """Measured time from a sample to the resulting voltage [s]."""
     limit_v: PositiveFloat
-    """Largest output, peak [V]."""
+    """Largest output voltage, peak [V]."""
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
-    """Time without a message after which it ramps down by itself [s]."""
+    """Time without a message after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """Only input of a law that is limited to proportional and derivative parts; absent: any linear law."""
+    """Only input, if the control law can only be proportional-derivative; absent for any linear law."""
     source: str = Field(min_length=1)
-    """Source of rate, latency and limit."""
+    """Source of sample rate, latency and limit."""
 
     @property
     def loop_time_s(self) -> float:
-        """Time from a motion to the resulting drive [s]."""
-        # Averaging over a sample delays by half a sample, and holding the voltage by one.
+        """Delay from a motion to the resulting drive [s]."""
+        # Averaging over a sample adds a delay of half a sample; holding the voltage adds one sample.
         return self.latency_s + 1.5 / self.rate_hz
 
 
 class Rig(FrozenModel):
-    """A whole bench, from its configuration file."""
+    """A whole bench, as described by its configuration file."""
 
     name: str = Field(min_length=1)
     generator: GeneratorConfig
     amplifier: AmplifierConfig
     shaker: ShakerConfig
     vibrometer: VibrometerConfig | None = None
-    """Sensor of the channel ``m0_velocity``, in a scan of another mass; absent if another sensor shows m0."""
+    """Sensor of ``m0_velocity``, or of another mass in a scan; absent if another sensor measures m0."""
     accelerometer: AccelerometerConfig
     """Sensor of the channel ``base_acceleration``."""
     sensors: dict[Role, TransducerConfig] = Field(default_factory=dict)
@@ -401,9 +401,9 @@ class Rig(FrozenModel):
     """Real-time controller that can replace the generator; optional."""
     calibration_valid_days: PositiveInt = 730
     check_valid_h: PositiveFloat = 12.0
-    """Time after a passed bench check during which the bench can be armed [h]."""
+    """Time for which a passed bench check allows the bench to be armed [h]."""
     virtual: VirtualConfig | None = None
-    """Present if all instruments are simulated."""
+    """Settings of a virtual rig, whose instruments are all simulated; absent for a real rig."""
 
     @model_validator(mode="after")
     def _has_sensors(self) -> Self:
@@ -429,7 +429,7 @@ class Rig(FrozenModel):
         return self
 
     def sensor(self, role: Role) -> SensorConfig | None:
-        """Return the sensor of a channel; None for a voltage, or if none is described."""
+        """Return the sensor of a channel; None for a voltage, or if no sensor is described."""
         described = {Role.BASE_ACCELERATION: self.accelerometer, Role.M0_VELOCITY: self.vibrometer}
         is_scanned = role in SCANNED_ROLES and Role.M0_VELOCITY not in self._roles
         return described.get(role, self.sensors.get(role, self.vibrometer if is_scanned else None))
@@ -437,7 +437,7 @@ class Rig(FrozenModel):
     def aimed(self, role: Role) -> Self:
         """Return the rig with the vibrometer's beam on the mass of ``role``, such as ``m2_velocity``.
 
-        Raises ConfigurationError when no channel records the vibrometer, or another one records that mass.
+        Raises ConfigurationError when no channel records the vibrometer or another sensor measures that mass.
         """
         if Role.M0_VELOCITY not in self._roles:
             raise ConfigurationError(
@@ -461,7 +461,7 @@ class Rig(FrozenModel):
 
     @property
     def response(self) -> Role | None:
-        """Channel that shows the motion of m0, the first of RESPONSE_ROLES; None if there is none."""
+        """Channel that measures the motion of m0: the first of RESPONSE_ROLES on this rig, or None."""
         return next((role for role in RESPONSE_ROLES if role in self._roles), None)
 
     @model_validator(mode="after")
@@ -491,12 +491,12 @@ class Rig(FrozenModel):
 
     @property
     def plays_back(self) -> bool:
-        """Whether a recording replaces the instruments."""
+        """Whether a recording is played back instead of using instruments."""
         return self.daq.driver == "file"
 
     @property
     def knobs(self) -> tuple[Knob, ...]:
-        """All manual settings."""
+        """All manual settings, which an operator must confirm."""
         amplifier, vibrometer = self.amplifier, self.vibrometer
         knobs = (
             Knob(instrument=amplifier.model, setting="gain", value=f"{amplifier.gain_db:g} dB"),

@@ -1,4 +1,4 @@
-"""Manual settings, which the operator confirms, and calibrations; both are stored in every recording."""
+"""Manual settings (knobs) that the operator confirms, and calibrations; every recording contains both."""
 
 import sys
 from collections.abc import Callable
@@ -20,14 +20,14 @@ from ._sensors import Role, sensor_table
 
 
 class Sensor(Protocol):
-    """Entry point of ``vibench.sensors``: returns a sensor's facts, and may read its instrument."""
+    """Entry point of ``vibench.sensors``: returns the properties of a sensor; may query its instrument."""
 
     def __call__(self, rig: Rig, config: ChannelConfig, /) -> SensorFacts:
-        """Return the facts of the sensor in front of an input."""
+        """Return the properties of the sensor at an input."""
 
 
 def sensor_name(config: ChannelConfig) -> str:
-    """Return the plug-in of a channel's sensor: the configured one, or the default of its role."""
+    """Return the name of the plug-in for a channel's sensor: as configured, or the default of its role."""
     if config.sensor is not None:
         return config.sensor
     table = sensor_table(config.role)
@@ -35,10 +35,10 @@ def sensor_name(config: ChannelConfig) -> str:
 
 
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Return the facts of the sensor in front of an input.
+    """Return the properties of the sensor at an input.
 
-    Raises ConfigurationError when no package offers it, or it measures another quantity than the channel;
-    BrokenPromise when another package's sensor fails or returns impossible facts.
+    Raises ConfigurationError when no package provides the sensor, or it measures another quantity than the
+    channel. Raises BrokenPromise when the plug-in of a sensor fails or returns impossible values.
     """
     name = sensor_name(config)
     facts = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)
@@ -52,7 +52,7 @@ def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 
 def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Return the facts of a wire: volts, divided by the channel's attenuation."""
+    """Return the properties of a wire as a sensor: one volt per volt, before the channel's attenuation."""
     if config.role is Role.AMPLIFIER_VOLTAGE:
         return SensorFacts(
             "voltage", "V", 1.0, float("inf"), "amplifier output, by wire", rig.amplifier.serial
@@ -61,9 +61,9 @@ def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 
 def transducer(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Return the sensor that the hardware configuration describes for a channel.
+    """Return the properties of a channel's sensor, as described in the hardware configuration.
 
-    Raises ConfigurationError when the configuration describes no sensor for it.
+    Raises ConfigurationError when the configuration describes no sensor for the channel.
     """
     role, sensor = config.role, rig.sensor(config.role)
     if sensor is None:
@@ -84,19 +84,19 @@ def transducer(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 @dataclass(frozen=True)
 class Channel:
-    """One recorded quantity, and the conversion of its volts to units."""
+    """One recorded quantity, and its conversion from volts to physical units."""
 
     role: Role
     physical: str
-    """Full name at the converter: ``"cDAQ1Mod1/ai2"``."""
+    """Full name of the input: ``"cDAQ1Mod1/ai2"``."""
     quantity: str
-    """``"voltage"``, ``"acceleration"``, ``"force"``."""
+    """Physical quantity: ``"voltage"``, ``"acceleration"``, ``"force"``."""
     unit: str
-    """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
+    """Unit as UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     units_per_volt: float
     """Physical units per volt at the converter's input."""
     full_scale_v: float
-    """The smaller of the sensor's largest output and the input's range [V]."""
+    """Largest usable voltage at the input: the smaller of the sensor's largest output and the range [V]."""
     range_v: float
     coupling: str
     iepe_current_a: float
@@ -132,31 +132,31 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# A sheet covers a campaign of a day and a night; after that, settings may have changed.
+# A confirmation is valid for a campaign of a day and a night; later, settings may have changed.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 
 
 class KnobSheet(FrozenModel):
-    """Settings that an operator has looked at, with name and time."""
+    """Manual settings that an operator has confirmed, with name and time."""
 
     operator: str = Field(min_length=1)
-    """Name, or the way of confirmation."""
+    """Name of the operator, or the means of confirmation."""
     confirmed: AwareDatetime
     knobs: tuple[Knob, ...]
 
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Ask about the settings and return the sheet; raises CheckFailed when one of them is wrong."""
+"""Function that has the settings confirmed and returns the sheet; raises CheckFailed if one is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
-    """Confirm the settings of a virtual rig, which always follow its configuration."""
+    """Return the sheet of a virtual rig, whose settings always agree with its configuration."""
     return KnobSheet(operator="simulated", confirmed=datetime.now(UTC), knobs=knobs)
 
 
 def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
-    """Return a function that asks one question about each setting.
+    """Return a function that confirms each setting by a question.
 
     ``ask`` shows a question and returns the answer, as ``input`` does; ``operator`` is the name to record.
     """
@@ -175,9 +175,9 @@ def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
 
 
 def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
-    """Ask at the terminal; raises CheckFailed when there is none, CheckStopped at a Ctrl-C.
+    """Ask at the terminal; raises CheckFailed if there is no terminal, CheckStopped on Ctrl-C.
 
-    An unattended program uses `confirm_by_sheet`.
+    Unattended programs use `confirm_by_sheet`.
     """
     if not sys.stdin.isatty():
         wanted = "; ".join(_shown(knob) for knob in knobs)
@@ -196,8 +196,8 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
     """Return a function that accepts an earlier confirmation if it is recent and has the same settings.
 
-    ``path`` is a sheet from `save_knob_sheet`; ``valid`` is how long it counts. The function raises
-    CheckFailed when the sheet is older or has other settings.
+    ``path`` is a sheet from `save_knob_sheet`; ``valid`` is the time for which the sheet is valid. The
+    function raises CheckFailed when the sheet is older or has other settings.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -220,7 +220,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Save a sheet, replacing an older one; raises ConfigurationError when the file is not a sheet."""
+    """Save a sheet, replacing an older sheet; raises ConfigurationError when ``path`` is another file."""
     if path.exists():
         load_knob_sheet(path)
     knobs = "".join(
@@ -239,7 +239,7 @@ def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
 
 
 def load_knob_sheet(path: Path) -> KnobSheet:
-    """Read a sheet; raises ConfigurationError with file, key and allowed values."""
+    """Return a saved sheet; raises ConfigurationError with file, key and allowed values."""
     return load_toml(path, KnobSheet)
 
 
@@ -259,12 +259,12 @@ class CalibrationRule(StrEnum):
     ENFORCED = auto()
     """The bench does not open."""
     WAIVED = auto()
-    """The bench opens; every recording contains the dates."""
+    """The bench opens; every recording contains the calibration dates."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration and its age."""
+    """A calibration of a sensor or an input, and its age."""
 
     what: str
     calibrated: date
@@ -273,17 +273,17 @@ class Calibration:
 
     @property
     def is_to_come(self) -> bool:
-        """Whether its date is in the future, which is a mistake."""
+        """Whether the date is in the future, which is an error."""
         return self.age_days < 0
 
     @property
     def is_valid(self) -> bool:
-        """Whether it is valid today; a future date is not."""
+        """Whether the calibration is valid today; a date in the future is invalid."""
         return 0 <= self.age_days <= self.valid_days
 
     @property
     def advice(self) -> str:
-        """Advice about an invalid calibration."""
+        """What to do about an invalid calibration."""
         if self.is_to_come:
             return "the date is in the future: enter the one on the certificate in the configuration"
         return "have it calibrated, and enter the date in the configuration"
@@ -294,9 +294,9 @@ class Calibration:
 
 
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
-    """Return all calibrations of a rig: of every sensor with a date, and of every input.
+    """Return the calibrations of a rig: of every sensor with a calibration date, and of every input.
 
-    Their ages are counted up to ``today``.
+    The ages are counted up to ``today``.
     """
     channels = channels_of(rig)
     sensors = dict.fromkeys(
@@ -311,7 +311,7 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
 
 
 def check_calibrations(rig: Rig, today: date) -> None:
-    """Check all calibrations of a rig; raises CheckFailed, which names each one expired by ``today``."""
+    """Check all calibrations of a rig; raises CheckFailed with those that have expired by ``today``."""
     stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
     if stale:
         raise CheckFailed(

@@ -1,4 +1,4 @@
-"""Read hardware configurations, and find the drivers and fault scripts named in them."""
+"""Read hardware configurations, and find the drivers and fault scripts that they name."""
 
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -20,7 +20,7 @@ from ._configuration import GeneratorConfig, OutputConfig, Rig
 
 
 def load_rig(path: Path | str) -> Rig:
-    """Read a hardware configuration: a TOML file, or a shipped one by its name (``"virtual_rig"``).
+    """Return the rig in a TOML file, or a shipped rig by its name (``"virtual_rig"``).
 
     Raises ConfigurationError with file, key, given value and allowed values.
     """
@@ -33,7 +33,7 @@ def load_rig(path: Path | str) -> Rig:
 
 
 def _require_plug_ins(rig: Rig, path: Path) -> None:
-    """Refuse names that no installed package offers; reading a recording does not need them."""
+    """Refuse names of plug-ins that no installed package provides."""
     plug_ins = [
         ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
         ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
@@ -60,9 +60,9 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
 
 
 def with_faults(rig: Rig, script: Path) -> Rig:
-    """Return a virtual rig that plays a script of faults.
+    """Return a virtual rig in which the faults of ``script`` occur.
 
-    Raises ConfigurationError when the rig is a real one.
+    Raises ConfigurationError when the rig is real.
     """
     if rig.virtual is None:
         raise ConfigurationError(
@@ -75,15 +75,15 @@ def with_faults(rig: Rig, script: Path) -> Rig:
 
 
 class GeneratorDriver(Protocol):
-    """Entry point of ``vibench.generators``: usually a class with these two class methods."""
+    """Entry point of ``vibench.generators``, usually a class with these two class methods."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return the generator's abilities with this configuration, without opening it."""
+        """Return the capabilities of the generator with this configuration, without opening it."""
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open a generator with its output off, at its smallest amplitude.
+        """Open and return a generator with its output off and its smallest amplitude set.
 
-        Raises InstrumentError when no generator or another instrument answers; nothing stays open then.
+        Raises InstrumentError when no generator or another instrument responds; nothing stays open then.
         """
 
 
@@ -91,26 +91,26 @@ class DigitizerDriver(Protocol):
     """Entry point of ``vibench.digitizers``."""
 
     def open(self, rig: Rig) -> Digitizer:
-        """Reserve a converter with the channels of ``rig.daq``, and read each setting back."""
+        """Reserve a converter with the channels of ``rig.daq``, read each setting back, and return it."""
 
 
 class OutputDriver(Protocol):
-    """Entry point of ``vibench.outputs``; registered under the name of the digitizer that starts with it."""
+    """Entry point of ``vibench.outputs``, registered under the name of the digitizer driver."""
 
     def open(self, physical: str, config: OutputConfig, digitizer: Any) -> AnalogOutput:
-        """Set an output to zero volts and reserve it.
+        """Set an output to zero volts, reserve it and return it.
 
         Parameters
         ----------
         physical
-            Full name: ``"Dev1/ao0"``.
+            Full name of the output: ``"Dev1/ao0"``.
         digitizer
-            The digitizer that the driver of the same name has opened; both start together.
+            Digitizer opened by the driver of the same name; output and digitizer start together.
         """
 
 
 def generator_driver(config: GeneratorConfig) -> GeneratorDriver:
-    """Return the driver of a generator; raises ConfigurationError when it is not installed."""
+    """Return the driver of a generator; raises ConfigurationError if it is not installed."""
     return cast("GeneratorDriver", driver_of(PlugInKind.GENERATOR, config.driver, GeneratorDriver))
 
 

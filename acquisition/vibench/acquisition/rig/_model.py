@@ -1,4 +1,4 @@
-"""Linear model of the rig, from voltage at the generator's terminal to table and specimen."""
+"""Linear model of the rig, from the voltage at the generator's terminal to table and specimen."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,12 +16,12 @@ from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
-"""The current limiter's setting is the rms of the largest unlimited sine."""
+"""Peak over rms of a sine; the limiter's setting is the rms current of the largest unlimited sine."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
 class BaseQuantity(StrEnum):
-    """A quantity of the chain that has a limit."""
+    """A quantity of shaker or specimen that the model predicts."""
 
     AMPLIFIER_VOLTAGE = "amplifier_voltage"
     """Voltage at the amplifier's output [V]."""
@@ -36,7 +36,7 @@ class BaseQuantity(StrEnum):
     ACCELERATION = "acceleration"
     """Acceleration of the table [m/s2]."""
     AMPLITUDE = "amplitude"
-    """Amplitude of the specimen: displacement of m0 against the table [m]."""
+    """Amplitude of the specimen: displacement of m0 relative to the table [m]."""
     M0_DISPLACEMENT = "m0_displacement"
     """Absolute displacement of m0 [m]."""
     M0_VELOCITY = "m0_velocity"
@@ -59,7 +59,7 @@ _COLUMNS = {
     BaseQuantity.M0_ACCELERATION: (_M0, 2),
     BaseQuantity.P: (_P, 0),
 }
-"""Column of the linear motion, and the power of i omega by which it is multiplied."""
+"""Column of the linear motion for each quantity, and the power of i omega to multiply it by."""
 
 
 class OnTable(StrEnum):
@@ -67,17 +67,17 @@ class OnTable(StrEnum):
 
     SPECIMEN = "specimen"
     NOTHING = "nothing"
-    """Bare table, with a smooth response: for feedback, which measures the specimen's influence."""
+    """Bare table, whose response is smooth; used by feedback, which measures the specimen's influence."""
 
 
 @dataclass(frozen=True)
 class RigModel:
     """A rig from the generator's terminal to table and specimen, linear except for the specimen's stops.
 
-    Coil, table and specimen are solved together (`vibench.sim.shaker`): the specimen changes the table's
-    motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops are included
-    to first order. Not included: clipping, the current limiter, the table's stops and its axial resonance
-    above 15 kHz. Those belong to the virtual rig or to the check with the rig itself.
+    Coil, table and specimen are solved together (`vibench.sim.shaker`), because the specimen changes the
+    table's motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops are
+    included to first order. Clipping, the current limiter, the table's stops and its axial resonance above
+    15 kHz are not included; the virtual rig or a check on the real rig covers them.
     """
 
     rig: Rig
@@ -85,35 +85,35 @@ class RigModel:
 
     @property
     def gap_m(self) -> float:
-        """Smaller gap of m1 at rest [m]; infinite without stops."""
+        """Smaller of the two gaps of m1 at rest [m]; infinite without stops."""
         specimen = specimen_of(self.rig)
         without = self.on_table is OnTable.NOTHING or isinstance(specimen.contact, NoContact)
         return inf if without else min(specimen.gaps_m)
 
     def transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return ``quantity`` per volt at the generator's terminal, complex peaks, shape of ``frequency_hz``.
+        """Return complex ``quantity`` per volt at the generator's terminal, shape of ``frequency_hz``.
 
-        Valid without collisions; time dependence exp(+i omega t). Zero hertz is allowed: only a
-        direct-coupled amplifier deflects the table permanently.
+        Valid without collisions; the time dependence is exp(+i omega t). 0 Hz is allowed; only a
+        direct-coupled amplifier gives a static deflection of the table.
         """
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).per_volt)
 
     def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return `transfer` with m1 fixed to m2 by the stops."""
+        """Return the same as `transfer`, but with m1 fixed to m2 by the stops."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return peaks of ``quantity`` per metre of p that the stops cause, shape of ``frequency_hz``."""
+        """Return ``quantity`` per metre of p imposed by the stops, complex, shape of ``frequency_hz``."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
 
     def under_sines(
         self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
     ) -> ComplexArray:
-        """Return peaks of ``quantity`` under sines of peak voltage ``terminal_v`` [V], shape of both."""
+        """Return complex peaks of ``quantity`` at peak voltages ``terminal_v`` [V], shape of both inputs."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).under(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:
-        """Return the peak voltage at the terminal [V] for a table's acceleration [m/s2], shape (n,)."""
+        """Return the peak terminal voltage [V] for a peak table acceleration [m/s2], shape (n,)."""
         hz = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         base_m = np.asarray(acceleration, dtype=np.float64) / (2 * np.pi * hz) ** 2
         return self._motion(hz).volts_for(base_m, self.gap_m)
@@ -140,7 +140,7 @@ class RigModel:
 def _kept_motion(
     amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: bytes
 ) -> LinearMotion:
-    """Solve once for all quantities at the same frequencies."""
+    """Return the motion, solved once for all quantities at the same frequencies."""
     return linear_motion(amplifier, shaker, specimen, np.frombuffer(frequency_hz, dtype=np.float64))
 
 
@@ -150,12 +150,12 @@ def suspended_mass_kg(shaker: ShakerConfig) -> float:
 
 
 def specimen_of(rig: Rig) -> Specimen:
-    """Make the specimen that a rig describes."""
+    """Return the specimen that a rig describes."""
     return rig.specimen.specimen()
 
 
 def amplifier_of(rig: Rig) -> Amplifier:
-    """Return the values of a rig's amplifier for the simulation."""
+    """Return the amplifier of a rig as a model for the simulation."""
     amplifier = rig.amplifier
     return Amplifier(
         gain=amplifier.gain,
@@ -167,7 +167,7 @@ def amplifier_of(rig: Rig) -> Amplifier:
 
 
 def shaker_of(rig: Rig) -> Shaker:
-    """Return the values of a rig's shaker, fixture included, for the simulation."""
+    """Return the shaker of a rig, including its fixture, as a model for the simulation."""
     shaker = rig.shaker
     return Shaker(
         moving_mass_kg=suspended_mass_kg(shaker),

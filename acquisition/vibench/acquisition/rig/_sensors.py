@@ -14,7 +14,7 @@ from ..host.toml_file import FrozenModel
 
 _VOLTS = {"V": 1.0, "mV": 1e-3, "uV": 1e-6}
 _STANDARD_GRAVITY, _POUND_KG = 9.80665, 0.45359237
-"""Exact values by definition (NIST SP 811)."""
+"""Standard gravity [m/s2] and pound [kg], exact by definition (NIST SP 811)."""
 _UNITS = {
     "m s-2": {
         **dict.fromkeys(("m/s2", "m s-2", "ms-2"), 1.0),
@@ -33,7 +33,7 @@ _UNITS = {
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
 }
-"""Units of data sheets in SI units, by the unit of the recorded quantity."""
+"""Size in SI units of the units in data sheets, by the unit of the recorded quantity."""
 _EXAMPLES = {
     "m s-2": "'100 mV/g' or '10 mV/(m/s2)'",
     "m s-1": "'250 mm/s/V' or '4 V/(m/s)'",
@@ -41,17 +41,17 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest number of a sensitivity; a smaller one, or one above the inverse, is a typing error."""
+"""Smallest accepted number of a sensitivity, and inverse of the largest; others are typing errors."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
 
 def volts_per_unit(text: str, unit: str) -> float:
-    """Read a sensitivity with its unit, as data sheets print it [V per ``unit``].
+    """Return the sensitivity in ``text``, written as in a data sheet, converted to [V per ``unit``].
 
-    ``text`` is ``"100 mV/g"`` or ``"250 mm/s/V"``; ``unit`` is the recorded unit, such as ``"m s-2"``.
+    ``text`` is, for example, ``"100 mV/g"`` or ``"250 mm/s/V"``; ``unit`` is the recorded unit (``"m s-2"``).
 
-    Raises ValueError when the text has no number above 0 or another unit, or can be read in two ways.
+    Raises ValueError when the text has no number above 0, has another unit, or is ambiguous.
     """
     words = " ".join(text.split())
     number = _NUMBER.match(words)
@@ -79,20 +79,20 @@ def volts_per_unit(text: str, unit: str) -> float:
 def size_of_unit(name: str, unit: str) -> float | None:
     """Return the size of the unit ``name`` in ``unit``: 9.80665 for ``"g"`` in ``"m s-2"``.
 
-    None if ``name`` is a unit of another quantity, or one of the two is not known.
+    Return None if ``name`` is a unit of another quantity, or one of the two units is unknown.
     """
     volts = _VOLTS | dict.fromkeys(("v", "volt", "volts", "Volt", "Volts"), 1.0)
     return {**_UNITS, "V": volts}.get(unit, {}).get(_plain(name))
 
 
 def _plain(unit: str) -> str:
-    """Return a unit in one spelling of powers, products and spaces."""
+    """Return a unit with a uniform spelling of powers, products and spaces."""
     letters = unit.translate(_SIGNS).replace("**", "").replace("^", "").replace("*", " ")
     return re.sub(r"\s*([/()])\s*", r"\1", letters).strip()
 
 
 class Sourced(FrozenModel):
-    """A value and its source, so that nobody mistakes an assumption for a data sheet."""
+    """A value and its source, to tell assumptions from values of a data sheet."""
 
     value: PositiveFloat
     source: str = Field(min_length=1)
@@ -102,9 +102,9 @@ class StatedUncertainty(FrozenModel):
     """Relative uncertainty of a sensitivity, from a certificate or a data sheet."""
 
     relative: float = Field(gt=0.0, lt=1.0)
-    """Expanded uncertainty over the value: 0.01 for 1 %."""
+    """Expanded uncertainty over the value; 0.01 means 1 %."""
     coverage_factor: PositiveFloat = 2.0
-    """Expanded over standard uncertainty: 2 on most certificates, 1.73 for uniform bounds."""
+    """Expanded over standard uncertainty; 2 on most certificates, 1.73 for uniform bounds."""
     source: str = Field(min_length=1)
     """Certificate with its number, or data sheet."""
 
@@ -123,52 +123,52 @@ class SensorConfig(FrozenModel):
     model: str
     serial: str = ""
     full_scale_v: PositiveFloat
-    """Largest output, peak [V]."""
+    """Largest output voltage, peak [V]."""
     bandwidth_hz: PositiveFloat | None = None
-    """Upper -3 dB frequency, first order [Hz]; absent: far above the measured band."""
+    """Upper -3 dB frequency, first order [Hz]; if absent, far above the measured band."""
     resonance_hz: PositiveFloat | None = None
-    """Mounted resonance [Hz]; absent: far above the measured band."""
+    """Mounted resonance frequency [Hz]; if absent, far above the measured band."""
     delay_s: NonNegativeFloat = 0.0
-    """Signal delay of its electronics, bandwidth included [s]; the analysis corrects the phase for it."""
+    """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects the phase."""
     iepe: Literal["yes", "no"] = "no"
-    """Whether the input supplies it with current."""
+    """Whether the input supplies the sensor with a constant current."""
     calibrated: date
     uncertainty: StatedUncertainty | None = None
-    """Uncertainty of the calibration; absent: not stated, and every result reports that."""
+    """Uncertainty of the calibration; if absent, every result reports that none was stated."""
     alignment_deg: Sourced | None = None
-    """Largest angle between sensitive axis, or beam, and motion [degree]."""
+    """Largest angle between the motion and the sensitive axis, or the laser beam [degrees]."""
     noise_per_rthz: Sourced | None = None
-    """Spectral density of its noise [SI unit per root hertz]; absent: not stated."""
+    """Spectral density of the sensor noise [SI unit per root hertz]; absent if not stated."""
 
     @property
     def name(self) -> str:
-        """Name in results."""
+        """Name of the sensor in results."""
         return self.model
 
     @abstractmethod
     def units_per_volt(self, unit: str) -> float:
-        """Return SI units of the quantity per volt; ``unit`` is the channel's."""
+        """Return the measured quantity per volt, in ``unit``, the SI unit of the channel."""
 
 
 class TransducerConfig(SensorConfig):
-    """Any other sensor: a table such as ``[sensors.m0_acceleration]``."""
+    """Any sensor other than accelerometer and vibrometer, from a table ``[sensors.m0_acceleration]``."""
 
     sensitivity: str
-    """With the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
+    """Sensitivity with the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
 
     def units_per_volt(self, unit: str) -> float:
-        """Return SI units per volt; raises ValueError when the sensitivity has another unit."""
+        """Return the quantity in ``unit`` per volt; raises ValueError if the sensitivity has another unit."""
         return 1 / volts_per_unit(self.sensitivity, unit)
 
 
 class VibrometerConfig(SensorConfig):
-    """The laser vibrometer. The operator sets range and filters by hand, and confirms them."""
+    """The laser vibrometer. The operator sets range and filters manually, and confirms the settings."""
 
     decoder: str
     range_mm_per_s_per_v: Annotated[
         PositiveFloat, BeforeValidator(_velocity_range, json_schema_input_type=PositiveFloat | str)
     ]
-    """Decoder range [mm/s per volt], or text with another unit: ``"4 V/(m/s)"``."""
+    """Velocity range of the decoder [mm/s per volt], or text with another unit: ``"4 V/(m/s)"``."""
     bandwidth_hz: PositiveFloat
     tracking_filter: Literal["off", "fast", "medium", "slow"] = "off"
     delay_s: NonNegativeFloat
@@ -176,11 +176,11 @@ class VibrometerConfig(SensorConfig):
 
     @property
     def name(self) -> str:
-        """Name in results, with that of the decoder."""
+        """Name of the sensor in results: vibrometer and decoder."""
         return f"{self.model} {self.decoder}"
 
     def units_per_volt(self, unit: str) -> float:
-        """Return the range [m/s per volt]."""
+        """Return the velocity per volt [m/s per volt]."""
         del unit
         return self.range_mm_per_s_per_v * 1e-3
 
@@ -196,13 +196,13 @@ class AccelerometerConfig(SensorConfig):
     iepe: Literal["yes", "no"]
 
     def units_per_volt(self, unit: str) -> float:
-        """Return the inverse of the sensitivity [m/s2 per volt]."""
+        """Return the acceleration per volt [m/s2 per volt]."""
         del unit
         return 1 / self.sensitivity_v_per_m_per_s2
 
 
 class Role(StrEnum):
-    """Place and quantity that a channel records; the name of its dataset.
+    """Place and quantity that a channel records; also the name of the dataset in the recording.
 
     ``base_force`` is the force of the shaker's table on everything mounted on it.
     """
@@ -225,17 +225,17 @@ class Role(StrEnum):
 
     @property
     def place(self) -> str:
-        """``"base"``, ``"m0"``."""
+        """Place of the measurement: ``"base"``, ``"m0"``."""
         return self.value.partition("_")[0]
 
     @property
     def quantity(self) -> str:
-        """``"voltage"``, ``"acceleration"``."""
+        """Measured quantity: ``"voltage"``, ``"acceleration"``."""
         return self.value.partition("_")[2]
 
     @property
     def unit(self) -> str:
-        """UDUNITS text: ``"m s-2"``."""
+        """SI unit as UDUNITS text: ``"m s-2"``."""
         return UNIT_OF_QUANTITY[self.quantity]
 
 
@@ -246,14 +246,14 @@ UNIT_OF_QUANTITY = {
     "velocity": "m s-1",
     "displacement": "m",
 }
-"""UDUNITS text, by the quantity of a channel."""
+"""SI unit as UDUNITS text, by the quantity of a channel."""
 RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
-"""Channels that show the motion of m0; the first one of a rig is used."""
+"""Channels that measure the motion of m0; the first of them in this list is used."""
 SCANNED_ROLES = (Role.M0_VELOCITY, Role.M1_VELOCITY, Role.M2_VELOCITY)
-"""Channels that can show the vibrometer in a scan."""
+"""Channels under which a scan can record the vibrometer."""
 _TABLES: Mapping[str, str] = {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
 
 
 def sensor_table(role: str) -> str:
-    """Return the table of a hardware configuration that describes the sensor of channel ``role``."""
+    """Return the name of the configuration table that describes the sensor of the channel ``role``."""
     return _TABLES.get(role, f"sensors.{role}")
