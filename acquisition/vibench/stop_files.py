@@ -1,9 +1,9 @@
-"""Stop requests written as files for a program that drives, and how their sender learns the result.
+"""Stop requests as files for a program that drives a bench, and the result reported to their sender.
 
-A file ``PID.START.stop-LEVEL`` in the folder of engines is a stop for the process of that number that began
-then. The program renames it to ``.taken-LEVEL`` when it obeys, touches it while it ramps down, and removes it
-when its output was read back as off. Only the standard library is imported here, and little of it:
-`vibench stop` must not wait for anything else.
+A file ``PID.START.stop-LEVEL`` in the folder of engines stops the process with number PID and start time
+START. The program renames the file to ``.taken-LEVEL`` when it obeys, updates its time while it ramps down,
+and removes it when its output has been read back as off. This module imports only a small part of the
+standard library, so that `vibench stop` starts without delay.
 """
 
 import os
@@ -13,53 +13,53 @@ from enum import Enum, auto
 
 LONGEST_REASON = 500
 TAKEN_S = 1.0
-"""Longest time for a program to accept a stop; it checks twenty times a second [s]."""
+"""Longest time for a program to accept a stop [s]; programs check 20 times per second."""
 HEEDED_S = 5.0
-"""Longest time without progress until its output is off; a block and a setting take some tenths [s]."""
+"""Longest time without progress until the output is off [s]; a block and a setting take some tenths."""
 LOOK_S = 0.01
 SWITCH_OFF = "The generator may still be driving: switch the amplifier off, then open the bench again"
 
 
 class Fate(Enum):
-    """Result of a stop."""
+    """Result of a stop request."""
 
     SILENT = auto()
-    """The program accepted it and confirmed that its output is off."""
+    """The program accepted the stop and confirmed that its output is off."""
     UNCONFIRMED = auto()
-    """The program accepted it but did not confirm that its output is off."""
+    """The program accepted the stop but did not confirm that its output is off."""
     NOT_TAKEN = auto()
 
 
 def stop_path(folder: str, pid: int | str, start: str, level: str) -> str:
-    """Return the path of a stop file."""
+    """Return the path of the stop file for a process and a stop level."""
     return os.path.join(folder, f"{pid}.{start}.stop-{level}")  # noqa: PTH118 - pathlib takes 8 ms to load
 
 
 def taken_path(stop: str) -> str:
-    """Return the path of a stop file once the stop is obeyed."""
+    """Return the path of a stop file after the program has accepted the stop."""
     return ".taken-".join(stop.rsplit(".stop-", 1))
 
 
 def write_stop_file(stop: str, reason: str) -> None:
-    """Write a stop file, completely or not at all; raises OSError when the folder has no room for it."""
+    """Write a stop file, completely or not at all; raises OSError if the folder cannot be written."""
     coming = f"{stop}-{os.getpid()}-{time.monotonic_ns()}"
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     try:
         os.write(descriptor, reason.encode(errors="replace")[:LONGEST_REASON])
-    except OSError:  # a full disk: the name says what matters
+    except OSError:  # a full disk: the file name is sufficient
         pass
     finally:
         os.close(descriptor)
     try:
         os.replace(coming, stop)  # noqa: PTH105 - as above
-    except OSError:  # a network folder may report an error of a rename that was made
+    except OSError:  # a network folder may report an error although the file was renamed
         if not os.path.exists(stop):  # noqa: PTH110 - as above
             os.unlink(coming)  # noqa: PTH108 - as above
             raise
 
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
-    """Wait until a program has obeyed a stop, or fails to."""
+    """Return the result of a stop, after waiting until the program has obeyed it or failed to."""
     give_up_s = time.monotonic() + TAKEN_S
     while _changed_ns(stop) is not None:
         if time.monotonic() > give_up_s:

@@ -1,10 +1,10 @@
-"""The errors of a measurement: each says what happened, what was done about it, and what to do next."""
+"""Errors of a measurement. Each states what happened, what was done about it, and what to do next."""
 
 from dataclasses import dataclass
 
 
 class AcquisitionError(Exception):
-    """Base of all errors between a plan and its recording.
+    """Base class of all errors between plan and recording.
 
     The text is one or two sentences for the person at the bench: what happened (with the value
     that was given and what is allowed), what was done about it, and what to do next.
@@ -14,7 +14,7 @@ class AcquisitionError(Exception):
 class ConfigurationError(AcquisitionError, ValueError):
     """A configuration, plan or campaign file contains something that is not allowed.
 
-    Raised before any instrument is touched. The text names file, key, what was given, what is allowed.
+    Raised before any instrument is used. The text names file, key, given value and allowed values.
     """
 
 
@@ -27,11 +27,11 @@ class InstrumentError(AcquisitionError):
 
 
 class InstrumentLost(InstrumentError, ConnectionError):
-    """An instrument is gone: cable out, power off, server down. Its output state is unknown."""
+    """An instrument cannot be reached: cable out, power off, server down. Its output state is unknown."""
 
 
 class InstrumentBusy(InstrumentError):
-    """Another program, or a task that was never closed, holds the instrument."""
+    """The instrument is in use by another program or by a task that was never closed."""
 
 
 class BrokenPromise(InstrumentError):
@@ -39,11 +39,11 @@ class BrokenPromise(InstrumentError):
 
 
 class SettingRefused(InstrumentError):
-    """A setting read back differs from what was sent: the instrument silently took another value."""
+    """The instrument accepted a setting but uses another value, as reading it back has shown."""
 
 
 class DriveLate(AcquisitionError):
-    """The generator takes longer for a setting than the plan allows, so the drive lags behind."""
+    """The generator needs more time for a setting than the plan allows, so the drive lags behind."""
 
 
 class RunStalled(AcquisitionError):
@@ -51,32 +51,32 @@ class RunStalled(AcquisitionError):
 
 
 class DataLost(AcquisitionError):
-    """Samples were overwritten before they were read: the recording has a gap and ends here."""
+    """Samples were overwritten before they were read; the recording has a gap and ends there."""
 
 
 @dataclass(frozen=True)
 class LimitTrip:
-    """The numbers of a limit that a running measurement has exceeded."""
+    """Values of a limit that a running measurement has exceeded."""
 
     channel: str
     """Role of the channel: ``"base_acceleration"``."""
     quantity: str
     """Quantity that exceeded its limit: ``"stroke"``."""
     value: float
-    """Largest magnitude of the block, in ``unit``."""
+    """Largest magnitude in the block, in ``unit``."""
     limit: float
     unit: str
     sample: int
-    """The first sample above the limit, counted from the first of the run."""
+    """Number of the first sample above the limit, counted from the start of the run."""
     time_s: float
-    """Time of that sample on the converter's clock [s]."""
+    """Time of that sample by the converter's clock [s]."""
 
 
 class LimitExceeded(AcquisitionError):
     """A plan, or the running measurement, exceeds a limit of shaker, amplifier or specimen.
 
     The text names the quantity, its value, the limit, and the source of the limit. ``trip`` contains the
-    numbers when a running measurement was stopped; it is None for a plan that was refused.
+    values if a running measurement was stopped; it is None for a refused plan.
     """
 
     def __init__(self, text: str, trip: LimitTrip | None = None) -> None:
@@ -85,11 +85,11 @@ class LimitExceeded(AcquisitionError):
 
 
 class CheckFailed(AcquisitionError):
-    """The bench check before arming found something that does not fit the configuration."""
+    """The bench check before arming found a difference from the configuration."""
 
 
 class CheckStopped(CheckFailed):
-    """Somebody stopped the bench check before its end: it has no result."""
+    """The bench check was stopped before its end and has no result."""
 
 
 class RecordingError(AcquisitionError, OSError):
@@ -97,4 +97,4 @@ class RecordingError(AcquisitionError, OSError):
 
 
 class RecordingUnreachable(RecordingError):
-    """The system could not read a recording, which may be intact."""
+    """The system could not read a recording; the recording itself may be intact."""
