@@ -160,7 +160,7 @@ class Attempts:
         reason_code = reason_code_of(error)
         try:
             self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
-        except RecordingError as second:  # the same disk fails: the first error is the cause
+        except RecordingError as second:  # the journal failed too: the first error is the cause
             error.add_note(str(second))
         self._say(
             CampaignEvent(

@@ -306,7 +306,7 @@ def _differ(points: Phasors, period: int, allowed: float) -> bool:
 
 
 def _remaining(early: float, late: float, by_chance: float) -> float:
-    """Return the geometrically extrapolated remaining change; the last change if that may be chance."""
+    """Return a mean's remaining change: extrapolated geometrically, or the last one if it may be chance."""
     if late <= _SURE * by_chance:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
@@ -325,7 +325,7 @@ def _limit(figures: Judgement, tolerance: float) -> float:
 
 
 def _stationary(points: Phasors, found: Judgement) -> Judgement:
-    """Return the judgement by statistics of blocks: steady without a trend or a step between halves."""
+    """Return the judgement from block statistics: stationary without a trend or a step between halves."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
     # Use order 1, or the only order if a single one is judged.

@@ -41,7 +41,7 @@ _Ours: TypeAlias = (
     | HeldResponse
 )
 _LACKING: dict[str, str] = {}
-"""Kinds from installed packages that could not be loaded: the reason for each, by name of the kind."""
+"""Reason why a kind from an installed package could not be loaded, by name of the kind."""
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:

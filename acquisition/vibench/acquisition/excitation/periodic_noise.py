@@ -53,7 +53,7 @@ class BandNoise(AbstractExcitation):
 
 
 MOST_REALISATIONS = 1000
-"""Largest number of realisations in one measurement; all waveforms are computed together to share an rms."""
+"""Largest number of realisations in one measurement; all are computed together, for a common rms."""
 
 
 class PeriodicNoise(BandNoise):

@@ -191,7 +191,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def approach(self) -> Approach:
-        """Start at each frequency: from the neighbour if the frequency moves, otherwise from rest."""
+        """Start of the motion: at the neighbouring frequency if the frequency moves, otherwise at rest."""
         return Approach.REST
 
     @property

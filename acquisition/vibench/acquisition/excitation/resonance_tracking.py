@@ -13,7 +13,7 @@ from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest factor by which the setting changes at once; large, because a loop lasts only 150 periods."""
+"""Largest factor by which the setting changes at once; large, as the loop has only 150 periods per level."""
 
 
 class ResonanceTracking(AbstractFeedback):

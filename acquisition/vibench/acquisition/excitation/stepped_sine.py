@@ -116,7 +116,7 @@ class FrequencySteps(AbstractExcitation):
         return 0.0
 
     def segment(self, frequency_hz: float, direction: str) -> Segment:
-        """Return the segment of a step; ``direction`` tells apart the two steps at a turning point."""
+        """Return the segment of a step; ``direction`` distinguishes the two steps at a turning point."""
         return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
 
     def steps(self) -> Iterator[Step]:

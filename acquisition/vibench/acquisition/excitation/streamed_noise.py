@@ -17,7 +17,7 @@ CREST_FACTOR = 4.5
 exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Number of random values per key: few, so that any sample is a cheap start, but enough to be fast."""
+"""Number of random values per key. Fewer make a start at any sample cheaper; more are faster to draw."""
 TRANSITION_WIDTH = 0.5
 """Transition width of the filter, over the band's lower edge; the band's edges are its -6 dB points."""
 HAMMING_WIDTH = 3.3

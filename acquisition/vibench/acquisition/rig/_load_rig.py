@@ -115,10 +115,10 @@ def generator_driver(config: GeneratorConfig) -> GeneratorDriver:
 
 
 def digitizer_driver(rig: Rig) -> DigitizerDriver:
-    """Return the driver of a converter; raises ConfigurationError when it is not installed."""
+    """Return the driver of a converter; raises ConfigurationError if it is not installed."""
     return cast("DigitizerDriver", driver_of(PlugInKind.DIGITIZER, rig.daq.driver, DigitizerDriver))
 
 
 def output_driver(rig: Rig) -> OutputDriver:
-    """Return the driver of an analogue output; raises ConfigurationError when it is not installed."""
+    """Return the driver of an analogue output; raises ConfigurationError if it is not installed."""
     return cast("OutputDriver", driver_of(PlugInKind.OUTPUT, rig.daq.driver, OutputDriver))

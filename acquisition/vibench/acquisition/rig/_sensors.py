@@ -151,7 +151,7 @@ class SensorConfig(FrozenModel):
 
 
 class TransducerConfig(SensorConfig):
-    """Any sensor other than accelerometer and vibrometer, from a table ``[sensors.m0_acceleration]``."""
+    """Any other sensor, described by a table such as ``[sensors.m0_acceleration]``."""
 
     sensitivity: str
     """Sensitivity with the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
@@ -248,7 +248,7 @@ UNIT_OF_QUANTITY = {
 }
 """SI unit as UDUNITS text, by the quantity of a channel."""
 RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
-"""Channels that measure the motion of m0; the first of them in this list is used."""
+"""Channels that measure the motion of m0, in the order of preference."""
 SCANNED_ROLES = (Role.M0_VELOCITY, Role.M1_VELOCITY, Role.M2_VELOCITY)
 """Channels under which a scan can record the vibrometer."""
 _TABLES: Mapping[str, str] = {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}

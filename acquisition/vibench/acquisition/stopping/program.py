@@ -419,7 +419,7 @@ def _sweep() -> None:
 
 
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
-"""Signals that are not handled: no program can catch the first two, and the others mean a fatal fault."""
+"""Signals that are not handled: the first two cannot be caught, the others would recur after a handler."""
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 """Signals that by default neither end nor suspend a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
