@@ -53,7 +53,7 @@ class CatalogueEntry:
     name: str
     """Name of the measurement."""
     state: str
-    """Value of `recording.layout.RecordingState`, or ``damaged`` or ``unreadable``."""
+    """Value of `recording.RecordingState`, or ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
     """``samples not checked``, or problems found: ended early, near full scale, samples lost."""

@@ -34,7 +34,7 @@ from ._bench_identity import BenchIdentity
 
 
 class ReasonCode(StrEnum):
-    """Reason for the state of a point; includes all values of `plan.retry.Retryable`."""
+    """Reason for the state of a point; includes all values of `plan.Retryable`."""
 
     NOT_YET = "not_yet"
     """Not started yet."""
