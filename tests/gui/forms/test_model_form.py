@@ -96,7 +96,7 @@ def test_the_help_of_a_field_is_its_description_in_the_model(form):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     excitation = form.editors["excitation"].form
     assert (
-        "Setting of the generator, peak to peak, as its panel"
+        "Amplitude setting as shown on the generator's panel"
         in excitation.editors["amplitude_vpp"].widget.toolTip()
     )
 
