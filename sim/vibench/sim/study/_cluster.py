@@ -1,7 +1,7 @@
-"""A Dask cluster as workers: any number of processes on any number of machines.
+"""Executor on a Dask cluster: any number of processes on any number of machines.
 
-Dask runs a task again if its worker dies, and moves tasks between workers. Neither changes a result, because
-the result of a scene does not depend on the worker. Workers must have the same software.
+Dask repeats a task if its worker fails, and moves tasks between workers. This does not change results,
+because the result of a scene does not depend on the worker. All workers must have the same software.
 """
 
 import queue
@@ -20,9 +20,9 @@ from ._executor import Bundle, Reply, Solver, empty_queue, solve_timed
 from ._software import software
 
 CONNECT_PATIENCE_S = 30.0
-"""Time to wait for the scheduler, and then for its first worker [s]."""
+"""Longest wait for the scheduler, and then for its first worker [s]."""
 LOOK_AGAIN_S = 1.0
-"""Interval for querying the number of workers [s]."""
+"""Interval between queries of the number of workers [s]."""
 RUNNING, CONNECTING = "running", "connecting"
 FINISHED, ERROR = "finished", "error"
 
@@ -31,15 +31,14 @@ Answer = tuple[str, tuple[Solved, ...]]
 
 
 def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
-    """Solve scenes; runs on a worker."""
+    """Solve scenes on a worker; return its software and the results."""
     return software(), tuple(solve_timed(scenes, solver))
 
 
 class ClusterExecutor:
-    """The workers of a Dask scheduler.
+    """Executor that uses the workers of a Dask scheduler.
 
-    Raises ClusterLost if the scheduler does not answer, there is no worker, or a worker does not have
-    the same software.
+    Raises ClusterLost if the scheduler does not answer or has no worker, or if a worker has other software.
     """
 
     def __init__(
@@ -54,7 +53,7 @@ class ClusterExecutor:
             self._client.close()
             raise
         self._arrived: queue.SimpleQueue[tuple[Bundle, Future]] = queue.SimpleQueue()
-        # The scheduler drops futures without references.
+        # Keep references, because the scheduler drops futures without references.
         self._held: dict[str, Future] = {}
         self._prefix = f"vibench-{uuid.uuid4().hex}"
         self._submitted = 0
@@ -63,12 +62,12 @@ class ClusterExecutor:
 
     @property
     def description(self) -> str:
-        """Description for the record."""
+        """Description of the executor for the file."""
         return f"Dask cluster at {self._address}, {self.slots} worker thread(s) at first"
 
     @property
     def slots(self) -> int:
-        """Recent number of threads of all workers; 0 while the scheduler does not answer."""
+        """Number of threads of all workers at the last query; 0 while the scheduler does not answer."""
         if not self._is_in_contact():
             return 0
         now_s = time.monotonic()
@@ -86,7 +85,7 @@ class ClusterExecutor:
         future.add_done_callback(partial(self._note, bundle))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return finished bundles; one dropped by the scheduler has no results."""
+        """Return the replies for finished bundles; a bundle dropped by the scheduler has no results."""
         arrived = empty_queue(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()
@@ -94,7 +93,7 @@ class ClusterExecutor:
         return [self._reply(bundle, future, answers) for bundle, future in arrived]
 
     def cancel(self) -> Sequence[Reply]:
-        """Cancel everything; running bundles are discarded."""
+        """Cancel all bundles; results of running bundles are discarded."""
         if self._client.status == RUNNING and self._held:
             self._client.cancel(list(self._held.values()))
         self._held.clear()
@@ -106,11 +105,11 @@ class ClusterExecutor:
         self._client.close()
 
     def _note(self, bundle: Bundle, future: Future) -> None:
-        """Put a finished bundle into the queue; called in a thread of the client."""
+        """Put a finished bundle into the queue; the client calls this in one of its threads."""
         self._arrived.put((bundle, future))
 
     def _fetched(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
-        """Fetch all finished results at once; none if they were lost."""
+        """Return the results of all finished futures, fetched at once; none if they were lost."""
         if not futures:
             return {}
         try:
@@ -159,7 +158,7 @@ def _connect(address: str, patience_s: float) -> Client:
 
 
 def _require_workers(client: Client, address: str, patience_s: float) -> None:
-    """Refuse a cluster without workers, or with workers that have other software."""
+    """Raise ClusterLost for a cluster without workers, or with workers that have other software."""
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except OSError as error:

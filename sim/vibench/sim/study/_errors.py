@@ -2,12 +2,12 @@
 
 
 class StudyError(Exception):
-    """A study cannot be run, stored, resumed or opened; the message is one sentence for the user."""
+    """Error: a study cannot be run, stored, resumed or opened; the message is a sentence for the user."""
 
 
 class InvalidStudy(StudyError, ValueError):
-    """A study is not allowed; nothing was computed."""
+    """Error: a study is not allowed; nothing was computed."""
 
 
 class ClusterLost(StudyError, ConnectionError):
-    """The cluster cannot be reached or was lost; stored results are kept."""
+    """Error: the cluster cannot be reached or was lost; stored results are kept."""

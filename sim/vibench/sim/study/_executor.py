@@ -1,6 +1,6 @@
-"""Interface between the queue and workers: local threads or remote processes.
+"""Interface between the queue and its workers, which are local threads or remote processes.
 
-Times of scenes exclude one-time work of a process: loading modules and making tables.
+Times of scenes exclude work that a process does only once: loading modules and computing tables.
 """
 
 import math
@@ -23,10 +23,10 @@ from ._errors import InvalidStudy
 
 @dataclass(frozen=True)
 class Bundle:
-    """Scenes sent together, to reduce overhead for short ones."""
+    """Scenes sent to a worker together, to reduce the overhead of short scenes."""
 
     numbers: tuple[int, ...]
-    """Points of the study, one per scene."""
+    """Number of the study's point for each scene."""
     scenes: tuple[Scene, ...]
 
 
@@ -36,33 +36,33 @@ class Reply:
 
     bundle: Bundle
     solved: tuple[Solved, ...]
-    """Results of the scenes in order; fewer after a cancellation or an error."""
+    """Results in the order of the scenes; incomplete after a cancellation or an error."""
     error: BaseException | None = None
-    """Error, if there are fewer results."""
+    """Error that prevented the remaining results."""
 
 
 class Executor(Protocol):
-    """Executor of bundles. Workers may be lost, but no bundle is lost; replies come in any order."""
+    """Executor of bundles. Every bundle gets a reply even if workers are lost; replies come in any order."""
 
     @property
     def description(self) -> str:
-        """Description of the executor for the record."""
+        """Description of the executor for the file."""
 
     @property
     def slots(self) -> int:
-        """Number of bundles computed at the same time; may change, also to 0."""
+        """Number of bundles computed at the same time; it may change, even to 0."""
 
     def submit(self, bundle: Bundle) -> None:
-        """Queue a bundle."""
+        """Add a bundle to the queue."""
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return replies; waits for the first, at most ``timeout_s``.
+        """Return the replies that have arrived; wait at most ``timeout_s`` for the first.
 
         Raises ClusterLost when no more replies can arrive.
         """
 
     def cancel(self) -> Sequence[Reply]:
-        """Start no further scenes; return remaining replies. May be called at any time."""
+        """Start no further scenes, and return the remaining replies. May be called at any time."""
 
     def close(self) -> None:
         """Release all workers. May be called at any time."""
@@ -71,13 +71,13 @@ class Executor(Protocol):
 Solver: TypeAlias = SceneSolver
 Kind = tuple[object, ...]
 _solved_before: set[Kind] = set()
-"""Kinds of scenes already run in this process."""
+"""Kinds of scenes that this process has solved."""
 
 
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
-    """Solve scenes, in batches or one by one; return each with its processor time.
+    """Solve scenes, in batches or one by one; yield each result with its processor time.
 
-    Times are recorded for estimates, except those of first scenes of a kind: they may load modules.
+    Times are recorded for later estimates, except for the first scene of a kind, which may load modules.
     """
     for group in [scenes] if isinstance(solver, InBatches) else [[scene] for scene in scenes]:
         kinds: list[Kind] = [
@@ -90,7 +90,7 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
             found = [_solve_and_time(group[0], solver)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
-            # Planning a closed form takes about as long as evaluating it.
+            # Closed forms are not recorded: planning them takes about as long as evaluating them.
             if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
                 learn_cost(scene, each.taken_s, solver)
             yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)
@@ -106,7 +106,7 @@ Item = TypeVar("Item")
 
 
 class ThreadExecutor:
-    """The requested number of threads; by default one per processor.
+    """Executor with the requested number of threads, by default one per processor.
 
     Raises InvalidStudy when fewer than one worker is requested.
     """
@@ -122,7 +122,7 @@ class ThreadExecutor:
 
     @property
     def description(self) -> str:
-        """Description of the executor for the record."""
+        """Description of the executor for the file."""
         return f"{self._workers} thread(s)"
 
     @property
@@ -131,17 +131,17 @@ class ThreadExecutor:
         return self._workers
 
     def submit(self, bundle: Bundle) -> None:
-        """Queue a bundle for the next free thread."""
+        """Add a bundle to the queue for the next free thread."""
         solved: list[Solved] = []
         future = self._pool.submit(self._solve_into, solved, bundle.scenes)
         future.add_done_callback(partial(self._note, bundle, solved))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return the finished bundles."""
+        """Return the replies for finished bundles; wait at most ``timeout_s`` for the first."""
         return empty_queue(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:
-        """Start no further scene, not even within a bundle; running ones are finished."""
+        """Start no further scene, even within a bundle; wait for running scenes and return their replies."""
         self._is_cancelled.set()
         self._pool.shutdown(wait=True, cancel_futures=True)
         return self.replies(0.0)
@@ -164,7 +164,7 @@ class ThreadExecutor:
 
 
 def empty_queue(arrivals: queue.SimpleQueue[Item], timeout_s: float) -> list[Item]:
-    """Empty a queue; waits for the first item, at most ``timeout_s``."""
+    """Return all items of a queue; wait at most ``timeout_s`` for the first."""
     items: list[Item] = []
     try:
         items.append(arrivals.get(timeout=timeout_s))

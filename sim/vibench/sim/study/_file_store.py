@@ -1,9 +1,9 @@
 """File of a running study, which remains valid if the process is killed.
 
-Order of a commit: cells -> sync -> states -> sync. If the process or the power fails at any moment, a point
-with the state DONE has all its cells.
+Results are written in the order cells, sync, states, sync. If the process or the power fails at any time,
+every point with the state DONE has all its cells.
 
-HDF5 creates the file with all metadata and space for all results, then closes it. Afterwards only bytes at
+HDF5 creates the file with all metadata and space for all results, and closes it. After that only bytes at
 known offsets are written, so that no crash can leave the file inconsistent.
 """
 
@@ -27,14 +27,14 @@ from ._software import software
 from ._store import Arrays, PointAnswer, put
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
-"""Longest wait for a reader to close the file, and time between tries [s]; a writer keeps it open longer."""
+"""Longest wait for a reader to close the file, and time between attempts [s]; a writer keeps it longer."""
 
 
 def sole_writer(path: Path) -> OpenFile:
-    """Open a file for writing, locked while it is open.
+    """Open a file for writing, with a lock while it is open.
 
-    Readers open the file only briefly. Raises StudyError when another process keeps it open longer, as a
-    writer does, or it cannot be opened.
+    Readers open the file only briefly. Raises StudyError when another process keeps the file open longer, as
+    a writer does, or when the file cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -69,15 +69,15 @@ _COMPONENTS = {
         ),
     )
 }
-"""Meaning of the components of a column."""
+"""Axes for columns with several components, by name."""
 HEAD_BYTES = 2_000_000
-"""Upper bound of the size of sessions, axes and attributes."""
+"""Upper bound on the size of sessions, axes and attributes [bytes]."""
 
 
 def make_file(path: Path, plan: layout.GridPlan) -> None:
-    """Create a plan's file with all points missing; after an error, leave no file.
+    """Create the file of a plan with all points missing; after an error, leave no file.
 
-    Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
+    Raises StudyError when the file exists, the folder does not exist, or the disk is too full.
     """
     try:
         path.open("xb").close()  # only one of two runs can create the file
@@ -161,7 +161,7 @@ def _scale(file: h5py.File, axis: layout.StudyAxis) -> h5py.Dataset:
 
 
 def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h5py.Dataset:
-    """Create a contiguous dataset for a column, filled with the value for missing."""
+    """Create a contiguous dataset for a column, filled with its missing value."""
     whole = shape if column.components == 1 else (*shape, column.components)
     kind = np.dtype(column.dtype)
     stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
@@ -179,7 +179,7 @@ def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h
 
 
 def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
-    """Set attributes; text is UTF-8 of fixed length, which old readers can read."""
+    """Set attributes; text is UTF-8 of fixed length, because old readers require it."""
     for name, value in values.items():
         match value:
             case str():
@@ -191,9 +191,9 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 
 
 class FileStore:
-    """Store in a study's file; a context manager that closes it.
+    """Store in the file of a study; as a context manager, it closes the file.
 
-    Raises StudyError when the file belongs to another study, is being written by another run, or is not a
+    Raises StudyError when the file belongs to another study, is being written by another run, or is not the
     file of a study.
     """
 
@@ -207,7 +207,7 @@ class FileStore:
             _require_same(path, read_plan(path, type(plan)), plan)
             self._places = places_of(path, plan)
             self.arrays = read_arrays(path, plan)
-            """Stored results so far."""
+            """Results stored so far."""
         except BaseException:
             self._disk.close()
             raise
@@ -215,12 +215,12 @@ class FileStore:
 
     @classmethod
     def created(cls, path: Path, plan: layout.GridPlan) -> Self:
-        """Create the file and its store; raises StudyError if the file exists."""
+        """Create the file and return its store; raise StudyError if the file exists."""
         make_file(path, plan)
         return cls(path, plan)
 
     def begin(self, executor: str) -> None:
-        """Record time, software and executor in the next row of sessions."""
+        """Write time, software and executor into the next row of the sessions."""
         self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
         for (name, width), text in zip(layout.SESSION_COLUMNS.items(), texts, strict=True):
@@ -232,9 +232,9 @@ class FileStore:
         self._sync()
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Commit answers: first cells, then states.
+        """Write results: first their cells, then their states.
 
-        Raises StudyError after a write error; earlier commits are kept.
+        Raises StudyError after a write error; earlier results are kept.
         """
         for answer in answers:
             cells = {**answer.cells, layout.SESSION: self._session}
@@ -248,7 +248,7 @@ class FileStore:
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store filled-in points as whole columns: first cells, then states."""
+        """Write filled-in points, as whole columns: first cells, then states."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
             self._write(self._places.columns[name], self.arrays[name].tobytes())
@@ -258,7 +258,7 @@ class FileStore:
         self._sync()
 
     def close(self) -> None:
-        """Release the file."""
+        """Close the file and release its lock."""
         self._disk.close()
 
     def __enter__(self) -> Self:
@@ -297,11 +297,11 @@ def _require_same(path: Path, kept: layout.GridPlan, requested: layout.GridPlan)
 
 
 SHOWN = 60
-"""Characters of a value that a message shows."""
+"""Largest number of characters of a value in a message."""
 
 
 def _difference(name: str, kept: layout.GridPlan, requested: layout.GridPlan) -> str:
-    """Return how one field of two plans differs; for long lists, the first difference."""
+    """Return text that states how a field of two plans differs; for lists, the first difference."""
     there, here = (plan.model_dump(mode="json")[name] for plan in (kept, requested))
     match there, here:
         case [*some], [*others]:

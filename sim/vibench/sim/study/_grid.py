@@ -1,4 +1,4 @@
-"""Content of a study's file: a grid of points over named axes, columns with units, and the layout.
+"""Content of the file of a study: a grid of points over named axes, columns with units, and the layout.
 
 ``docs/studies.md`` describes the file for users of h5py, xarray or MATLAB.
 """
@@ -19,10 +19,10 @@ from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2
-"""Incremented when older readers would misread the file."""
+"""Version of the format, incremented when older readers would misread the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""Superblock 0, which every HDF5 reader since 1.8 can read, including MATLAB."""
+"""HDF5 versions that give superblock 0, which all readers since HDF5 1.8 support, including MATLAB."""
 
 STUDY = "study_json"
 STATE = "state"
@@ -33,10 +33,10 @@ COUNTER_DTYPE = "<i8"
 
 
 class PointState(IntEnum):
-    """State of a point, written last."""
+    """State of a point, which is written after its results."""
 
     MISSING = 0
-    """Not computed yet."""
+    """The point has not been computed."""
     DONE = 1
     """The run reached its end."""
     STOPPED = 2
@@ -44,28 +44,28 @@ class PointState(IntEnum):
     FAILED = 3
     """The scene could not be computed; ``message`` contains the reason. Numbers are NaN."""
     FILLED = 4
-    """Filled in on a map, not computed: neighbours agree, and numbers are interpolated between them."""
+    """The point of a map was not computed but interpolated, because its neighbours agree."""
 
 
 SESSION_COLUMNS = {"started_utc": 32, "software_json": 512, "executor": 160}
-"""Columns of the sessions and their bytes; a session is the first run of a study or a resumption."""
+"""Columns of the sessions and their sizes [bytes]; a session is the first run of a study or a resumption."""
 MOST_SESSIONS = 1024
-"""Rows; further sessions share the last one."""
+"""Number of rows for sessions; all further sessions use the last row."""
 
 
 Cell = float | int | bytes | tuple[float, ...]
 
 REAL, WHOLE = "<f8", "<i4"
 MISSING_WHOLE = -1
-"""Value for a missing whole number or flag; ``_FillValue`` of the CF conventions."""
+"""Value of a missing whole number or flag; ``_FillValue`` of the CF conventions."""
 COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
 MOST_FOUND = 8
-"""Number of stored motions of an ensemble: those with the largest shares."""
+"""Number of stored motions of an ensemble, in the order of decreasing share."""
 IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
-"""Longest stored text; longer ones are cut."""
+"""Longest stored text [bytes]; longer texts are cut."""
 
 TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
 CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
@@ -75,19 +75,19 @@ MEMORY, STARTS = "start_memory", "starts_followed"
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity over all points."""
+    """One quantity of all points."""
 
     name: str
     dtype: str
     units: str
-    """UDUNITS text; 1 for ratios and counts."""
+    """Unit as UDUNITS text; 1 for ratios and counts."""
     long_name: str
     meanings: tuple[str, ...] = ()
     """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """Number of components; if more than one, the array has another axis at the end."""
+    """Number of components; if more than one, the array has an additional last axis."""
     along: str = COORDINATE
-    """Name of that axis."""
+    """Name of the additional axis."""
 
     @property
     def missing(self) -> float | int | bytes:
@@ -104,7 +104,7 @@ class Column:
 
 
 def _meanings(kind: type[Enum]) -> tuple[str, ...]:
-    """Return one word for each member, as the CF conventions require for flags."""
+    """Return one word for each member of an enum, as the CF conventions require for flags."""
     return tuple(member.name.lower() for member in kind)
 
 
@@ -203,11 +203,11 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Grid:
-    """A grid of points, numbered in C order: the index of the last axis changes fastest."""
+    """Grid of points, numbered in C order: the index of the last axis changes fastest."""
 
     shape: tuple[int, ...]
     is_ordered: tuple[bool, ...]
-    """Whether neighbours along each axis are similar: frequencies are, models are not."""
+    """Whether neighbouring points along each axis are similar: True for frequencies, False for models."""
 
     @property
     def size(self) -> int:
@@ -223,7 +223,7 @@ class Grid:
         return tuple(reversed(place))
 
     def neighbours(self, number: int) -> Iterator[int]:
-        """Yield the points one step away along the ordered axes."""
+        """Yield the neighbouring points along the ordered axes."""
         stride, rest = 1, number
         for length, is_ordered in zip(reversed(self.shape), reversed(self.is_ordered), strict=True):
             rest, index = divmod(rest, length)
@@ -242,28 +242,28 @@ MODEL = "model"
 
 @dataclass(frozen=True)
 class StudyAxis:
-    """One dimension of a study's arrays."""
+    """One dimension of the arrays of a study."""
 
     name: str
     values: tuple[float | str, ...]
-    """Numbers ascending, or labels."""
+    """Ascending numbers, or labels."""
     units: str
-    """UDUNITS text; empty for labels."""
+    """Unit as UDUNITS text; empty for labels."""
     long_name: str
 
     @property
     def is_ordered(self) -> bool:
-        """Whether its values are numbers, so that neighbours are similar."""
+        """Whether the values are numbers, so that neighbouring points are similar."""
         return bool(self.units)
 
 
 class GridPlan(FrozenModel, ABC):
-    """Complete plan; equal plans have equal results."""
+    """Complete plan of a grid of points; equal plans have equal results."""
 
     called: ClassVar[str]
-    """Name of such a plan in messages."""
+    """Name of this kind of plan in messages."""
     format: ClassVar[str]
-    """Format name of its files."""
+    """Name of the format of its files."""
 
     @property
     @abstractmethod
@@ -273,7 +273,7 @@ class GridPlan(FrozenModel, ABC):
     @property
     @abstractmethod
     def columns(self) -> tuple[Column, ...]:
-        """Stored columns of each point."""
+        """Columns that are stored for each point."""
 
     @property
     def grid(self) -> Grid:
@@ -284,10 +284,10 @@ class GridPlan(FrozenModel, ABC):
 
     @abstractmethod
     def frequency_at(self, place: tuple[int, ...]) -> float:
-        """Drive frequency at a place of the grid [Hz]."""
+        """Return the drive frequency at a position of the grid [Hz]."""
 
     def phase_after(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> float:
-        """Return the drive phase at the end of a computed point [rad], to continue from its final state."""
+        """Return the drive phase at the end of a computed point, for a run that continues from it [rad]."""
         frequency_hz = self.frequency_at(self.grid.place(number))
         turns = math.fmod(frequency_hz * float(arrays[DURATION][number]), 1.0)
         return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][number]), 2.0 * math.pi)
@@ -298,7 +298,7 @@ class GridPlan(FrozenModel, ABC):
         return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
 
     def require_target_alone(self, *names: str) -> None:
-        """Refuse fields that a requested error or time sets; the ValueError names the first."""
+        """Raise ValueError if one of these fields is given together with a requested error or time."""
         for name in names:
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")

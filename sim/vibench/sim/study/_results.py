@@ -1,4 +1,4 @@
-"""Results of a study so far: arrays over its axes, NaN if unknown, and states."""
+"""Results of a study so far: arrays over its axes, with NaN for unknown values, and states."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ class Places:
     session_columns: Mapping[str, int]
     n_sessions: int
     sessions: int
-    """Number of sessions so far."""
+    """Number of recorded sessions."""
 
 
 @dataclass(frozen=True)
@@ -45,22 +45,22 @@ class Session:
 
 
 def read_plan(path: Path, kind: type[Plan]) -> Plan:
-    """Read the plan of a file; raises StudyError when the file does not contain this ``kind`` of plan."""
+    """Return the plan of a file; raise StudyError if the file does not contain this ``kind`` of plan."""
     with _open_store(path, kind) as file:
         return _plan(path, file, kind)
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
-    """Read all columns, each of shape (points, ...); points that are being computed count as missing.
+    """Return all columns of a file, shape (points, ...) each; points being computed are missing.
 
-    Raises StudyError when the file cannot be read, or is of another kind than the plan.
+    Raises StudyError when the file cannot be read, or contains another kind of plan.
     """
     with _open_store(path, type(plan)) as file:
         return _arrays(file, plan)
 
 
 def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
-    """Read the sessions: time, software and executor."""
+    """Return the sessions recorded in a file: time, software and executor of each."""
     with _open_store(path, kind) as file:
         group = file[layout.SESSIONS]
         rows = range(int(group[layout.N_SESSIONS][0]))
@@ -81,7 +81,7 @@ def places_of(path: Path, plan: GridPlan) -> Places:
 
 
 def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
-    # States first, so that answers that arrive during reading are ignored consistently.
+    # Read the states first, so that results that arrive during reading are ignored in all columns.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
     arrays: Arrays = {layout.STATE: state}
@@ -100,7 +100,7 @@ def _offset(dataset: "h5py.Dataset") -> int:
 
 @contextmanager
 def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
-    # Imported here, because results in memory do not need h5py.
+    # Import here, because results in memory do not need h5py.
     from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     wanted = f"give the path of a {kind.called}'s file"
@@ -108,8 +108,8 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
         what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
         raise StudyError(f"{path} {what}; {wanted}.")
     try:
-        # Use HDF5's default lock, which the writer's lock allows: HDF5 refuses another kind of lock if this
-        # process has already opened the file, for example in xarray.
+        # Use HDF5's default lock, which is compatible with the writer's lock. HDF5 does not allow another
+        # kind of lock if this process has already opened the file, for example in xarray.
         file = open_hdf5(path)
     except UnsafeHdf5 as error:
         raise StudyError(f"{path} was not read: {error}") from error
@@ -150,20 +150,20 @@ def _plan(path: Path, file: "h5py.File", kind: type[Plan]) -> Plan:
 
 Value = float | str
 SHOWN_VALUES = 8
-"""Number of values of an axis that a message lists."""
+"""Largest number of values of an axis in a message."""
 SAME = 1e-9
-"""Relative tolerance within which a number is taken as a value of an axis."""
+"""Relative tolerance within which a number equals a value of an axis."""
 
 
 @dataclass(frozen=True, eq=False)
 class GridResults(Generic[Plan]):
-    """Results of a plan. Axes in the order of ``plan.axes``."""
+    """Results of a plan, over axes in the order of ``plan.axes``."""
 
     plan: Plan
     arrays: Mapping[str, NDArray[np.generic]]
-    """Arrays by column, with one row per point, as in the file."""
+    """Arrays by the name of their column, with one row per point, as in the file."""
     sessions: tuple[Session, ...] = ()
-    """Sessions that computed the results; empty for a study in memory."""
+    """Sessions in which the results were computed; empty for a study in memory."""
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
@@ -172,7 +172,7 @@ class GridResults(Generic[Plan]):
 
     @property
     def state(self) -> NDArray[np.uint8]:
-        """A `PointState` for each point, over all axes."""
+        """`PointState` of each point, over all axes."""
         return states(self.arrays).reshape(self.plan.grid.shape)
 
     @property
@@ -186,16 +186,16 @@ class GridResults(Generic[Plan]):
         return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
 
     def values(self, name: str, **fixed: Value) -> Floats:
-        """Return one quantity over the axes, NaN if unknown.
+        """Return one quantity over the axes that are not fixed; unknown values are NaN.
 
         Raises InvalidStudy when there is no such column, axis or value.
 
         Parameters
         ----------
         name
-            A column, such as ``"response_i"``; numbers only.
+            Name of a column that contains numbers, such as ``"response_i"``.
         **fixed
-            Axes with a fixed value, which the result does not have: ``amplitude=5e-6, model="hertz"``.
+            Fixed values of axes, which are removed from the result: ``amplitude=5e-6, model="hertz"``.
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"
@@ -213,7 +213,7 @@ class GridResults(Generic[Plan]):
         return np.asarray(whole[self._place(fixed)])
 
     def failures(self) -> Iterator[tuple[dict[str, Value], str]]:
-        """Yield position and reason of each failure: a scene that is not allowed, or a lost run."""
+        """Yield coordinates and reason of each failure: a scene that is not allowed, or a lost run."""
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.STOPPED) | (state == PointState.FAILED)):
             why = ENDED if state[number] == PointState.STOPPED and ENDED in self.arrays else MESSAGE
@@ -237,7 +237,7 @@ class StudyResults(GridResults[Study]):
 
     @property
     def study(self) -> Study:
-        """The study."""
+        """Study whose results these are."""
         return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:
@@ -269,9 +269,9 @@ class StudyResults(GridResults[Study]):
 
 
 def open_study(path: Path | str) -> StudyResults:
-    """Read the file of a study, complete or still being computed.
+    """Return the results in the file of a study, complete or still being computed.
 
-    Raises StudyError if it is not the file of a study, or of another version.
+    Raises StudyError if the file is not that of a study, or has another format version.
     """
     path = Path(path)
     study = read_plan(path, Study)
@@ -279,7 +279,7 @@ def open_study(path: Path | str) -> StudyResults:
 
 
 def results_of(study: Study, arrays: Arrays) -> StudyResults:
-    """Return the results in a memory store."""
+    """Return the results of a study in memory."""
     return StudyResults(study, {name: values.copy() for name, values in arrays.items()})
 
 

@@ -1,4 +1,4 @@
-"""Identity of the software, to check whether two machines compute the same results."""
+"""Software versions, to check whether two machines compute the same results."""
 
 import json
 import platform
@@ -12,7 +12,7 @@ PACKAGES = ("vibench", "numpy", "scipy")
 
 @cache
 def software() -> str:
-    """Return versions and the digest of the simulation's sources, as JSON text with sorted keys."""
+    """Return package versions and a digest of the simulation's sources, as JSON text with sorted keys."""
     found = {"python": platform.python_version(), "sim_sources": physics_digest()}
     for name in PACKAGES:
         try:

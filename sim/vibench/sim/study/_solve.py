@@ -1,4 +1,4 @@
-"""Solve a study: workers, storage and results in one call."""
+"""Solve a study with its workers and its store in one call."""
 
 import hashlib
 import json
@@ -37,9 +37,9 @@ from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
 from ._study import GivenStart, Study, continued_from, study_solver
 
-# Scenes of a study's points: their starts, and the stored part of their results.
+# Scenes of the points of a study, and the results that are stored.
 #
-# The identity of a scene is a digest of its content, the same in every process on every machine.
+# The identity of a scene is a digest of its content, which is the same in every process and on every machine.
 
 _scenes = TypeAdapter(Scene)
 
@@ -50,32 +50,32 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     Parameters
     ----------
     scene
-        Scene. Every bit of its numbers affects the digest; the order of fields does not.
+        Scene. The digest depends on every bit of its numbers, but not on the order of its fields.
     continued
-        Identity of the scene that this one continues, if any. It replaces state and phase at the start, which
-        follow from it.
+        Identity of the scene that this scene continues, if any. It replaces the initial state and phase,
+        which are results of that scene.
     """
     content = _scenes.dump_python(scene, mode="python")
-    # A name does not change the motion.
+    # The name of the start does not change the motion.
     content["start"].pop("name", None)
     if content["target"] is None:
-        # Keep the digests of files that are older than targets.
+        # Keep the digests in files that were written before scenes had a target.
         del content["target"]
     if continued:
         content["start"] = {"continues": continued}
         del content["drive"]["phase_rad"]
-    # Python writes the shortest digits that represent a float exactly, and infinity as a word.
+    # Python writes floats with the shortest exact digits, and infinity as a word.
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
 
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Worker time of a bundle [s], long compared with a transfer on a cluster of a few milliseconds; and of a
-bundle for SIMD batches."""
+"""Worker time of a bundle [s], which is long compared with a transfer of a few milliseconds on a cluster; and
+worker time of a bundle that is solved in SIMD batches [s]."""
 
 
 class Expansion(Points):
-    """The points of a study."""
+    """The points of a study as scenes."""
 
     def __init__(self, study: Study) -> None:
         super().__init__(study.grid, study.starts, study_solver(study))
@@ -83,7 +83,7 @@ class Expansion(Points):
         self.bundle_s = BUNDLE_S if self._solver is solve_scene else LANES_S
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return every point."""
+        """Return the numbers of all points."""
         return np.arange(len(arrays[FINAL_STATE]))
 
     def unchained(self, number: int) -> Scene:
@@ -97,13 +97,13 @@ class Expansion(Points):
                 return self._study.scene(place, Rest())
 
     def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point that continues another."""
+        """Return the scene of a point that continues the point ``before``."""
         name = continued_from(self._study.frequency_at(self.grid.place(before)))
         start = Given(state_of(arrays[FINAL_STATE][before].astype(np.float64)), name)
         return self._study.scene(self.grid.place(number), start, self._study.phase_after(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the stored results of a prediction, with the start and the identity of its scene."""
+        """Return the values to store for a prediction, with the start and the identity of its scene."""
         before = self.predecessor(number, arrays)
         known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
         cells: dict[str, Cell] = {
@@ -121,7 +121,7 @@ class Expansion(Points):
 def planned_work_s(study: Study) -> float:
     """Return the planned time of all points of a study on one core [s].
 
-    No point is run, except in a pilot of about a second where points have a target.
+    No point is computed, except in pilot runs of about a second if points have a target.
 
     >>> from vibench.sim.study import Study
     >>> study = Study(frequencies_hz=(200.0, 260.0), amplitudes_m=(1e-6,))
@@ -135,7 +135,7 @@ def planned_work_s(study: Study) -> float:
 
 
 class ExistingStudy(StrEnum):
-    """Treatment of an existing file."""
+    """Treatment of a file that already exists."""
 
     REFUSE = "refuse"
     RESUME = "resume"
@@ -153,7 +153,7 @@ def solve_study(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyResults:
-    """Compute a study, or the missing part of its file.
+    """Compute a study, or the missing points of its file, and return the results.
 
     Raises StudyError, for example for a file of another study, a full disk or a cluster that does not answer.
 
@@ -162,21 +162,21 @@ def solve_study(
     study
         Requested study.
     out
-        File for the results, ``NAME.h5``; in memory only when None.
+        File for the results, ``NAME.h5``; None to keep them in memory.
     existing
-        Whether an existing file is refused or resumed. Resuming computes the missing points; a missing file
-        is created.
+        Whether an existing file raises an error or is resumed. Resuming computes its missing points; a
+        missing file is created.
     workers
-        Number of threads; one per processor when None.
+        Number of threads; None for one per processor.
     cluster
-        Address of a Dask scheduler, whose workers compute instead.
+        Address of a Dask scheduler, whose workers are used instead of threads.
     observer, cancelled
-        Called in the calling thread.
+        Functions for progress and cancellation, called in the calling thread.
 
     Returns
     -------
     StudyResults
-        Complete, or partial if cancelled.
+        Results; partial if cancelled.
     """
     solver = study_solver(study)
     with executor_of(workers, cluster, solver) as executor, store_of(study, out, existing) as store:
@@ -187,7 +187,7 @@ def solve_study(
 
 @contextmanager
 def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | ExistingWord) -> Iterator[Store]:
-    """Open the store of a plan: a new or continued file, or memory."""
+    """Open the store of a plan: a new file, an existing file to resume, or memory."""
     existing = chosen(ExistingStudy, existing)
     if out is None:
         yield MemoryStore(plan)
@@ -201,7 +201,7 @@ def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | Existin
 
 @contextmanager
 def executor_of(workers: int | None, cluster: str | None, solver: Solver = solve_scene) -> Iterator[Executor]:
-    """Return the executor: ``workers`` threads, or the workers of the Dask scheduler at ``cluster``."""
+    """Open the executor: ``workers`` threads, or the workers of the Dask scheduler at ``cluster``."""
     executor = ThreadExecutor(workers, solver) if cluster is None else _cluster_executor(cluster, solver)
     with closing(executor):
         yield executor
@@ -225,19 +225,19 @@ def run_study(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute every point that is missing in the store, longest first.
+    """Compute every point that is missing in the store, the longest first.
 
-    Results do not depend on the executor or the order: scenes are independent, and a point that continues
-    another waits for it. An error in a scene becomes the result of that point. Raises StudyError when the
-    store or the executor fails; results stored before are kept.
+    Results do not depend on the executor or the order, because scenes are independent; a point that continues
+    another point waits for it. An error in a scene becomes the result of its point. Raises StudyError when
+    the store or the executor fails; results stored before are kept.
 
     Parameters
     ----------
     study, executor, store
         Study, executor of its scenes, and store of the results.
     observer
-        Called after every batch of results.
+        Function called after every batch of results.
     cancelled
-        Called between results; True ends the run.
+        Function called between results; True ends the run.
     """
     return run_points(Expansion(study), executor, store, observer, cancelled)

@@ -1,4 +1,4 @@
-"""Interface of stores of a running study, and the store in memory."""
+"""Interface of the stores for results of a running study, and the store in memory."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,18 +20,18 @@ Arrays = dict[str, NDArray[np.generic]]
 
 @dataclass(frozen=True)
 class PointAnswer:
-    """Stored results of one point."""
+    """Results of one point, as they are stored."""
 
     number: int
     state: layout.PointState
     cells: dict[str, layout.Cell]
-    """Values by column; other columns stay missing."""
+    """Values by the name of their column; other columns remain missing."""
     taken_s: float = math.nan
     """Processor time [s]; NaN if unknown."""
 
 
 def empty_arrays(plan: layout.GridPlan) -> Arrays:
-    """Make arrays in which every point is missing, shape (points,) or (points, components)."""
+    """Return arrays in which every point is missing, shape (points,) or (points, components)."""
     return {
         column.name: np.full(_shape(column, plan.grid), column.missing, column.dtype)
         for column in plan.columns
@@ -41,15 +41,15 @@ def empty_arrays(plan: layout.GridPlan) -> Arrays:
 def put(
     arrays: Arrays, columns: Sequence[layout.Column], answer: PointAnswer
 ) -> Iterator[tuple[layout.Column, bytes]]:
-    """Write an answer's cells into the arrays; yield each column with its bytes for the file.
+    """Write the cells of a result into the arrays; yield each column with its bytes for the file.
 
-    The state is not included: it is written after the cells.
+    The state is not included, because it is written after the cells.
     """
     for column in columns:
         if column.name in answer.cells:
             values = arrays[column.name]
             values[answer.number] = answer.cells[column.name]
-            # Use a slice, because numpy strips the padding of a single text.
+            # Use a slice, because numpy removes the padding of a single text.
             yield column, values[answer.number : answer.number + 1].tobytes()
 
 
@@ -58,7 +58,7 @@ def _shape(column: layout.Column, grid: layout.Grid) -> tuple[int, ...]:
 
 
 def is_failed(state: NDArray[np.uint8] | layout.PointState) -> NDArray[np.bool_]:
-    """Return whether there is an error instead of a result, or the run did not reach its end."""
+    """Return whether a scene had an error or its run did not reach its end, shape of ``state``."""
     return np.isin(state, (layout.PointState.STOPPED, layout.PointState.FAILED))
 
 
@@ -68,20 +68,20 @@ def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:
 
 
 class Store(Protocol):
-    """Store of answers. Points that already have an answer are not computed."""
+    """Store of results. Points that already have a result are not computed."""
 
     @property
     def arrays(self) -> Arrays:
-        """Stored results so far; read-only."""
+        """Results stored so far; do not change them."""
 
     def begin(self, executor: str) -> None:
         """Record the start of a session and its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store answers; return when they are safe."""
+        """Store results; return when they are stored safely."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store filled-in points, by column, with the state FILLED."""
+        """Store interpolated points, by column, with the state FILLED."""
 
 
 class MemoryStore:
@@ -91,24 +91,24 @@ class MemoryStore:
         self.arrays, self._columns = empty_arrays(plan), plan.columns
 
     def begin(self, executor: str) -> None:
-        """Do nothing: a store in memory has no sessions."""
+        """Do nothing, because a store in memory has no sessions."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store answers."""
+        """Store results."""
         for answer in answers:
             for _ in put(self.arrays, self._columns, answer):
                 pass
             self.arrays[layout.STATE][answer.number] = answer.state
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store filled-in points, by column, with the state FILLED."""
+        """Store interpolated points, by column, with the state FILLED."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
         self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, layout.Cell]:
-    """Convert a prediction to cells; values not requested or not found stay missing."""
+    """Return the cells of a prediction, without values that were not requested or not found."""
     return {
         **_cells_of(prediction, layout.NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),
@@ -127,7 +127,7 @@ def _cells_of(value: object, columns: Mapping[str, layout.Column]) -> dict[str, 
 
 
 def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
-    """Return the cells of an ensemble; those of its motions have one component per motion."""
+    """Return the cells of an ensemble; cells for its motions have one component per motion."""
     if ensemble is None:
         return {}
     kept = ensemble.motions[: layout.MOST_FOUND]
@@ -145,13 +145,13 @@ def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
 
 
 def _fill_places(column: layout.Column, values: list[float | None]) -> layout.Cell:
-    """Return the components of a column; absent values and motions are marked as missing."""
+    """Return the components of a column; unknown values and absent motions have the missing value."""
     filled = [column.missing if value is None else value for value in values]
     return tuple(filled + [column.missing] * (layout.MOST_FOUND - len(filled)))  # type: ignore[arg-type]
 
 
 def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
-    """Return the ensemble of a point from its cells; None if it has no ensemble."""
+    """Return the ensemble of a point from its cells; None if the point has no ensemble."""
     if _number(arrays[layout.STARTS][number]) is None:
         return None
     escape = _numbers_at(arrays, layout.ESCAPE_NUMBERS, number)
@@ -208,14 +208,14 @@ def prediction_at(
 
 
 def cut_text(text: str) -> bytes:
-    """Return a text as UTF-8 bytes, cut between characters to the size of a column."""
+    """Return text as UTF-8 bytes, cut between characters to the size of a column."""
     return text.encode()[: layout.TEXT_BYTES].decode(errors="ignore").encode()
 
 
 def _numbers_at(
     arrays: Arrays, columns: Mapping[str, layout.Column], at: int | tuple[int, int]
 ) -> dict[str, Any]:
-    """Return the numbers of a point, or of one motion of it, by field; None where missing."""
+    """Return the numbers of a point, or of one of its motions, by field; None if missing."""
     return {field: _number(arrays[column.name][at]) for field, column in columns.items()}
 
 

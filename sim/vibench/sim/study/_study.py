@@ -26,13 +26,13 @@ from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_sp
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
-"""Most values of all ranges together; more is probably a mistake."""
+"""Most values of all ranges together; a larger number is probably a mistake."""
 WHOLE = 1e-9
-"""A range this close to a whole number of steps includes its stop."""
+"""Relative tolerance within which a range has a whole number of steps and includes its stop."""
 
 
 def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]:
-    """List `start`, `start` + `step`, ... up to `stop`, which is included when it is hit [Hz].
+    """Return `start`, `start` + `step`, ... up to `stop`, which is included if it is reached exactly [Hz].
 
     Raises ValueError when the range is empty or too long.
     """
@@ -48,10 +48,10 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
 
 
 def expand_ranges(given: object) -> object:
-    """Replace tables with start, stop and step by their values, also in lists; keep anything else."""
+    """Return the value with tables of start, stop and step, also in lists, replaced by their numbers."""
     match given:
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
-            # Not isinstance, because true is also an int.
+            # Do not use isinstance, because true is also an int.
             if not {type(start), type(stop), type(step)} <= {float, int}:
                 raise ValueError(
                     f"a range from {start!r} to {stop!r} by {step!r} is not allowed: give three numbers"
@@ -82,28 +82,28 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 
 
 MOST_POINTS = 10_000_000
-"""Most points: a file of 2 GB."""
+"""Most points of a study; the file then has 2 GB."""
 AS_DESCRIBED = "as described"
-"""Label of an axis whose values are defined by the specimen only."""
+"""Label of an axis whose value is given by the specimen only."""
 
 
 class Start(StrEnum):
-    """The state from which a point begins."""
+    """Initial state of a point."""
 
     REST = "rest"
     UP = "up"
-    """The end of the point at the next lower frequency; the lowest begins at rest."""
+    """Final state of the point at the next lower frequency; rest at the lowest frequency."""
     DOWN = "down"
-    """The end of the point at the next higher frequency; the highest begins at rest."""
+    """Final state of the point at the next higher frequency; rest at the highest frequency."""
 
 
 class GivenStart(FrozenModel):
-    """A given state, the same for every point."""
+    """Given initial state, which is the same for every point."""
 
     label: Annotated[str, Field(min_length=1, max_length=60)]
     """Name of the start in the file and in results."""
     state: tuple[float, float, float, float, float, float]
-    """x, y, z, vx, vy, vz [m, m/s]."""
+    """Initial x, y, z, vx, vy, vz [m, m/s]."""
 
     def __str__(self) -> str:
         return self.label
@@ -123,12 +123,12 @@ Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValida
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(expand_ranges)]
 
-TargetError = Annotated[float, Field(gt=0.0, lt=1.0), NumberWith("%")]
-"""Relative error: 0.01, or "1 %"."""
+TargetError = Annotated[float, Field(gt=0.0, le=1.0), NumberWith("%")]
+"""Relative error, such as 0.01 or "1 %"."""
 TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), NumberWith("ms", "s", "min", "h")]
-"""Time in seconds, or with a unit: "200 ms", "2 s", "5 min"."""
+"""Time in seconds or with a unit, such as "200 ms", "2 s", "5 min"."""
 StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
-"""Observables with one number per point."""
+"""Observables that give single numbers for each point."""
 
 
 def _own_law(values: dict[str, Any]) -> tuple[str, ...]:
@@ -146,17 +146,17 @@ def _own_gap(values: dict[str, Any]) -> tuple[float, ...] | None:
 
 
 def _described_specimen(values: dict[str, Any]) -> SpecimenTable:
-    """Return the specimen of a study that is being read; the default one if that was not valid."""
+    """Return the specimen of a study that is being validated; the default specimen if it was not valid."""
     found: SpecimenTable = values.get("specimen") or usual_specimen()
     return found
 
 
 AXES_OF_SPECIMEN = 3
-"""Number of first axes of a study that define the specimen: contact law, damping, gap."""
+"""Number of the first axes of a study, which define the specimen: contact law, damping, gap."""
 
 
 class Study(GridPlan):
-    """Complete request for predictions: equal studies have equal results."""
+    """Complete request for predictions; equal studies have equal results."""
 
     called: ClassVar[str] = "study"
     format: ClassVar[str] = FORMAT
@@ -164,35 +164,35 @@ class Study(GridPlan):
     specimen: SpecimenTable = Field(
         default_factory=usual_specimen, validation_alias=AliasChoices("specimen", "structure")
     )
-    """A name or a path, or a table that may start from one (``model``); the paper's when absent."""
+    """Name or path of a specimen, or a table that may start from one (``model``); by default the paper's."""
     frequencies_hz: Frequencies
-    """A list, or a table with start, stop and step, or several of these in a list."""
+    """Drive frequencies: a list of numbers and of tables with start, stop and step, or one such table."""
     amplitudes_m: Positive
     """Amplitudes of the base displacement."""
     models: Annotated[tuple[ContactWord, ...], Field(min_length=1, default_factory=_own_law)]
-    """Contact laws as `vibench.sim.specimen` spells them; the specimen's own when absent."""
+    """Contact laws, by their names in `vibench.sim.specimen`; by default that of the specimen."""
     damping_times_s: Annotated[NotNegative | None, Field(default_factory=_own_damping)]
-    """c_i = damping time * k_i; as the specimen has it when absent."""
+    """Ratios of damping to stiffness, c_i / k_i; by default that of the specimen."""
     gaps_m: Annotated[Positive | None, Field(default_factory=_own_gap)]
-    """Clearance at both stops; as the specimen has it when absent."""
+    """Clearances at both stops; by default those of the specimen."""
     starts: Annotated[tuple[Start | GivenStart, ...], Field(min_length=1)] = (Start.REST,)
-    """Start of each point; the motion that is reached may depend on it."""
+    """Initial states of each point; the motion that is reached may depend on the initial state."""
     observe: tuple[StudyObservable, ...] = (Observable.RESPONSE,)
-    """Observed quantities; sections and spectra, whose lengths differ, are only available for single
+    """Observed quantities. Sections and spectra, whose lengths differ, are available only for single
     scenes."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of every point."""
     duration_s: PositiveFloat | Literal["auto"] = 30.0
     """Length of each run; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
-    """Length of the observed end of the run."""
+    """Length of the observed window at the end of the run."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Processor time per point for other starts (with sensitive dependence on the start) and for following
-    chaos further."""
+    """Processor time per point for following chaos further and, with sensitive dependence on the start, for
+    other starts."""
     error: TargetError | None = None
-    """Requested relative error of each point, 0.01 or "1 %"; sets accuracy, duration and budget."""
+    """Requested relative error of each point, 0.01 or "1 %"; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
-    """Time limit per point, 2 or "2 s"; one minute by default."""
+    """Time limit per point, 2 or "2 s"; with only an error, one minute."""
 
     @model_validator(mode="after")
     def _target_stands_alone(self) -> Self:
@@ -210,7 +210,7 @@ class Study(GridPlan):
 
     @model_validator(mode="after")
     def _scenes_are_allowed(self) -> Self:
-        """Refuse an unknown model or a too short window before any point is computed."""
+        """Raise ValueError for an unknown model or a window that is too short, before any computation."""
         for model in range(len(self.models)):
             for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
                 self.scene((model, 0, gap, 0, 0, 0), Rest())
@@ -225,7 +225,7 @@ class Study(GridPlan):
 
     @property
     def start_labels(self) -> tuple[str, ...]:
-        """Names of the starts."""
+        """Names of the starts in the file and in results."""
         return tuple(str(start) for start in self.starts)
 
     @property
@@ -242,13 +242,13 @@ class Study(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Stored columns of each point."""
+        """Columns that are stored for each point."""
         return COLUMNS
 
     def scene(self, place: tuple[int, ...], start: Rest | Given, phase_rad: float = 0.0) -> Scene:
-        """Return the scene at a place of the grid.
+        """Return the scene at a position of the grid.
 
-        Raises ValueError when a scene of these numbers is not allowed.
+        Raises ValueError when a scene with these values is not allowed.
         """
         model, damping, gap, amplitude, _, frequency = place
         return Scene(
@@ -267,12 +267,12 @@ class Study(GridPlan):
         )
 
     def frequency_at(self, place: tuple[int, ...]) -> float:
-        """Drive frequency at a place of the grid [Hz]."""
+        """Return the drive frequency at a position of the grid [Hz]."""
         return self.frequencies_hz[place[-1]]
 
     @property
     def target(self) -> Target | None:
-        """Return the target of each point; None without an error and a time."""
+        """Requested error and time of each point; None if neither is given."""
         return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @property
@@ -286,7 +286,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Return an axis of numbers, or with one label if the specimen defines the value."""
+    """Return an axis of numbers, or of one label if the value is given by the specimen."""
     return (
         StudyAxis(name, (AS_DESCRIBED,), "", long_name)
         if values is None
@@ -295,19 +295,19 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
 
 
 def continued_from(frequency_hz: float) -> str:
-    """Return the name of a start at the end of another point."""
+    """Return the name of a start that is the final state of the point at this frequency."""
     return f"end at {frequency_hz:g} Hz"
 
 
 OTHER_STARTS = 8
-"""Number of runs counted for a point if its motion may depend sensitively on the start."""
+"""Assumed number of runs for a point whose motion may depend sensitively on its start."""
 
 
 def study_solver(study: Study) -> Solver:
-    """Choose the solver of a study: batches, or one point after the other.
+    """Return the solver of a study: in batches, or one point after the other.
 
-    Batches need independent motions, a processor with wide registers and enough motion per specimen. Stops
-    other than Hertz's and accuracy *reference* are solved one by one.
+    Batches require independent motions, a processor with wide registers and enough simulated time per
+    specimen. Even then, stops other than Hertz contacts and the accuracy *reference* are solved one by one.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
@@ -317,15 +317,15 @@ def study_solver(study: Study) -> Solver:
 
 
 MOST_GAPS = 1000.0
-"""Base amplitude, in gaps, above which a warning is given: 45 mm at the paper's gap exceeds the stroke of any
-shaker."""
+"""Ratio of base amplitude to gap above which a warning is given. At the paper's gap it means 45 mm, more than
+the stroke of any shaker."""
 WIDEST_M = 0.1
-"""Clearance above which a warning is given: a specimen on a shaker is hardly larger."""
+"""Gap above which a warning is given [m], because a specimen on a shaker is hardly larger."""
 _MICRO = 1e-6
 
 
 def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]) -> Iterator[str]:
-    """Yield warnings of implausible base amplitudes and gaps (infinite without a stop)."""
+    """Yield warnings about implausible base amplitudes [m] and gaps [m]; a gap without a stop is infinite."""
     gaps_m = tuple(gaps_m)
     largest_m, narrowest_m = max(amplitudes_m, default=0.0), min(gaps_m)
     if largest_m > MOST_GAPS * narrowest_m:
