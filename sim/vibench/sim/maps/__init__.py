@@ -1,8 +1,8 @@
 """Maps of motions over two parameters, over two coordinates of the start, or along one of them.
 
-A map is a `vibench.sim.study` plan whose points are settled motions: kind, period, responses, impacts. A
-coarse lattice is computed first, then points where neighbours differ; the rest is filled in. A random sample
-of filled points is computed to estimate the error rate (docs/maps.md).
+A map is a plan as in `vibench.sim.study` whose points are settled motions: kind, period, responses, impacts.
+Points on a coarse lattice are computed first, then points whose neighbours differ; all other points are
+filled in by interpolation. A random sample of these is computed to estimate the error rate (docs/maps.md).
 
 >>> from vibench.sim.maps import Map, Range, solve_map
 >>> plan = Map(

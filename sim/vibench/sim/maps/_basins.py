@@ -1,4 +1,4 @@
-"""Analysis of a basin map: uncertainty exponent of boundaries, and basin stability under kicks."""
+"""Analysis of basins of attraction: uncertainty exponent of their boundaries, and stability under kicks."""
 
 import math
 from collections.abc import Sequence
@@ -21,46 +21,45 @@ from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults
 
 BLOCKS = 4
-"""Number of parts along each axis for a jackknife of the exponent."""
+"""Number of parts along each axis in the jackknife estimate of the exponent's error."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Fewest uncertain cells that make a distance usable."""
+"""Fewest uncertain cells at a distance that is used."""
 MOST_UNCERTAIN = 0.5
-"""Largest share of uncertain cells that makes a distance usable; above it, cells differ by chance."""
+"""Largest share of uncertain cells at a distance that is used; above it, cells differ by chance."""
 SPREAD = 4.0
-"""Smallest ratio of the largest to the smallest distance; the slope over a smaller range is unreliable."""
+"""Smallest ratio of the largest to the smallest distance; over a smaller range the slope is unreliable."""
 
 
 @dataclass(frozen=True)
 class UncertaintyExponent:
-    """Uncertainty exponent: the share f of uncertain starts falls with their uncertainty d as d^exponent.
+    """Uncertainty exponent: the share of uncertain starts is proportional to (uncertainty)^exponent.
 
-    The exponent is 1 for a smooth boundary, and 0 if more accurate starts do not help. The dimension of the
-    boundary is 2 minus the exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
+    The exponent is 1 for a smooth boundary, and 0 if a more accurate start does not help. The dimension of
+    the boundary is 2 minus the exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
     """
 
     exponent: float
     low: float
-    """Lower end of the interval for 19 cases of 20, within the resolution of the grid."""
+    """Lower end of the 95 % confidence interval, at the resolution of the grid."""
     high: float
     steps: tuple[int, ...]
     """Compared distances in steps of the grid."""
     shares: tuple[float, ...]
-    """Share of starts at each distance that have a neighbour with another motion."""
+    """Share of uncertain starts at each distance."""
 
 
 def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | None:
-    """Find the uncertainty exponent of the boundary between the motions of a map over two coordinates.
+    """Return the uncertainty exponent of the basin boundaries in a map over two coordinates of the start.
 
-    A start is uncertain at a distance if a start that far away along an axis reaches another motion. The
-    interval is from a jackknife over parts of the map. None unless at least three distances have enough
-    uncertain starts, and at most half of all.
+    A start is uncertain at a distance if a start at this distance along an axis reaches another motion. The
+    confidence interval is a jackknife estimate over parts of the map. None unless at least three distances
+    have at least 100 uncertain starts, and at most half of all starts.
 
     Parameters
     ----------
     numbers
-        Number of the motion that each start reached, shape (rows, columns): `MapResults.motion_numbers[:,
-        0]`.
+        Index of the motion that each start reached, `MapResults.motion_numbers[:, 0]`, shape (rows, columns).
     """
     steps = [2**k for k in range(int(math.log2(max(min(numbers.shape) // 8, 1))) + 1)]
     uncertain = {step: _uncertain(numbers, step, steps[-1]) for step in steps}
@@ -83,7 +82,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
 
 
 def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
-    """Return whether a start one step away along an axis reaches another motion; edge cells are omitted."""
+    """Return whether a start ``step`` away along an axis reaches another motion; edge cells are omitted."""
     inner = numbers[
         edge - step : numbers.shape[0] - edge + step, edge - step : numbers.shape[1] - edge + step
     ]
@@ -94,7 +93,7 @@ def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.b
 
 
 def _share_without(uncertain: NDArray[np.bool_], part: int) -> float:
-    """Return the share of uncertain starts with one part of the map left out."""
+    """Return the share of uncertain starts, with one part of the map left out."""
     rows, columns = (np.arange(length) * BLOCKS // length for length in uncertain.shape)
     is_in = (rows[:, None] * BLOCKS + columns) != part
     return max(float(uncertain[is_in].mean()), 1.0 / uncertain.size)
@@ -106,12 +105,12 @@ def _slope(steps: Sequence[int], shares: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class KickStability:
-    """Stability of a motion under kicks of all displacements and velocities."""
+    """Stability of a motion under random kicks of all displacements and velocities."""
 
     motion: int
     """Index of the motion in `MapResults.motion_numbers`."""
     size: float
-    """Standard deviation of each displacement over the gap; of each velocity over gap times 2 pi f."""
+    """Standard deviation of the kicks: of displacements over the gap, of velocities over gap * 2 pi f."""
     returned: Share
     """Share of kicks after which the motion returns, within the drive periods of the map."""
 
@@ -123,21 +122,21 @@ def kick_stability(
     seed: int = 1,
     workers: int | None = None,
 ) -> tuple[KickStability, ...]:
-    """Kick each motion of a basin map and count how often it returns (basin stability).
+    """Return how often each motion of a basin map returns after random kicks (basin stability).
 
-    Raises InvalidStudy when more than the start varies, or there is no kick.
+    Raises InvalidStudy when drive or specimen vary in the map, or the number of kicks is below 1.
 
     Parameters
     ----------
     results
-        A complete map in which only the start varies.
+        Complete map in which only the start varies.
     sizes
-        Sizes of the kicks, drawn from a normal distribution (Menck, Heitzig, Marwan and Kurths, Nature
-        Physics 9 (2013) 89, draw them from a box).
+        Sizes of the kicks, which are normally distributed (in Menck, Heitzig, Marwan and Kurths, Nature
+        Physics 9 (2013) 89, they are uniformly distributed in a box).
     kicks
-        Number of kicks of each size, all at one drive phase.
+        Number of kicks of each size, all at the same drive phase.
     seed, workers
-        Seed of the kicks; number of threads.
+        Seed of the kicks, and number of threads.
     """
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks were requested; give 1 or more.")

@@ -1,4 +1,4 @@
-"""Points of a map as scenes: their starts, stored results, and selection."""
+"""Points of a map as scenes: their starts, their stored results, and the selection of computed points."""
 
 import math
 import os
@@ -29,19 +29,19 @@ from ._map import OF_SPECIMEN, START, Map, contact_energy_j, labels_of, section_
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1
-"""Relative difference of neighbouring responses that triggers refinement."""
+"""Relative difference between neighbouring responses above which a map is refined."""
 BASIN_JUMP = 2e-3
-"""The same if only the start varies: responses of one motion then differ only by remaining transients."""
+"""The same if only the start varies; responses of one motion then differ only by remaining transients."""
 NOTHING = -1
 BUNDLE_S = 0.3
-"""Worker time of a bundle of scenes [s], enough for full SIMD batches."""
+"""Worker time of a bundle of scenes [s], long enough for full SIMD batches."""
 
 
 def map_solver(plan: Map) -> Solver:
-    """Return the solver of a map: SIMD batches, or point by point.
+    """Return the solver of a map: in SIMD batches, or point by point.
 
-    Batches need independent motions of one specimen and a processor with wide registers. Stops other than
-    Hertz's, accuracy *reference* and points with a target are solved one by one.
+    Batches require independent motions of one specimen and a processor with wide registers. Stops other than
+    Hertz contacts, the accuracy *reference* and points with a target are solved one by one.
     """
     if plan.target is not None:
         return solve_scene
@@ -52,12 +52,12 @@ def map_solver(plan: Map) -> Solver:
 
 
 class MapPoints(Points):
-    """The points of a map."""
+    """The points of a map as scenes."""
 
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Checked here, not in the plan: files of earlier versions contain such maps.
+        # Check here and not in the plan, because files of earlier versions contain such maps.
         of_start = [each.field for each in plan.varied if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(
@@ -70,13 +70,13 @@ class MapPoints(Points):
 
     @property
     def wanted_first(self) -> NDArray[np.int64]:
-        """Return the points of the first lattice."""
+        """Numbers of the points of the first lattice, from all starts."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points of the next cells from all starts, or all points of a non-adaptive map."""
+        """Return the points to compute next, from all starts; all points if the map is not adaptive."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
@@ -86,14 +86,14 @@ class MapPoints(Points):
         return self.plan.scene(self.grid.place(number))
 
     def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point that continues another."""
+        """Return the scene of a point that continues the point ``before``."""
         place = self.grid.place(number)
         state = state_of(arrays["final_state"][before].astype(np.float64))
         start = Given(state, self.plan.start_labels[place[-2]])
         return self.plan.scene(place, start, self.plan.phase_after(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the stored results of a prediction."""
+        """Return the values to store for a prediction."""
         found = solved.prediction
         numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
         cells: dict[str, Cell] = {
@@ -119,7 +119,7 @@ class MapPoints(Points):
 
 
 def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
-    """Return which cells of an adaptive map are to be computed next, and what was filled in."""
+    """Return the cells of an adaptive map to compute next, or the filled-in cells if there are none."""
     shape = plan.grid.shape
     state = np.asarray(arrays["state"]).reshape(shape)
     is_known = np.all((state != PointState.MISSING) & (state != PointState.FILLED), axis=1)
@@ -138,15 +138,15 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a number for each cell, by the motion of the first start and the set of motions found.
+    """Return a number for each cell, equal for equal motions of the first start and equal sets of motions.
 
-    From shape (rows, starts, columns) to (rows, columns).
+    ``label`` has the shape (rows, starts, columns), the result (rows, columns).
     """
     rows, starts, columns = label.shape
     if starts == 1:
         return label[:, 0]
     found = np.sort(label, axis=1)
-    # Count a motion only once, even if several starts reach it.
+    # Count a motion once, even if several starts reach it.
     found[:, 1:][found[:, 1:] == found[:, :-1]] = NOTHING
     cells = np.concatenate([label[:, :1], np.sort(found, axis=1)], axis=1)
     flat = cells.transpose(0, 2, 1).reshape(rows * columns, starts + 1)
@@ -154,69 +154,69 @@ def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def cells_shape(grid: Grid) -> tuple[int, int]:
-    """Return rows and columns of a map over two quantities."""
+    """Return the numbers of rows and columns of a map over two quantities."""
     rows, _, columns = grid.shape
     return rows, columns
 
 
 def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:
-    """Return the numbers of the points of some cells of a map over two quantities, from all starts."""
+    """Return the numbers of the points in some cells of a map over two quantities, for all starts."""
     _, starts, columns = grid.shape
     row, column = np.divmod(cells, columns)
     return np.asarray(((row[:, None] * starts + np.arange(starts)) * columns + column[:, None]).reshape(-1))
 
 
 POINT_S = 2e-4
-"""Time that the main process spends on each point [s]: build its scene, store its result."""
+"""Time that the main process needs for each point [s]: build its scene and store its result."""
 
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """Estimated time of a map; for an adaptive one, from its coarse lattice to all points."""
+    """Estimated time of a map. For an adaptive map: bounds, from the first lattice only to all points."""
 
     points: int
     coarse_points: int
-    """Number of points of the first lattice: at least these are computed."""
+    """Number of points of the first lattice, which are computed in any case."""
     work_s: float
-    """Work of all points on one core, from recent run times on this machine."""
+    """Time of all points on one core [s], from recent run times on this machine."""
     longest_work_s: float
-    """Work if no motion repeats: each is followed for all drive periods of the map."""
+    """Time of all points on one core [s] if no motion repeats and all runs have their full length."""
     coarse_work_s: float
-    """Work of the first lattice."""
+    """Time of the first lattice on one core [s]."""
     workers: int
     file_bytes: int
     followed: str
-    """Method chosen by `map_solver`."""
+    """Description of the solver chosen by `map_solver`."""
     known_from: str
-    """Source of the times."""
+    """Description of the source of the run times."""
 
     @property
     def all_s(self) -> float:
-        """Time until all points are computed."""
+        """Elapsed time for all points [s]."""
         return self._elapsed_s(self.points, self.work_s)
 
     @property
     def most_s(self) -> float:
-        """Time until all points are computed if no motion repeats."""
+        """Elapsed time for all points if no motion repeats [s]."""
         return self._elapsed_s(self.points, self.longest_work_s)
 
     @property
     def first_s(self) -> float:
-        """Time until the first lattice is done."""
+        """Elapsed time for the first lattice [s]."""
         return self._elapsed_s(self.coarse_points, self.coarse_work_s)
 
     @property
     def most_useful_workers(self) -> int:
-        """Number of workers above which they wait for the main process."""
+        """Largest useful number of workers; more workers would wait for the main process."""
         return max(1, math.floor(self.work_s / (self.points * POINT_S)))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
-        """Return the elapsed time: shared work, one main process, and the last point alone."""
+        """Return the elapsed time [s]: shared work and a last point, or the time of the main process."""
         return max(work_s / self.workers + work_s / points, points * POINT_S)
 
     @property
     def sentence(self) -> str:
-        """Return the estimate as a sentence."""
+        """Estimate as text."""
         return (
             f"{self.points} points at most, {self.coarse_points} of them in the first picture; all are "
             f"planned as {self.work_s:.2g} s of one core, as {self.known_from}. With "
@@ -238,10 +238,10 @@ class MapEstimate:
 
 
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
-    """Estimate the time of a map on ``workers`` threads from recent run times on this machine.
+    """Return the estimated time of a map on ``workers`` threads, from recent run times on this machine.
 
-    No point is run, except in a pilot of about a second where points have a target. The number of refined
-    points and of repeating motions is unknown beforehand: the estimate gives bounds.
+    No point is computed, except in pilot runs of about a second if points have a target. The numbers of
+    refined points and of repeating motions are not known in advance, so the estimate consists of bounds.
     """
     points = MapPoints(plan)
     row_bytes = sum(np.dtype(column.dtype).itemsize * column.components for column in plan.columns)

@@ -1,4 +1,4 @@
-"""Request for a map: fixed parameters, and one or two that vary."""
+"""Request for a map: fixed parameters, and one or two varying parameters."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -50,18 +50,18 @@ KEPT = (
     "session",
     "state",
 )
-"""Columns of a study that a map also has."""
+"""Columns of a study that are also columns of a map."""
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
 """Additional columns of a map with a target."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
-"""Most stored states per motion, one per drive period, along one quantity."""
+"""Most stored section points (states once per drive period) of a motion, in a map along one quantity."""
 SECTION_COLUMNS = tuple(
     Column(f"section_{name}", "<f8", "m", f"{what} once a drive period", (), SECTION_STATES, "drive_period")
     for name, what in (("x", "displacement of m0"), ("p", "displacement of m1 against m2"))
 )
-"""Section columns of a map along one quantity."""
+"""Columns for the section points in a map along one quantity."""
 _OF_STUDIES = {column.name: column for column in COLUMNS}
 _MAP_COLUMNS = (
     *(_OF_STUDIES[name] for name in KEPT[:-1]),
@@ -71,33 +71,33 @@ _MAP_COLUMNS = (
 
 
 def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
-    """Return all columns; the state of a point is the last."""
+    """Return all columns of a map; the state of a point is the last column."""
     return (*_MAP_COLUMNS, *more, _OF_STUDIES["state"])
 
 
 LONGER = 64
-"""Base of the numbers that label a kind of motion with its period; above the longest searched period."""
+"""Base of the labels, kind * LONGER + period; larger than the longest period that is detected."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
 
 
 def without_impacts(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Return which points have motions without impacts."""
+    """Return whether the motion of each point has period 1 and no impacts, shape (points,)."""
     is_first = (arrays["motion"] == _PERIODIC) & (arrays["period"] == 1)
     return np.asarray(is_first & (arrays["impact_rate"] == 0.0))
 
 
 def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """Return labels of motions by kind and period; motions without impacts have their own."""
+    """Return a label of each motion by kind and period; motions without impacts have a separate label."""
     motion, period = (arrays[name].astype(np.int64) for name in ("motion", "period"))
     return np.where(without_impacts(arrays), _PERIODIC * LONGER, motion * LONGER + period)
 
 
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:
-    """Return the largest energy stored in a stop [J], from the penetration; None for rigid stops.
+    """Return the largest energy stored in a stop [J], from the penetration; None without elastic stops.
 
-    Also None where gaps differ and abs(p) exceeds the smaller: either stop may have been reached.
+    None also if the gaps differ and abs(p) exceeds the smaller gap: either stop may have been reached.
     """
     stops = specimen.contact.stops
     if found.relative_i is None or stops.restitution is not None:
@@ -111,7 +111,7 @@ def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None
 
 
 def section_cells(found: ScenePrediction) -> dict[str, Cell]:
-    """Return the last states once per drive period: one period of a repeating motion, else the maximum."""
+    """Return the section points to store: one period of a repeating motion, otherwise `SECTION_STATES`."""
     if found.section is None:
         return {}
     most = min(SECTION_STATES, found.period or SECTION_STATES)
@@ -126,9 +126,9 @@ class Quantity:
     """A parameter of a scene that may be fixed or vary."""
 
     field: str
-    """Field of `Map`."""
+    """Name of the field of `Map`."""
     axis: str
-    """Axis of the results."""
+    """Name of the axis of the results."""
     units: str
     long_name: str
 
@@ -156,11 +156,11 @@ QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)
 
 
 MOST_POINTS = 4_000_000
-"""Largest number of points: a file of 1 GB, and as much memory."""
+"""Largest number of points; file and memory then have 1 GB each."""
 MOST_STEP = 16
-"""Default steps between the points of the first lattice."""
+"""Default spacing of the first lattice, in grid steps."""
 FEWEST_STEPS = 8
-"""Fewest steps of the first lattice on an axis; a map from fewer would be mostly interpolated."""
+"""Fewest intervals of the first lattice on an axis; with fewer, most of the map would be interpolated."""
 STARTS = "start"
 RANDOM = "random"
 
@@ -205,7 +205,7 @@ class Range(FrozenModel):
 
     @property
     def edges(self) -> tuple[float, ...]:
-        """Edges of the cells of its values, one more than values."""
+        """Edges of the cells around the values; one more than values."""
         if self.spacing is Spacing.LINEAR:
             half = 0.5 * (self.stop - self.start) / (self.points - 1)
             return tuple(np.linspace(self.start - half, self.stop + half, self.points + 1).tolist())
@@ -219,9 +219,9 @@ class Refinement(StrEnum):
     """Selection of the computed points of a map over two quantities."""
 
     ADAPTIVE = "adaptive"
-    """A coarse lattice first, and other points only where neighbours differ."""
+    """Points of a coarse lattice first, then points whose neighbours differ."""
     FULL = "full"
-    """Every point."""
+    """All points."""
 
 
 Number = float | Range
@@ -229,68 +229,68 @@ Positive = PositiveFloat | Range
 
 
 class Map(GridPlan):
-    """Map of motions over two quantities or along one. One or two fields are a `Range`."""
+    """Map of motions over two quantities or along one; one or two fields are a `Range`."""
 
     called: ClassVar[str] = "map"
     format: ClassVar[str] = "vibench-map"
 
     specimen: SpecimenTable = Field(default_factory=usual_specimen)
-    """A name or a path, or a table that may start from one (``model``); the paper's when absent."""
+    """Name or path of a specimen, or a table that may start from one (``model``); by default the paper's."""
     model: ContactWord | None = None
-    """Contact law; the specimen's own when absent."""
+    """Contact law; by default that of the specimen."""
     frequency_hz: Positive = 260.0
     """Frequency of the drive."""
     amplitude_m: Positive = 5e-6
     """Amplitude of the base displacement."""
     gap_m: Positive | None = None
-    """Clearance at both stops; the specimen's own when absent, as the next five."""
+    """Clearance at both stops; by default that of the specimen, as for the next five parameters."""
     damping_time_s: NonNegativeFloat | Range | None = None
-    """c_i = damping time * k_i."""
+    """Damping over stiffness, c_i / k_i."""
     k0_n_per_m: Positive | None = None
-    """Stiffness between base and m0; dampers follow if the specimen has a damping time."""
+    """Stiffness between base and m0; dampings change with it if the specimen has a damping time."""
     k1_n_per_m: Positive | None = None
-    """Between m2 and m1."""
+    """Stiffness between m2 and m1."""
     k2_n_per_m: Positive | None = None
-    """Between m0 and m2."""
+    """Stiffness between m0 and m2."""
     hertz_stiffness: Positive | None = None
-    """k of F = k d^(3/2) at a stop [N/m^1.5]."""
+    """Hertz stiffness k of a stop, F = k d^(3/2) [N/m^1.5]."""
     x_m: Number = 0.0
-    """Start: absolute displacements and velocities of m0, m1 and m2."""
+    """Initial absolute displacements and velocities of m0, m1 and m2."""
     y_m: Number = 0.0
     z_m: Number = 0.0
     vx_m_per_s: Number = 0.0
     vy_m_per_s: Number = 0.0
     vz_m_per_s: Number = 0.0
     chain: tuple[Literal[Start.UP, Start.DOWN], ...] = ()
-    """Start from the end of the previous point along the range: up, down, or both."""
+    """Start each point from the final state of the previous point: up, down, or both along the range."""
     random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
-    """Random additional starts at every point, to find coexisting motions and their shares."""
+    """Number of additional random starts at every point, to find coexisting motions and their shares."""
     seed: Annotated[int, Field(ge=0)] = 1
-    """Seed of the random states."""
+    """Seed of the random starts."""
     observe: Annotated[tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...], Field(min_length=1)] = (
         Observable.RESPONSE,
     )
-    """Additional observables: "lyapunov" is the largest exponent, over up to 25 s at each point (tens of
-    times the work)."""
+    """Additional observables: "lyapunov" is the largest Lyapunov exponent, averaged over up to 25 s at each
+    point, which takes tens of times longer."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of each point."""
     error: TargetError | None = None
-    """Requested relative error of each point, 0.01 or "1 %"; sets the accuracy."""
+    """Requested relative error of each point, 0.01 or "1 %"; replaces the accuracy."""
     time_s: TargetTime | None = None
-    """Time limit per point, 2 or "2 s"; one minute by default."""
+    """Time limit per point, 2 or "2 s"; with only an error, one minute."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
-    """Longest run in drive periods of a motion that does not repeat."""
+    """Longest run of a motion that does not repeat, in drive periods."""
     window_periods: Annotated[int, Field(ge=10)] = 200
-    """Drive periods over which a motion that does not repeat is observed."""
+    """Length of the window for a motion that does not repeat, in drive periods."""
     refinement: Refinement = Refinement.ADAPTIVE
     """Selection of the computed points of a map over two quantities."""
     coarse: Annotated[int, Field(ge=2, le=64)] | None = None
-    """Steps between the points that are computed first, halved until 1. Absent: 16, or fewer so that each
-    axis has eight such steps. Points between equal neighbours are filled in."""
+    """Grid steps between the points that are computed first; halved until 1. By default 16, or fewer so that
+    each axis has eight intervals. Points between equal neighbours are filled in."""
 
     @property
     def target(self) -> Target | None:
-        """Return the target of each point; None without an error and a time."""
+        """Requested error and time of each point; None if neither is given."""
         return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @model_validator(mode="after")
@@ -323,7 +323,7 @@ class Map(GridPlan):
         return self
 
     def _refuse_unless_felt(self, quantity: Quantity) -> None:
-        """Refuse a range of a parameter that the contact law does not use."""
+        """Raise ValueError for a range of a parameter that has no effect with this contact law."""
         if quantity not in OF_SPECIMEN:
             return
         span = self.range_of(quantity)
@@ -340,34 +340,34 @@ class Map(GridPlan):
 
     @property
     def varied(self) -> tuple[Quantity, ...]:
-        """Return the one or two varying quantities; the first is along the last axis."""
+        """The one or two varying quantities; the first is on the last axis of the results."""
         return tuple(each for each in QUANTITIES if isinstance(getattr(self, each.field), Range))
 
     def range_of(self, quantity: Quantity) -> Range:
-        """Return the range of a quantity that varies."""
+        """Return the range of a varying quantity."""
         found = getattr(self, quantity.field)
         assert isinstance(found, Range), "only varied parameters are requested"
         return found
 
     @property
     def is_basin(self) -> bool:
-        """Return whether only the start varies."""
+        """Whether only the start varies."""
         return all(each in START for each in self.varied)
 
     @property
     def is_over_drive(self) -> bool:
-        """Return whether drive frequency and amplitude vary, so that levels of recordings can be overlaid."""
+        """Whether drive frequency and amplitude vary, so that levels of recordings can be overlaid."""
         return [each.axis for each in self.varied] == ["frequency", "amplitude"]
 
     @property
     def is_adaptive(self) -> bool:
-        """Return whether points may be filled in: two quantities, no chain."""
+        """Whether points may be filled in, which requires two varying quantities and no chain."""
         may_be = self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
         return may_be and self.first_step > 1
 
     @property
     def first_step(self) -> int:
-        """Steps between the points that are computed first; 1 if all points are."""
+        """Grid steps between the points that are computed first; 1 if all points are computed."""
         if self.coarse is not None:
             return self.coarse
         fewest = min(self.range_of(each).points for each in self.varied)
@@ -376,7 +376,7 @@ class Map(GridPlan):
 
     @property
     def start_labels(self) -> tuple[str, ...]:
-        """Return the names of the starts of each point."""
+        """Names of the starts of each point."""
         own = tuple(str(each) for each in self.chain) or (
             "given" if any(getattr(self, each.field) for each in START) else "rest",
         )
@@ -384,7 +384,7 @@ class Map(GridPlan):
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Return the dimensions of the results: second varying quantity if any, starts, first one."""
+        """Dimensions of the results: second varying quantity (if any), starts, first varying quantity."""
         first, *second = (
             StudyAxis(each.axis, self.range_of(each).values, each.units, each.long_name)
             for each in self.varied
@@ -393,14 +393,14 @@ class Map(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Stored columns: errors only with a target, sections only along one quantity."""
+        """Stored columns; errors only with a target, section points only along one quantity."""
         errors = () if self.target is None else tuple(_OF_STUDIES[name] for name in ERRORS)
         return columns_with((*errors, *(SECTION_COLUMNS if len(self.varied) == 1 else ())))
 
     def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
-        """Return the scene at a place of the grid, from its own start or the given one.
+        """Return the scene at a position of the grid, with the start of the plan or the given start.
 
-        Raises ValueError when a scene of these numbers is not allowed.
+        Raises ValueError when a scene with these values is not allowed.
         """
         numbers = self._numbers(place)
         frequency_hz = numbers["frequency_hz"]
@@ -426,13 +426,13 @@ class Map(GridPlan):
         )
 
     def frequency_at(self, place: tuple[int, ...]) -> float:
-        """Drive frequency at a place of the grid [Hz]."""
+        """Return the drive frequency at a position of the grid [Hz]."""
         return float(self._numbers(place)["frequency_hz"])
 
     def _start(
         self, place: tuple[int, ...], numbers: Mapping[str, float], specimen: Specimen, drive: Harmonic
     ) -> Given | Rest:
-        """Return the start of a point that does not continue another."""
+        """Return the start of a point that does not continue another point."""
         if place[-2] >= max(1, len(self.chain)):
             drawn = np.random.default_rng([self.seed, place[-2]])
             return Given(state_of(random_state(specimen, drive, drawn)), RANDOM)
@@ -441,7 +441,7 @@ class Map(GridPlan):
         return Given(state_of(np.array([numbers[each.field] for each in START])))
 
     def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
-        """Return the value of every quantity at a place of the grid."""
+        """Return the value of every quantity at a position of the grid."""
         numbers = {each.field: getattr(self, each.field) for each in QUANTITIES}
         for quantity, index in zip(self.varied, (place[-1], place[0]), strict=False):
             numbers[quantity.field] = _values(self.range_of(quantity))[index]
@@ -462,7 +462,7 @@ def _specimen(
     stiffnesses: tuple[float | None, ...],
     hertz_stiffness: float | None,
 ) -> Specimen:
-    """Build a specimen once for all points that share it."""
+    """Return a specimen, which is built only once for all points that share it."""
     changes: dict[str, object] = {}
     if any(each is not None for each in stiffnesses):
         k0, k1, k2 = (

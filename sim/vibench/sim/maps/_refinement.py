@@ -1,7 +1,7 @@
-"""Selection of the computed cells of a map: a coarse lattice first, then where neighbours differ.
+"""Selection of the computed cells of a map: a coarse lattice first, then cells whose neighbours differ.
 
-The plan is a pure function of the known results, recomputed from the coarse lattice whenever all requested
-cells are done. So a resumed map computes the same cells as an uninterrupted one.
+The selection depends only on the known results, and is repeated from the coarse lattice whenever all
+requested cells are done. A resumed map therefore computes the same cells as an uninterrupted map.
 """
 
 from collections.abc import Iterator
@@ -17,17 +17,17 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Largest number and share of filled cells that the audit computes."""
+"""Largest number and largest share of filled-in cells that are computed for the audit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Compared quantities of the cells of a map, arrays of shape (rows, columns)."""
+    """Compared results of the cells of a map, arrays of shape (rows, columns)."""
 
     is_known: Mask
-    """Whether the cell is computed."""
+    """Whether the cell has been computed."""
     codes: Codes
-    """Motion of each cell."""
+    """Number of the motion, or set of motions, of the cell."""
     sizes: Floats
     """Natural logarithm of a response; NaN for motions whose response is not reproducible."""
     jump: float
@@ -36,45 +36,45 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """Filled cells of one level, with the cells and weights for interpolation."""
+    """Filled-in cells of one level, with the cells and weights for interpolation."""
 
     cells: Indices
-    """Flat numbers, shape (n,)."""
+    """Flat indices of the filled-in cells, shape (n,)."""
     donors: Indices
-    """Computed cells that supply their motion, shape (n,)."""
+    """Computed cells whose motion is copied, shape (n,)."""
     corners: Indices
-    """Computed or filled cells of coarser levels with the same motion, shape (n, 4)."""
+    """Cells of coarser levels with the same motion, as corners for interpolation, shape (n, 4)."""
     weights: Floats
-    """Shape (n, 4); their sum is 1."""
+    """Interpolation weights of the corners, whose sum is 1, shape (n, 4)."""
 
 
 @dataclass(frozen=True, eq=False)
 class RefinementPlan:
-    """Cells to compute next, and the filled cells once there are none."""
+    """Cells to compute next, or the filled-in cells if there are none."""
 
     missing: Indices
-    """Flat numbers of the cells that are to be computed next."""
+    """Flat indices of the cells to compute next."""
     step: int
-    """Steps between the points of the current lattice."""
+    """Grid steps between the points of the current lattice."""
     fillings: tuple[Filling, ...] = ()
-    """Coarse levels first."""
+    """Filled-in cells of each level, from coarse to fine."""
     audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Audited cells: computed instead of filled in."""
+    """Audited cells, which are computed although they could be filled in."""
     audited_donors: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Computed cells that had supplied the motion of each audited cell."""
+    """Computed cells whose motion would have been copied to each audited cell."""
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
-    """Return the cells to compute next; none when the map is done.
+    """Return the cells to compute next; none if the map is complete.
 
     Parameters
     ----------
     seen
         Results so far.
     coarse
-        Steps between the points of the first lattice, a power of 2.
+        Grid steps between the points of the first lattice, a power of 2.
     seed
-        Seed of the choice of audited cells.
+        Seed of the random choice of audited cells.
     """
     shape = seen.is_known.shape
     sketch = _Sketch(seen)
@@ -107,7 +107,7 @@ def _audit_plan(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> 
 
 
 class _Sketch:
-    """Computed and filled cells of the levels processed so far."""
+    """Computed and filled-in cells of the levels processed so far."""
 
     def __init__(self, seen: Seen) -> None:
         self.seen = seen
@@ -124,7 +124,7 @@ class _Sketch:
         self.donors[cells] = np.flatnonzero(cells)
 
     def refine(self, fine: int, step: int) -> Mask:
-        """Refine a lattice by two; return the cells to compute first, if any."""
+        """Refine a lattice by a factor of two; return the cells that must be computed before, if any."""
         cells = np.flatnonzero(lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step))
         corners, weights = _corners(self.codes.shape, cells, step)
         wanted = np.zeros_like(self.is_computed)
@@ -135,16 +135,16 @@ class _Sketch:
             if missing.any():
                 return missing
             self.compute(wanted)
-            # A filled cell beside a different one may differ too: regions can be thinner than the lattice.
+            # Compute filled-in cells beside a different cell: regions can be narrower than the lattice.
             beside = self._has_other_neighbour(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
             if not beside.any():
                 return missing
             wanted = beside
 
     def filling(self, fine: int, step: int) -> Filling:
-        """Return how the remaining cells of a level are filled in.
+        """Return the filled-in cells of a level.
 
-        Corners that later turned out to have another motion are not used.
+        Corners that were later found to have another motion are not used.
         """
         is_new = lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step) & ~self.is_computed
         cells = np.flatnonzero(is_new)
@@ -168,7 +168,7 @@ class _Sketch:
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
 
     def _has_other_neighbour(self, fine: int) -> Mask:
-        """Return whether one of the eight neighbours has another motion, shape (rows, columns)."""
+        """Return whether any of the eight neighbours has another motion, shape (rows, columns)."""
         rows, columns = (_lines(length, fine) for length in self.codes.shape)
         there = np.ix_(rows, columns)
         differs = _differs_from_neighbours(self.codes[there], self.sizes[there], self.seen.jump)
@@ -187,7 +187,7 @@ def _differs_from_neighbours(codes: Codes, sizes: Floats, jump: float) -> Mask:
 
 
 def _pairs() -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-    """Yield slices of neighbours along rows, columns and both diagonals."""
+    """Yield pairs of slices of neighbouring cells, along rows, columns and both diagonals."""
     whole, low, high = slice(None), slice(None, -1), slice(1, None)
     yield (low, whole), (high, whole)
     yield (whole, low), (whole, high)
@@ -196,19 +196,19 @@ def _pairs() -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
 
 
 def _lines(length: int, step: int) -> Indices:
-    """Return the lines of a lattice along one axis; the last line of the map is one of them."""
+    """Return the indices of lattice lines along one axis; the last line of the map is included."""
     return np.unique([*range(0, length, step), length - 1])
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Return the cells on every n-th line, including the last line of the map."""
+    """Return whether each cell is on a lattice of every n-th line, with the last line of the map."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found
 
 
 def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices, Floats]:
-    """Return the corners of the coarser lattice around each cell and their bilinear weights, shape (n, 4)."""
+    """Return the lattice points around each cell and their bilinear weights, shape (n, 4) each."""
     rows, columns = np.divmod(cells, shape[1])
     (low_row, high_row, up), (low_column, high_column, right) = (
         _between(place, _lines(length, step)) for place, length in zip((rows, columns), shape, strict=True)
@@ -224,7 +224,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
 
 
 def _between(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
-    """Return the lines at or below and above each place, and its position between them (0 to 1)."""
+    """Return the lattice lines below and above each index, and its position between them (0 to 1)."""
     above = np.searchsorted(lines, place, side="left")
     high = lines[above]
     low = np.where(high == place, place, lines[np.maximum(above - 1, 0)])

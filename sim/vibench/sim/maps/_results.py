@@ -1,4 +1,4 @@
-"""Results of a map over its axes, computed or filled in, and the motions found."""
+"""Results of a map over its axes, computed or filled in, and the motions that were found."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,52 +18,51 @@ from ._refinement import RefinementPlan
 
 UNKNOWN = -1
 SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
-"""Kinds of motion with reproducible responses."""
+"""Whether the responses of each kind of motion are reproducible."""
 
 
 @dataclass(frozen=True)
 class MapMotion:
-    """A motion of a map or of one of its points. Symmetric partners count as one motion."""
+    """A motion in a map or in one of its cells; symmetric partners count as one motion."""
 
     motion: MotionKind
     period: int | None
     """Period of a periodic motion, in drive periods."""
     has_impacts: bool
     response_i: float
-    """Largest abs(x) over the drive amplitude; the median over its points."""
+    """Response I, largest abs(x) over the drive amplitude; median over the points with this motion."""
     response_ii: float
     share: Share
-    """Share of the starts, after the drive periods of the map; chaos may die out later. The intervals of all
-    motions hold together in 19 cases of 20. Random starts are the same in every cell, so each counts as one
-    trial."""
+    """Share of the starts after the drive periods of the map; chaos may die out later. The 95 % intervals of
+    all motions are simultaneous. Random starts are equal in all cells, so each counts as one trial."""
 
 
 @dataclass(frozen=True)
 class Audit:
-    """Error rate of filled cells, from a random sample."""
+    """Error rate of filled-in cells, from a random sample."""
 
     filled: int
-    """Cells that were not computed, including the audited ones."""
+    """Number of filled-in cells, including the audited cells."""
     audited: int
     wrong: int
-    """Audited cells whose filled-in motion was wrong."""
+    """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Wrong cells by computed motion; fractions with several starts."""
+    """Number of wrong cells by their computed motion; fractional with several starts."""
     lost: tuple[float, ...]
-    """Wrong cells by filled-in motion."""
+    """Number of wrong cells by their filled-in motion."""
 
     @property
     def wrong_share(self) -> Share:
-        """Return the share of filled cells that are wrong, with its interval for 19 cases of 20."""
+        """Share of filled-in cells that are wrong, with its 95 % confidence interval."""
         if not self.audited:
             return Share(0.0, 0.0, 1.0 if self.filled else 0.0)
         return wilson_share(self.wrong, self.audited)
 
     def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
-        """Correct shares of motions in a map of this many cells for errors of filling in.
+        """Return the shares of motions in a map with ``cells`` cells, corrected for wrong filled-in cells.
 
-        Where motions are finely mixed, the most common one is filled in too often. Gains and losses of the
-        audited cells are scaled up to all filled cells.
+        Where motions are finely mixed, the most common motion is filled in too often. Gains and losses of the
+        audited cells are extrapolated to all filled-in cells.
         """
         if not self.filled:
             return tuple(shares)
@@ -71,7 +70,7 @@ class Audit:
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
-            # Without audited cells, nothing is known of filled cells.
+            # Without audited cells, nothing is known about filled-in cells.
             come, gone = (
                 wilson_share(each, self.audited, unsure) if self.audited else Share(0.0, 0.0, 1.0)
                 for each in (gained, lost)
@@ -87,14 +86,14 @@ class Audit:
 
 
 def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
-    """Return how often filling in was wrong.
+    """Return the error rate of filled-in cells.
 
     Parameters
     ----------
     numbers
-        Number of the motion that each point reached, shape (rows, starts, columns).
+        Index of the motion of each point, shape (rows, starts, columns).
     found
-        Plan of a complete refinement.
+        Plan of a complete map.
     """
     codes = cell_codes(numbers).reshape(-1)
     starts = np.moveaxis(numbers, 1, 2).reshape(len(codes), -1)
@@ -112,27 +111,27 @@ def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
 
 @dataclass(frozen=True, eq=False)
 class MapResults(GridResults[Map]):
-    """Results of a map. Axes in the order of ``plan.axes``."""
+    """Results of a map, over axes in the order of ``plan.axes``."""
 
     @property
     def computed(self) -> int:
-        """Return the number of computed points."""
+        """Number of computed points."""
         return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
 
     @cached_property
     def audit(self) -> Audit | None:
-        """Error rate of filled cells; None if all points are computed or the map is incomplete."""
+        """Error rate of filled-in cells; None if all points are computed or the map is incomplete."""
         if not (self.plan.is_adaptive and self.is_complete):
             return None
         return audit_of(self.motion_numbers, refinement_of(self.plan, dict(self.arrays)))
 
     @cached_property
     def motion_numbers(self) -> NDArray[np.int64]:
-        """Index of the motion of each point over all axes; -1 if unknown.
+        """Index of the motion of each point over all axes; -1 if unknown, 0 for the most common motion.
 
-        Points of one kind and period have the same number; motions without impacts have their own. Where only
-        the start varies, periodic motions are also distinguished by their responses, so that each number is
-        one attractor. The most common motion is 0.
+        Motions of the same kind and period have the same index; motions without impacts have a separate
+        index. If only the start varies, periodic motions are also distinguished by their responses, so that
+        each index is one attractor.
         """
         state = self.state.reshape(-1)
         is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))
@@ -143,7 +142,7 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def motion_counts(self) -> Floats:
-        """Number of motions in each cell over all starts; NaN if unknown."""
+        """Number of different motions reached from the starts of each cell; NaN if unknown."""
         shape = self.plan.grid.shape
         labels, sizes = self._labels.reshape(shape), self._sizes.reshape(shape)
         order = np.lexsort((sizes, labels), axis=-2)
@@ -156,14 +155,14 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def motions(self) -> tuple[MapMotion, ...]:
-        """Return the motions of the whole map, in the order of `motion_numbers`.
+        """Motions of the whole map, in the order of `motion_numbers`.
 
-        Shares refer to all known points, and are corrected by the audit if some points are filled in.
+        Shares are those of all known points, corrected by the audit if some points are filled in.
         """
         return self._described(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Describe the motions that the starts of one cell reached, the most common first."""
+        """Return the motions reached from the starts of one cell, the most common first."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
@@ -172,9 +171,9 @@ class MapResults(GridResults[Map]):
         return self._described(numbers, None)
 
     def shown(self, name: str, start: int = 0) -> Floats:
-        """Return one quantity over the varying ones, from one of the starts; NaN where unknown.
+        """Return a result over the varying quantities, for one of the starts; NaN if unknown.
 
-        ``motions`` is the number of motions reached from the starts of a cell; other names are columns.
+        ``name`` is a column, or ``motions`` for the number of motions reached from the starts of a cell.
         """
         if name == "motions":
             return self.motion_counts
@@ -182,7 +181,7 @@ class MapResults(GridResults[Map]):
         return np.asarray(np.take(values, start, axis=len(self.plan.grid.shape) - 2))
 
     def example(self, number: int) -> int:
-        """Return the first computed point with the motion of this number."""
+        """Return the number of the first computed point whose motion has this index."""
         is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
         return int(np.flatnonzero(is_it)[0])
 
@@ -194,7 +193,7 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def _sizes(self) -> Floats:
-        """Return the logarithm of Response I where it is reproducible, else 0."""
+        """Natural logarithm of Response I where it is reproducible, otherwise 0."""
         response = np.maximum(self.arrays["response_i"].astype(np.float64), 1e-300)
         is_solid = (self._labels >= 0) & SOLID[self.arrays["motion"].astype(np.int64)]
         return np.where(is_solid, np.log(np.where(np.isfinite(response), response, 1.0)), 0.0)
@@ -227,7 +226,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Return group numbers by label and, if given, by size; a jump in size separates two motions."""
+    """Return group numbers by label and, if given, by size; a jump of the size separates two motions."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))
@@ -238,7 +237,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Renumber motions by frequency, the most common first."""
+    """Return the motions renumbered in the order of their frequency, the most common first."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")
@@ -246,9 +245,9 @@ def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def open_map(path: Path | str) -> MapResults:
-    """Read the file of a map, complete or still being computed.
+    """Return the results in the file of a map, complete or still being computed.
 
-    Raises StudyError if it is not the file of a map, or of another version.
+    Raises StudyError if the file is not that of a map, or has another format version.
     """
     path = Path(path)
     plan = read_plan(path, Map)

@@ -1,4 +1,4 @@
-"""Compute a map point by point, then fill in the rest."""
+"""Compute the selected points of a map, then fill in the other points."""
 
 from pathlib import Path
 from typing import Literal
@@ -24,7 +24,7 @@ from ._refinement import Filling
 from ._results import MapResults, open_map
 
 WHOLE = ("motion", "period", "outcome")
-"""Columns that a filled cell copies from a computed one."""
+"""Columns that are copied from a computed cell to a filled-in cell."""
 BETWEEN = (
     "response_i",
     "response_ii",
@@ -35,7 +35,7 @@ BETWEEN = (
     "lyapunov",
     "duration",
 )
-"""Columns that are interpolated between the corners of a filled cell."""
+"""Columns that are interpolated between the corners around a filled-in cell."""
 
 
 def solve_map(
@@ -47,21 +47,21 @@ def solve_map(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> MapResults:
-    """Compute a map, or the missing part of its file.
+    """Compute a map, or the missing points of its file, and return the results.
 
     Raises StudyError, for example for a file of another map, a full disk or a cluster that does not answer.
 
     Parameters
     ----------
     plan
-        The map.
+        Requested map.
     out, existing, workers, cluster, observer, cancelled
-        As in `vibench.sim.study.solve_study`. The number of requested points grows with every level.
+        As in `vibench.sim.study.solve_study`. The number of requested points increases with every level.
 
     Returns
     -------
     MapResults
-        Complete, or partial if cancelled.
+        Results; partial if cancelled.
     """
     with executor_of(workers, cluster, map_solver(plan)) as executor, store_of(plan, out, existing) as store:
         compute_map(plan, executor, store, observer, cancelled)
@@ -76,9 +76,9 @@ def compute_map(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the missing points of a map until ``cancelled``, and fill in the rest.
+    """Compute the missing points of a map until ``cancelled``, then fill in the other points.
 
-    The solver is `map_solver`.
+    The solver of the executor must be `map_solver`.
     """
     end = run_points(MapPoints(plan), executor, store, observer, cancelled)
     if end is StudyEnd.COMPLETE:
@@ -87,7 +87,7 @@ def compute_map(
 
 
 def fill_in(plan: Map, store: Store) -> None:
-    """Fill in the points that an adaptive map left out."""
+    """Fill in the points of an adaptive map that were not computed."""
     if not plan.is_adaptive or np.all(store.arrays["state"] != PointState.MISSING):
         return
     found = refinement_of(plan, store.arrays)
@@ -100,7 +100,7 @@ def fill_in(plan: Map, store: Store) -> None:
 
 
 def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
-    """Interpolate the cells of one level from their corners, for each start."""
+    """Interpolate the filled-in cells of one level between their corners, for each start."""
     cells = points_of(filling.cells, plan.grid)
     starts = plan.grid.shape[-2]
     of_cells = points_of(filling.corners.reshape(-1), plan.grid).reshape(-1, 4, starts)
@@ -114,7 +114,7 @@ def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
 
 
 def _mean(values: Floats, weights: Floats) -> Floats:
-    """Return the weighted mean of finite corners, shape (n, 4) to (n,); NaN where none is finite."""
+    """Return the weighted mean over the finite corners, shape (n, 4) to (n,); NaN if none is finite."""
     is_known = np.isfinite(values)
     counted = np.where(is_known, weights, 0.0)
     with np.errstate(invalid="ignore"):
