@@ -1,9 +1,9 @@
-"""The largest Lyapunov exponent of a specimen under a harmonic drive, with its error. SI units.
+"""Largest Lyapunov exponent of a specimen under a harmonic drive, with its error. SI units.
 
-One small variation of the motion is propagated exactly through flight and contacts; its mean growth rate
-is the exponent. The method depends on the final motion: modes if no impact will follow, multipliers if the
-motion has become periodic, else a mean with a standard error that allows for correlation between
-neighbouring intervals. Transient chaos is reported separately.
+A tangent vector is propagated exactly with and without contact; its mean growth rate is the exponent. The
+method depends on the final motion: eigenvalues of the modes if no impact will follow, Floquet multipliers if
+the motion has become periodic, otherwise a mean with a standard error that allows for correlation between
+successive intervals. Transient chaos is reported separately.
 """
 
 import math
@@ -38,7 +38,7 @@ from .tangent_run import (
 )
 
 FEWEST_INTERVALS = 32
-"""Fewest intervals in the duration for estimating the error of the mean."""
+"""Fewest intervals in the duration, for the estimate of the error of the mean."""
 
 
 class ExponentVerdict(StrEnum):
@@ -51,7 +51,7 @@ class ExponentVerdict(StrEnum):
 
 
 class Source(StrEnum):
-    """How an exponent was found."""
+    """Method by which an exponent was determined."""
 
     AVERAGE = "mean growth over the run"
     MULTIPLIERS = "multipliers of the periodic motion at the end"
@@ -60,10 +60,10 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class ChaoticTransient:
-    """Transient chaos."""
+    """Chaos before the final motion."""
 
     exponent_per_s: float
-    """Exponent during the transient."""
+    """Largest exponent during the transient [1/s]."""
     standard_error_per_s: float
     until_s: float
     impacts: int
@@ -71,19 +71,19 @@ class ChaoticTransient:
 
 @dataclass(frozen=True)
 class Precision:
-    """Required error of an exponent."""
+    """Required precision of an exponent; the larger of the two limits applies."""
 
     absolute_per_s: float
-    """Standard error [1/s]."""
+    """Largest standard error [1/s]."""
     relative: float = 0.0
-    """Standard error over exponent; the larger limit counts."""
+    """Largest standard error over the exponent."""
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
             raise ValueError(f"Precision {self} is not allowed: zero or positive numbers.")
 
     def is_reached_by(self, exponents: Floats) -> bool:
-        """Return whether the mean of local exponents, shape (n,), is known to this precision."""
+        """Return whether the mean of local exponents, shape (n,), has this precision."""
         if len(exponents) < FEWEST_INTERVALS:
             return False
         found = block_mean(exponents)
@@ -93,32 +93,32 @@ class Precision:
 
 @dataclass(frozen=True, eq=False)
 class LyapunovEstimate:
-    """The largest exponent of the motion in which a run ended. NaN where the run did not reach its end."""
+    """Largest exponent of the final motion of a run; NaN if the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """From blocks for a mean, half the difference of two cycles for multipliers, zero for modes."""
+    """Standard error: from blocks (mean), half the difference of two cycles (multipliers), zero (modes)."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
     """Final motion of the run."""
     since_s: float
-    """Start of the average, or of the final motion."""
+    """Start of the average, or of the final motion [s]."""
     blocks: BlockedMean | None
     """Mean and error from blocks [1/s]; None unless the source is the average."""
     interval_s: float
-    """Time between readings."""
+    """Length of an interval [s]."""
     local_time_s: Floats
-    """Ends of the intervals, shape (n,)."""
+    """End times of the intervals, shape (n,) [s]."""
     local_exponents_per_s: Floats
-    """Growth rate in each interval from time zero, shape (n,)."""
+    """Growth rate in each interval from time zero, shape (n,) [1/s]."""
     transient: ChaoticTransient | None
     impacts: int
     """Number of impacts since time zero."""
     impact_rate_hz: float
-    """Mean impact rate in the final motion."""
+    """Mean impact rate in the final motion [1/s]."""
     final_state: Floats
     """x, y, z, vx, vy, vz at the end, shape (6,)."""
     end_time_s: float
@@ -137,27 +137,27 @@ def lyapunov_exponent(
     precision: Precision | None = None,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> LyapunovEstimate:
-    """Return the largest Lyapunov exponent: how fast neighbouring motions separate.
+    """Return the largest Lyapunov exponent, the rate at which neighbouring motions separate.
 
-    The first ``settle_s`` only find the attractor; the exponent is that of the following ``duration_s``, or
-    of the motion in which they end. Together the defaults are the paper's 30 s from rest. Raises ValueError
-    when an argument is not allowed, or the duration holds fewer than 32 intervals.
+    During ``settle_s`` the motion approaches its attractor. The exponent is that of the following
+    ``duration_s``, or of the final motion if it changes. The defaults add up to the paper's 30 s from rest.
+    Raises ValueError when an argument is not allowed, or the duration contains fewer than 32 intervals.
 
     Parameters
     ----------
     specimen, drive
         Specimen with any contact law, and its drive.
     accuracy
-        Accuracy of the motion. In chaos an exponent is the same at every level, within its error.
+        Accuracy of the motion. In chaos the exponent is the same at every level, within its error.
     duration_s, settle_s
-        [s].
+        Averaging time, and time before it for settling [s].
     initial_state
-        x, y, z, vx, vy, vz, shape (6,); at rest when None. The state reached may depend on it.
+        x, y, z, vx, vy, vz, shape (6,); None for rest. The final motion may depend on it.
     interval_s
-        Approximate time between readings; two cycles of the slowest mode when None.
+        Approximate length of an interval [s]; None for two cycles of the slowest mode.
     precision
-        End the run as soon as the error is this small. None uses the whole duration, so that
-        chaos that ends late is found.
+        Required precision, at which the run ends. None uses the whole duration, which also detects
+        chaos that ends late.
     max_impact_rate_hz
         As in `vibench.sim.motion.integrate`.
     """
@@ -187,7 +187,7 @@ def lyapunov_exponent(
 
 
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
-    """Return the number of settling intervals; refuse times that leave too few intervals for a mean."""
+    """Return the number of settling intervals; raise ValueError if too few intervals follow them."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         raise ValueError(
             f"Duration {duration_s} s after settling for {settle_s} s is not allowed: positive, and finite."
@@ -204,13 +204,13 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
 
 @dataclass(frozen=True)
 class _Exponent:
-    """An exponent and its source."""
+    """Exponent with its error and source [1/s]."""
 
     mean: float
     error: float
     source: Source
     since: int
-    """Interval in which the averaged part begins."""
+    """Index of the first averaged interval."""
     blocks: BlockedMean | None = None
 
 
@@ -218,7 +218,7 @@ _LOST = _Exponent(math.nan, math.nan, Source.AVERAGE, 0)
 
 
 def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settling, skipped: int) -> _Exponent:
-    """Find the exponent from modes, multipliers or an average, whichever suits the final motion."""
+    """Return the exponent from modes, multipliers or an average, depending on the final motion."""
     match end.motion:
         case FinalMotion.QUIET:
             slowest = float(np.max(modal_form(specimen).rates.real))
@@ -235,8 +235,8 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Return the largest exponent of a periodic motion over two cycles, and half their difference [1/s]."""
-    from ..periodic.floquet import multipliers  # noqa: PLC0415 - it imports scipy; few scenes ask for an exponent
+    """Return the mean largest exponent of a periodic motion in two cycles, and half the difference [1/s]."""
+    from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []
     for _ in range(2):
@@ -274,7 +274,7 @@ def _estimate(
 
 
 def verdict_of(mean: float, error: float) -> ExponentVerdict:
-    """Return the verdict on an exponent with its error."""
+    """Return the verdict for an exponent and its standard error [1/s]."""
     if not (math.isfinite(mean) and math.isfinite(error)):
         return ExponentVerdict.UNKNOWN
     if abs(mean) <= SURE * error:

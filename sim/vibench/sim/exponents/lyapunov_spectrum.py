@@ -1,9 +1,9 @@
 """All six Lyapunov exponents of a specimen under a harmonic drive, and Kaplan-Yorke dimension. SI units.
 
-Six small variations span all directions of the state. They are propagated together and made orthogonal
-repeatedly, and give the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9). Their sum is
-the mean rate of change of a volume's logarithm: -tr(M^-1 C) for every elastic law and any motion, which
-tests the calculation.
+Six tangent vectors span all directions of the state. They are propagated together and orthogonalised
+repeatedly; their growth rates are the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9).
+The sum of the exponents is the mean rate of change of the logarithm of a volume, -tr(M^-1 C) for every
+elastic law and any motion, which is used as a test.
 """
 
 import math
@@ -36,14 +36,14 @@ from .tangent_run import (
 
 @dataclass(frozen=True, eq=False)
 class LyapunovSpectrum:
-    """The exponents of the motion in which a run ended. NaN where the run did not reach its end."""
+    """Exponents of the final motion of a run; NaN if the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
     exponents_per_s: Floats
-    """Descending, shape (6,); minus infinity for a direction that is lost while a stop holds m1."""
+    """Exponents in descending order, shape (6,); -inf for a direction that is lost while a stop holds m1."""
     standard_errors_per_s: Floats
-    """Shape (6,); zero where the exponents are those of the modes."""
+    """Standard errors, shape (6,) [1/s]; zero if the exponents are those of the modes."""
     blocks: NDArray[np.int64]
     """Number of independent blocks from which each standard error is estimated, shape (6,)."""
     verdict: ExponentVerdict
@@ -54,7 +54,7 @@ class LyapunovSpectrum:
     impacts: int
     """Number of impacts since time zero."""
     impact_rate_hz: float
-    """Mean impact rate in the final motion."""
+    """Mean impact rate in the final motion [1/s]."""
     dimension_standard_error: float
     """Standard error of `dimension` from the correlated errors of the exponents; 0 for a whole number."""
     final_state: Floats
@@ -63,21 +63,21 @@ class LyapunovSpectrum:
 
     @property
     def sum_per_s(self) -> float:
-        """Sum of the exponents: mean rate of change of a volume's logarithm."""
+        """Sum of the exponents [1/s]: mean rate of change of the logarithm of a volume."""
         return float(np.sum(self.exponents_per_s))
 
     @property
     def dimension(self) -> float:
-        """Kaplan-Yorke dimension of the attractor's stroboscopic section; that of the flow is one higher."""
+        """Kaplan-Yorke dimension of the stroboscopic section; the attractor of the flow has one more."""
         return kaplan_yorke(self.exponents_per_s)
 
     def intervals_per_s(self, confidence: float = 0.95) -> Floats:
-        """Return Student's bounds of each exponent, for blocks - 1 degrees of freedom, shape (6, 2)."""
+        """Return Student's confidence limits of the exponents, for blocks - 1 freedoms, shape (6, 2)."""
         reach = self._reach(confidence) * self.standard_errors_per_s
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return confidence bounds of the dimension within 0 to 6, for the fewest blocks of all exponents."""
+        """Return confidence limits of the dimension within 0 to 6, for the fewest blocks of any exponent."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 
@@ -98,10 +98,10 @@ def lyapunov_spectrum(
     interval_s: float | None = None,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> LyapunovSpectrum:
-    """Return all Lyapunov exponents: how fast neighbouring motions separate or converge in each direction.
+    """Return all Lyapunov exponents, the rates at which neighbouring motions separate or converge.
 
-    Arguments as in `vibench.sim.lyapunov_exponent`, ``initial_state`` of shape (6,) [m, m/s]; the
-    standard errors need blocks longer than the correlation time of the motion.
+    The arguments are those of `vibench.sim.lyapunov_exponent`, with ``initial_state`` of shape (6,) [m, m/s].
+    The standard errors are valid for blocks longer than the correlation time of the motion.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
@@ -147,7 +147,7 @@ UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
 class _Taken(NamedTuple):
-    """Exponents derived from a run; by default those of a lost run."""
+    """Exponents of a run; the default values are for a lost run."""
 
     exponents: Floats = UNKNOWN
     errors: Floats = UNKNOWN
@@ -168,7 +168,7 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
         return _Taken(
             decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
         )
-    # A motion that settles late leaves little to average; at least half of the requested time is used.
+    # If the motion settles late, little is left to average: use at least half of the requested time.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     rates = run.rates[since:]
     means = [_mean(each) for each in rates.T]
@@ -188,16 +188,16 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
 
 
 def _mean(rates: Floats) -> BlockedMean:
-    """Return the mean of local exponents with its error; minus infinity if the direction was lost."""
+    """Return the mean of local exponents with its error; minus infinity for a lost direction."""
     if not bool(np.all(np.isfinite(rates))):
         return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
     return block_mean(rates)
 
 
 def _dimension_error(rates: Floats, exponents: Floats) -> float:
-    """Return the standard error of the dimension, from its linearisation in the local exponents.
+    """Return the standard error of the dimension, linearised with respect to the local exponents.
 
-    D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0: dD = -dS / l + S dl / l^2.
+    D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0, hence dD = -dS / l + S dl / l^2.
     """
     kept = math.floor(kaplan_yorke(exponents))
     if kept in (0, len(exponents)) or not math.isfinite(exponents[kept]):
@@ -208,10 +208,10 @@ def _dimension_error(rates: Floats, exponents: Floats) -> float:
 
 
 def kaplan_yorke(exponents: Floats) -> float:
-    """Return the Kaplan-Yorke dimension from descending exponents; their number if all sums are positive.
+    """Return the Kaplan-Yorke dimension from exponents in descending order.
 
-    j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative (Kaplan and Yorke, Lecture
-    Notes in Mathematics 730 (1979) 204).
+    It is j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative, or the number of
+    exponents if no sum is negative (Kaplan and Yorke, Lecture Notes in Mathematics 730 (1979) 204).
     """
     sums = np.cumsum(exponents)
     kept = int(np.count_nonzero(np.cumprod(sums >= 0.0)))

@@ -1,9 +1,9 @@
-"""Integration with small variations of the state, whose growth is read at equal intervals. SI units.
+"""Integration with tangent vectors, whose growth is recorded at equal intervals. SI units.
 
-Between readings the variations are propagated exactly. At a reading they are made orthogonal and of unit
-length in the energy norm s' diag(K, M) s, and the logarithms of the divisors are kept (Benettin,
-Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9 and 21). The energy without stops is the specimen's
-natural norm: free motion only shrinks in it, so that any growth is due to impacts.
+Within an interval the tangent vectors are propagated exactly. At its end they are orthonormalised in the
+energy norm s' diag(K, M) s, and the logarithms of the divisors are recorded (Benettin, Galgani, Giorgilli and
+Strelcyn, Meccanica 15 (1980) 9 and 21). In this norm, the energy without stops, free motion only decays: any
+growth is due to impacts.
 """
 
 import math
@@ -28,38 +28,38 @@ from ..specimen.stops import require_positive
 
 # Standard error of the mean of a correlated series, from sufficiently long blocks.
 #
-# Neighbouring values are averaged in pairs repeatedly. The estimated error of the mean grows until blocks are
-# longer than the memory of the series, then stays (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461).
-# This plateau is tested by the correlation of neighbouring blocks, at one length and all longer ones
-# together (Jonsson, Phys. Rev. E 98 (2018) 043304).
+# Neighbouring values are repeatedly averaged in pairs. The estimated error of the mean increases until blocks
+# are longer than the correlation length of the series, then is constant (Flyvbjerg and Petersen, J. Chem.
+# Phys. 91 (1989) 461). The test for this plateau uses the correlation of neighbouring blocks, at one block
+# length and all longer lengths together (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 FEWEST_BLOCKS = 16
-"""With fewer independent blocks, a standard error itself is uncertain by more than 20 per cent."""
+"""Fewest independent blocks; with fewer, the standard error itself is uncertain by more than 20 per cent."""
 CONFIDENCE = 0.99
-"""Confidence of the test above which blocks count as correlated."""
+"""Confidence level of the test for correlation between blocks."""
 
 
 @dataclass(frozen=True)
 class BlockedMean:
-    """A mean with its standard error."""
+    """Mean of a series with its standard error."""
 
     mean: float
     standard_error: float
-    """Standard error of the mean; zero where all values are equal, NaN for a single one."""
+    """Standard error of the mean; zero if all values are equal, NaN for a single value."""
     block_length: int
     """Values in a block: the smallest power of two for which neighbouring blocks are independent."""
     blocks: int
     correlation_length: float
-    """Number of values equivalent to one independent value: variance of the mean over that of independent
-    values."""
+    """Number of values that count as one independent value: variance of the mean over its variance for
+    independent values."""
     is_long_enough: bool
     """Whether there are at least `FEWEST_BLOCKS` independent blocks; otherwise the error is a lower bound."""
 
 
 def block_mean(values: ArrayLike) -> BlockedMean:
-    """Return the mean of evenly spaced values, shape (n,), n >= 1, with its error.
+    """Return the mean of evenly spaced values, shape (n,), n >= 1, with its standard error.
 
-    Raises ValueError when there is no value, or one is not finite.
+    Raises ValueError when there is no value, or a value is not finite.
     """
     series = np.asarray(values, dtype=np.float64)
     if series.ndim != 1 or len(series) == 0 or not bool(np.all(np.isfinite(series))):
@@ -71,7 +71,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
     if len(counts) == 0 or variances[0] == 0.0:
         error = 0.0 if len(series) > 1 else math.nan
         return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
-    # Choose the shortest blocks above which no neighbours are correlated.
+    # Choose the shortest blocks from which on neighbouring blocks are not correlated.
     ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
     # For independent values the lagged correlation has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
@@ -89,7 +89,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
 
 
 def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return variance, covariance of neighbours and number of blocks for each length with two or more."""
+    """Return variance, covariance of neighbours and number of blocks, for each length with two blocks."""
     variances, correlations, counts = [], [], []
     while len(centred) > 1:
         variances.append(float(np.mean(centred**2)))
@@ -102,32 +102,32 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Return the largest evidence for correlation by chance, at each length and all longer ones."""
+    """Return the limits of the correlation test for each block length and all longer lengths."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
 
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
-"""Longest time between orthogonalisations, in radians and decays of the fastest mode; in this time changes
-remain distinct to several digits."""
+"""Longest time between orthogonalisations, in radians and in decay times of the fastest mode; in this time
+the tangent vectors remain independent to several digits."""
 CHECKS = 32
 """Most checks per run for an early end."""
 ALMOST = 1e-9
-"""A duration this close to a whole number of intervals counts as whole."""
+"""Relative tolerance within which a duration contains a whole number of intervals."""
 Enough = Callable[[Floats], bool]
-"""Called during a run with the growth in each interval so far, shape (n, m): whether it may end."""
+"""Function that returns whether a run may end, from the growth in each interval so far, shape (n, m)."""
 CYCLES = 2.0
-"""Cycles of the slowest mode in an interval, unless another is requested."""
+"""Default length of an interval in cycles of the slowest mode."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Time between readings."""
+    """Interval in which growth is measured."""
 
     length_s: float
     periods: int
-    """Number of drive periods in the interval; 0 if that is not a whole number."""
+    """Number of drive periods in the interval; 0 if it is not a whole number."""
 
     def count_in(self, duration_s: float) -> int:
         """Return the number of intervals in a duration."""
@@ -135,9 +135,9 @@ class Interval:
 
 
 def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = None) -> Interval:
-    """Choose whole drive periods of about ``about_s`` [s], two cycles of the slowest mode when None.
+    """Return an interval of whole drive periods of about ``about_s`` [s]; None for two slowest cycles.
 
-    If a drive period is longer than twice that time, the interval is ``about_s``.
+    If a drive period is longer than twice ``about_s``, the interval is ``about_s``.
     """
     about = CYCLES / float(specimen.natural_frequencies_hz[0]) if about_s is None else about_s
     require_positive("Interval", about, "s")
@@ -149,20 +149,20 @@ def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = No
 
 @dataclass(frozen=True, eq=False)
 class TangentRun:
-    """Growth of small variations of a motion in each interval."""
+    """Growth of m tangent vectors of a motion in each of n intervals."""
 
     interval: Interval
     growth: Floats
-    """Logarithm of the factor by which each change grew in each interval, shape (n, m)."""
+    """Natural logarithm of the growth of each tangent vector in each interval, shape (n, m)."""
     impacts: NDArray[np.int64]
     """Number of impacts in each interval, shape (n,)."""
     section: Floats
-    """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
+    """x, y, z, vx, vy, vz at the end of each interval, shape (n, 6)."""
     impact_times_s: Floats
     is_quiet: bool
-    """Whether it is certain that no impact will follow."""
+    """Whether a bound proves that no impact will follow."""
     final_state: Floats
-    """Shape (6,), at ``end_time_s``."""
+    """State at ``end_time_s``, shape (6,)."""
     end_time_s: float
     outcome: Outcome
 
@@ -183,9 +183,9 @@ def run_with_tangent(
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
     enough: Enough | None = None,
 ) -> TangentRun:
-    """Follow a motion from the drive's time zero, with ``changes`` (1 to 6) small changes.
+    """Integrate a motion from the drive's time zero, with ``changes`` (1 to 6) tangent vectors.
 
-    The run ends with the last interval that fits, or when ``enough`` returns True.
+    The run ends with the last whole interval of the duration, or when ``enough`` returns True.
     """
     check_impact_rate(max_impact_rate_hz)
     count = interval.count_in(duration_s)
@@ -207,7 +207,7 @@ def run_with_tangent(
         impacts=readings.impacts,
         section=readings.motions,
         impact_times_s=record.impact_times_s.copy(),
-        # Without impacts the amplitudes of all modes only decay.
+        # Without impacts the amplitudes of all modes decay, so that the bound remains valid.
         is_quiet=run.reach_m < min(specimen.gaps_m),
         final_state=run.motion,
         end_time_s=run.time_s,
@@ -216,14 +216,14 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """Return the number of parts of an interval that keep the variations numerically independent."""
+    """Return the number of parts of an interval that keep the tangent vectors numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
 
 
 def starting_changes(metric: Table, changes: int) -> Table:
-    """Return starting variations, orthonormal in the metric and the same in every run."""
+    """Return initial tangent vectors, orthonormal in the metric and the same in every run."""
     size = len(metric)
     general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
     root = np.linalg.cholesky(metric)
@@ -231,24 +231,24 @@ def starting_changes(metric: Table, changes: int) -> Table:
     return np.linalg.solve(root.T, rows * np.sign(np.diag(lengths))).T
 
 
-# When a run settles into its final kind of motion, and whether it was chaotic before. SI units.
+# Time at which a run settles into its final kind of motion, and chaos before that time. SI units.
 #
-# A motion can strike its stops thousands of times and then leave them for ever: transient chaos (Grebogi, Ott
-# and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run describes neither motion.
+# After thousands of impacts m1 may never touch its stops again: transient chaos (Grebogi, Ott and Yorke,
+# Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change per cycle below which a section repeats, and above which it did not yet repeat."""
+"""Relative change per cycle below which a section repeats, and above which it does not repeat yet."""
 LONGEST_CYCLE = 16
-"""Longest searched cycle in intervals."""
+"""Longest cycle that is detected, in intervals."""
 SURE = 3.0
-"""Number of standard errors from zero beyond which the sign of a mean is significant."""
+"""Number of standard errors from zero above which the sign of a mean is significant."""
 CHANGED = 5.0
-"""Standard errors between the means before and after a change; more than SURE, because the best of many
-places is chosen."""
+"""Smallest difference between the means before and after a change, in standard errors; larger than SURE,
+because the best of many times is chosen."""
 FEWEST_INTERVALS = 32
-"""Fewest intervals on each side of a change of the exponent's sign."""
+"""Fewest intervals before and after a change of the exponent's sign."""
 ALIGNING = 8
-"""Number of first intervals in which a small change turns towards its direction of growth."""
+"""Number of first intervals in which a tangent vector turns to its direction of fastest growth."""
 
 
 class FinalMotion(StrEnum):
@@ -262,7 +262,7 @@ class FinalMotion(StrEnum):
 
 @dataclass(frozen=True)
 class Settling:
-    """When a run settled into its final kind of motion."""
+    """Final kind of motion of a run, and the interval in which it begins."""
 
     motion: FinalMotion
     since: int
@@ -272,7 +272,7 @@ class Settling:
 
 
 def settling(run: TangentRun, scales: Floats) -> Settling:
-    """Find the final motion of a run and its beginning; ``scales`` from `state_scales`, shape (6,)."""
+    """Return the final motion of a run and its beginning; ``scales`` are from `state_scales`, shape (6,)."""
     if run.is_quiet:
         struck = np.flatnonzero(run.impacts)
         return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)
@@ -291,14 +291,14 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Find where the mean growth changes from significantly positive to not positive."""
+    """Return the interval at which the mean growth stops being significantly positive; None if none."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None
     places = np.arange(FEWEST_INTERVALS, count - FEWEST_INTERVALS + 1)
     sums = np.cumsum(growth)
     before, after = sums[places - 1] / places, (sums[-1] - sums[places - 1]) / (count - places)
-    # The split with the least scatter about the two means.
+    # Split the series where the scatter about the two means is smallest.
     place = int(places[np.argmax((before - after) * np.sqrt(places * (count - places)))])
     head, tail = block_mean(growth[:place]), block_mean(growth[place:])
     is_falling = head.mean > SURE * head.standard_error and tail.mean <= SURE * tail.standard_error
