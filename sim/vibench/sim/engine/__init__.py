@@ -1,10 +1,10 @@
 """The native engine, compiled from the C++ in native/: motions, chains, filters, the virtual rig.
 
-`NativeRun` integrates one motion of a specimen under a harmonic drive. The library is chosen by processor,
+`NativeRun` integrates a motion of a specimen under a harmonic drive. The library is chosen for the processor,
 loaded once, and checked with a known scene (docs/decisions/0077-native-engine.md). Python prepares modal
-forms and the shapes of collisions and steps. `CubicRun` integrates under a base motion of cubic polynomials
-on equal intervals: sweeps and recordings.
+forms and the tables for collisions and time steps. `CubicRun` integrates a motion under sweeps and
+recordings: base motions given by cubic polynomials on equal intervals.
 
-Signals, filters and the analogue world call the engine through `native_engine`: `Engine.new` fills a
-structure of native/structures.hpp, `Engine.call` passes it to a function.
+Signals, filters and the analogue part of the virtual rig use the engine through `native_engine`: `Engine.new`
+fills a structure of native/structures.hpp, `Engine.call` passes it to a function.
 """

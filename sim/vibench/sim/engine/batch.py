@@ -1,7 +1,7 @@
-"""SIMD batches: integrate eight motions of one specimen at a time.
+"""SIMD batches: integrate eight motions of one specimen at the same time.
 
-native/batch.hpp supports Hertz's stops at *quick* and *standard*, and returns the states once per drive
-period (docs/decisions/0061-lanes.md). SI units.
+native/batch.hpp supports Hertz contacts at the accuracies *quick* and *standard*, and returns the states once
+per drive period (docs/decisions/0061-lanes.md). SI units.
 """
 
 import math
@@ -36,37 +36,37 @@ from .shapes import (
     collision_shapes,
 )
 
-# Fit of the polynomials by which a batch resolves Hertz collisions (native/collision_fit.hpp). SI units.
+# Fit of the polynomials with which a batch computes Hertz collisions (native/collision_fit.hpp). SI units.
 #
-# In units of the depth and the time u of a free collision of the same speed, a collision depends only on the
-# acceleration by all other springs and on u. The variables of the fit are this acceleration and its first
-# four derivatives in the middle of the collision, and u. The polynomials give the duration and the moments of
-# the force about the middle; they are fitted to collisions solved at sixteen points.
+# In units of the depth and the time u of a free collision at the same speed, a collision depends only on u
+# and on the acceleration due to all other springs. The variables of the fit are this acceleration and its
+# first four derivatives in the middle of the collision, and u. The polynomials give the duration and the
+# moments of the force about the middle. They are fitted to collisions solved at sixteen Gauss points.
 
 MIDDLE = 1.47
-"""Middle of a collision, in u."""
+"""Time of the middle of a collision after its start, in u."""
 DERIVATIVES = 5
-"""Number of variables for the acceleration: its value and four derivatives."""
+"""Number of variables for the acceleration: the acceleration and four derivatives."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Range of fitted speeds, over gap times fastest modal rate."""
+"""Range of fitted speeds, over the gap times the fastest modal rate."""
 HARDEST_PRESS = 0.24
-"""Largest fitted acceleration, in both directions, over speed / u."""
+"""Largest fitted acceleration in both directions, over speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest first derivative over speed / u^2, and later ones over the one before; paper's specimen."""
+"""Largest first derivative over speed / u^2, and ratio of later derivatives to the one before (paper)."""
 PAPER_TURN = 0.053
-"""Fastest modal rate times u for the paper's specimen, in the middle of the range of speeds."""
+"""Fastest modal rate times u [rad], for the paper's specimen in the middle of the range of speeds."""
 SLOWEST_TURN = 0.15
-"""Limit of the fastest modal rate times u [rad]; a collision lasts three times u."""
+"""Largest product of the fastest modal rate and u [rad]; a collision lasts about three times u."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1
 NEWTON_STEPS = 8
 FIT_ERROR = 2e-7
-"""Largest allowed error of a fit: speed after a collision over speed before."""
+"""Largest allowed error of the speed after a collision, over the speed before."""
 GUESS_POINTS = 64
 
 
@@ -74,9 +74,9 @@ _ONE_THREAD = Lock()
 
 
 def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the `CollisionFit` of native/structures.hpp, in about one second per specimen.
+    """Return the `CollisionFit` of native/structures.hpp, which takes about one second per specimen.
 
-    None if stops are too soft, or the fit is not accurate enough.
+    None if the stops are too soft or the fit is not accurate enough.
     """
     with _ONE_THREAD:
         return _collision_fit(engine, specimen)
@@ -84,14 +84,14 @@ def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
 
 @lru_cache(maxsize=8)
 def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Fit to collisions drawn at random from a box."""
+    """Return the fit to random collisions in a box of the variables; None as in `collision_fit`."""
     middle, half = _box(specimen)
     if not np.all(half > 0.0) or _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
         return None
     rng = np.random.default_rng(SEED)
     count = COLLISIONS + CHECKED
     places = rng.uniform(-1.0, 1.0, (count, VARIABLES))
-    # Denser towards the ends, as Chebyshev's points are.
+    # Concentrate the points near the ends, as Chebyshev points are.
     places[:COLLISIONS] = np.sin(0.5 * math.pi * places[:COLLISIONS])
     variables = middle + half * places
     solved = _solve(variables[:, :DERIVATIVES], variables[:, -1], _coupling(specimen))
@@ -120,14 +120,14 @@ def _fastest(specimen: Specimen) -> float:
 
 
 def _time_over_fifth_root(specimen: Specimen) -> float:
-    """Return u times the fifth root of the speed: u = depth / speed, and m v^2 / 2 = 2 k d^(5/2) / 5."""
+    """Return u times the fifth root of the speed, from u = depth / speed and m v^2 / 2 = 2 k d^(5/2) / 5."""
     m1, m2 = specimen.masses[1:]
     reduced = m1 * m2 / (m1 + m2)
     return float((HALF_FORCE * reduced / specimen.contact.stops.contact_stiffness) ** 0.4)
 
 
 def _box(specimen: Specimen) -> tuple[Vector, Vector]:
-    """Return the box of fitted collisions: middle and half width of each variable."""
+    """Return the middle and the half width of the range of each variable of the fit."""
     unit = min(specimen.gaps_m) * _fastest(specimen)
     shortest, longest = (
         _time_over_fifth_root(specimen) * (part * unit) ** -0.2 for part in (FASTEST, SLOWEST)
@@ -139,7 +139,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effects of the integrals of a force on p, relative to the effect of the second one."""
+    """Return the effect of each integral of a force on p, relative to the effect of the second integral."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -147,7 +147,7 @@ def _coupling(specimen: Specimen) -> Vector:
 
 
 def _free(accelerations: Table) -> Table:
-    """Return the depth without force in powers of the time after the middle, shape (n, DERIVATIVES + 2)."""
+    """Return the depth without force as powers of time from the middle, shape (n, DERIVATIVES + 2)."""
     powers = np.arange(2, DERIVATIVES + 2)
     bent = accelerations / [math.factorial(k) for k in powers]
     speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
@@ -156,7 +156,7 @@ def _free(accelerations: Table) -> Table:
 
 
 def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
-    """Solve collisions by Newton's method: duration and moments about its middle, shape (n, POLYNOMIALS)."""
+    """Return duration and moments about the middle of collisions, by Newton, shape (n, POLYNOMIALS)."""
     shapes, durations = collision_shapes()
     press = np.clip(accelerations[:, 0] - MIDDLE * accelerations[:, 1], SOFTEST, HARDEST)
     place = np.rint((press - SOFTEST) / SPACING).astype(int)
@@ -173,7 +173,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
         misfit = (powers * free[:, None, :]).sum(axis=2) - np.einsum("nm,nmi->ni", weights, pushed)
         misfit[:, :POINTS] -= depths
         slopes = np.empty((len(depths), POINTS + 1, POINTS + 1))
-        # Terms after three integrals are small and corrected with the rest.
+        # Later integrals are small: the derivative neglects them, the misfit includes them.
         slopes[:, :, :POINTS] = -np.einsum("nm,mki->nik", weights[:, 1:4], SHARES[1:4])
         slopes[:, :, :POINTS] *= (1.5 * HALF_FORCE * root)[:, None, :]
         slopes[:, range(POINTS), range(POINTS)] -= 1.0
@@ -187,7 +187,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
 
 
 def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
-    """Turn integrals of F (T - t)^m into those of F (T / 2 - t)^m."""
+    """Return the integrals of F (T / 2 - t)^m from those of F (T - t)^m, shape (n, MOMENTS)."""
     return np.stack(
         [
             sum(math.comb(m, j) * (-0.5 * length) ** (m - j) * ends[:, j] for j in range(m + 1))
@@ -198,23 +198,23 @@ def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
 
 
 LEAST_TOLERANCE = 1e-7
-"""Accuracy of the polynomials; as in native/collision.hpp."""
+"""Smallest tolerance, limited by the accuracy of the polynomials; as in native/collision.hpp."""
 FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
 """Families of processors with wide registers and fused multiply-add."""
 MODES = 3
 MOST_DAMPED = 0.05
-"""Largest damping ratio of a mode; above it the series needs more terms."""
+"""Largest damping ratio of a mode; for larger ratios the series would need more terms."""
 LEAST_PART = 1e-9
-"""Smallest share of a mode in p, over the largest: batches follow p and derive all else from it."""
+"""Smallest contribution of a mode to p, over the largest; batches integrate p and derive all modes from p."""
 
 
 @dataclass(frozen=True, eq=False)
 class BatchedMotion:
-    """Result of one motion."""
+    """Result of one motion of a batch."""
 
     states: Floats
-    """States once per drive period, shape (periods, 6). A state within a short collision, unless it is the
-    last, is extrapolated from the flight after it."""
+    """States once per drive period, shape (periods, 6). States within a short collision, except the last, are
+    extrapolated from the motion after the collision."""
     impacts: int
 
 
@@ -225,7 +225,7 @@ def batches_pay() -> bool:
 
 
 def is_batchable(specimen: Specimen, tolerance: float) -> bool:
-    """Return whether batches support such a specimen and tolerance."""
+    """Return whether batches support a specimen and a tolerance."""
     return (
         tolerance >= LEAST_TOLERANCE
         and _turns_in_p(specimen)
@@ -235,7 +235,7 @@ def is_batchable(specimen: Specimen, tolerance: float) -> bool:
 
 @lru_cache(maxsize=8)
 def _turns_in_p(specimen: Specimen) -> bool:
-    """Return whether all three modes oscillate and move p."""
+    """Return whether stops are Hertz contacts and all three modes oscillate and contribute to p."""
     if not isinstance(specimen.contact, Hertz) or not math.isfinite(sum(specimen.gaps_m)):
         return False
     modes = modal_form(specimen)
@@ -245,20 +245,20 @@ def _turns_in_p(specimen: Specimen) -> bool:
 
 
 def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[BatchedMotion | None]:
-    """Advance motions of a batchable specimen, each by a number of its drive periods.
+    """Advance motions of one specimen in a batch, each by a number of its drive periods.
 
     Parameters
     ----------
     runs
-        Each in flight, at a whole drive period, at the same tolerance. Small changes are not propagated.
-    periods
-        Number of drive periods for each.
+        Motions without contact at the end of a drive period, with the same tolerance, without tangent
+    vectors. periods
+        Number of drive periods for each motion.
 
     Returns
     -------
-    Results of each; None for a failed one, which is unchanged.
+    Result of each motion; None for a motion that failed, whose state is not changed.
 
-    Raises ValueError when the specimen is not batchable, or a motion is on a stop.
+    Raises ValueError when batches do not support the specimen, or a motion is in contact.
     """
     first = runs[0]
     engine = first.engine
@@ -267,7 +267,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
         raise ValueError(
             "This specimen cannot be simulated in a batch: use Hertz contacts and three oscillating modes."
         )
-    # Longest first, so that motions computed in parallel end at about the same time.
+    # Sort the longest first, so that motions computed in parallel end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
     states = [np.empty((count, DIRECTIONS)) for count in periods]
     motions = engine.rows("BatchMotion", len(runs))

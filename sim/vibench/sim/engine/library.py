@@ -1,4 +1,4 @@
-"""Find, load and call the native engine by `ctypes`, which releases the global interpreter lock."""
+"""Find, load and call the native engine with `ctypes`, which releases the global interpreter lock."""
 
 import ctypes
 import hashlib
@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 from .processor import usable_families
 
 Structure = NDArray[np.void]
-"""One structure, shape (), or an array of them."""
+"""One structure, shape (), or an array of structures."""
 StructureType = np.dtype[np.void]
 _STRUCTURE = re.compile(r"(\w+) \{ (.*) \}")
 _NAME = re.compile(r"(\*?)\s*(\w+)((?:\[\d+\])*)")
@@ -25,15 +25,15 @@ _NUMBERS: dict[str, DTypeLike] = {"double": np.float64, "int64_t": np.int64, "Ph
 
 
 def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
-    """Return numpy's type of every structure.
+    """Return the numpy type of every structure, by name.
 
-    Raises ValueError when a text is not of this form.
+    Raises ValueError when a declaration has another form.
 
     Parameters
     ----------
     texts
-        C++ as native/structures.hpp declares it, such as ``State { double motion[6]; double side; }``; a
-        structure may contain earlier ones.
+        C++ declarations as in native/structures.hpp, such as ``State { double motion[6]; double side; }``. A
+        structure may contain earlier structures.
     """
     known: dict[str, StructureType] = {}
     for text in texts:
@@ -65,10 +65,10 @@ def _fields(
 
 
 FOLDER = Path(__file__).parent / "libraries"
-"""Folder of the built libraries: ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
+"""Folder of the built libraries ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
 CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
-"""Build script; in a checkout only, not in an installed wheel."""
+"""Build script, which exists in a checkout, but not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 """File ending of libraries for this system; a checkout may also contain libraries for other systems."""
 REBUILD = "python native/build.py"
@@ -78,24 +78,24 @@ FUNCTIONS = (
     *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
     *("describe_collisions", "follow_batch"),
 )
-"""Functions of the library that take one structure as argument."""
+"""Functions of the library that have a single structure as argument."""
 Tables = NDArray[np.float64]
-"""Prepared data of one scene, in the engine's layout."""
+"""Prepared data of a scene, in the layout of the engine."""
 _Pointer = ctypes.c_void_p
 
 
 class EngineError(RuntimeError):
-    """The native engine cannot be used; the text states what to do."""
+    """Error: the native engine cannot be used; the message states what to do."""
 
 
 class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
-    """Structure that keeps the arrays it points to alive."""
+    """Structure that keeps references to the arrays to which it points."""
 
     lent: dict[str, object]
 
 
 class Engine:
-    """A loaded library of the native engine."""
+    """Loaded library of the native engine."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -140,13 +140,13 @@ class Engine:
 
     @property
     def family(self) -> str:
-        """Family of processors that the library was compiled for."""
+        """Family of processors for which the library was compiled."""
         return self.path.name.split("-")[1]
 
     def new(self, name: str, **fields: object) -> Structure:
-        """Create a structure of native/structures.hpp, with zero for missing fields.
+        """Return a structure of native/structures.hpp, with zero for fields that are not given.
 
-        Arrays are referenced, not copied, and live as long as the structure.
+        Arrays are referenced and not copied; they exist as long as the structure.
         """
         structure = np.zeros((), self._types[name]).view(_Lending)
         structure.lent = {}
@@ -154,20 +154,20 @@ class Engine:
         return structure
 
     def rows(self, name: str, count: int) -> Structure:
-        """Create an array of zeroed structures."""
+        """Return an array of structures with all fields zero."""
         return np.zeros(count, self._types[name])
 
     def fill(self, structure: Structure, **fields: object) -> None:
-        """Change fields of a structure from `new`."""
+        """Change fields of a structure that was created by `new`."""
         assert isinstance(structure, _Lending)
         structure.lent |= fields
         for field, value in fields.items():
             structure[field] = _pointer(value) if isinstance(value, np.ndarray) else value
 
     def call(self, function: str, structure: Structure) -> int:
-        """Call a function of native/api.cpp with one structure; return its result.
+        """Call a function of native/api.cpp with one structure, and return its result.
 
-        Raises ValueError when the engine refuses the structure.
+        Raises ValueError when the engine rejects the structure.
         """
         code = int(self._functions[function](structure.ctypes.data))
         if code < 0:
@@ -177,18 +177,18 @@ class Engine:
         return code
 
     def chain_memory(self, cells: int, kinds: int) -> int:
-        """Return the number of floats that a chain needs; ``kinds`` is the number of different cells."""
+        """Return the number of floats of memory for a chain with ``kinds`` kinds of cells."""
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
-        """Create the tables of a scene; do not free its shapes of collisions and steps before the tables.
+        """Return the tables of a scene, which refer to its collision and step shapes: do not free these.
 
-        Raises ValueError when the engine refuses a number of the scene.
+        Raises ValueError when the engine rejects a number of the scene.
         """
         return self._prepare("tables", "prepare", scene)
 
     def prepare_cubics(self, scene: Structure) -> Tables:
-        """Create the tables of a scene with cubic base motion; see `prepare`."""
+        """Return the tables of a scene with piecewise cubic base motion; see `prepare`."""
         return self._prepare("cubic_tables", "prepare_cubics", scene)
 
     def _prepare(self, sized: str, prepare: str, scene: Structure) -> Tables:
@@ -201,7 +201,7 @@ class Engine:
         return tables
 
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
-        """Decide whether the motion of ``state`` starts on a stop; returns 0, or -1 when refused."""
+        """Set whether the motion of ``state`` starts in contact; return 0, or -1 if rejected."""
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
 
     def run(
@@ -213,9 +213,9 @@ class Engine:
         record: Structure,
         tangent: Structure | None = None,
     ) -> int:
-        """Advance ``state``, carry ``tangent`` along, and fill ``record``.
+        """Advance ``state`` with its ``tangent`` vectors, and fill ``record``.
 
-        Returns the number of an `Outcome`, or -1 when refused.
+        Return the number of an `Outcome`, or -1 if rejected.
         """
         run = (tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data)
         if tangent is None:
@@ -225,7 +225,7 @@ class Engine:
     def run_cubics(
         self, tables: Tables, state: Structure, drive: Structure, tolerance: float, record: Structure
     ) -> int:
-        """Advance ``state`` over the intervals of ``drive`` and fill ``record``; returns as `run` does."""
+        """Advance ``state`` over the intervals of ``drive`` and fill ``record``; return the same as `run`."""
         run = (tables.ctypes.data, state.ctypes.data, drive.ctypes.data, tolerance, record.ctypes.data)
         return int(self._library.vibench_run_cubics(*run))
 
@@ -239,7 +239,7 @@ class Engine:
         readings: Structure,
         last: int,
     ) -> int:
-        """Advance up to reading ``last``, and fill ``readings``; returns as `run` does."""
+        """Advance to the end of interval ``last``, and fill ``readings``; return the same as `run`."""
         filled = (each.ctypes.data for each in (record, tangent, readings))
         return int(
             self._library.vibench_take_readings(
@@ -248,12 +248,12 @@ class Engine:
         )
 
     def reach(self, tables: Tables, state: Structure) -> float:
-        """Return a bound on later abs(p) in free flight [m]; infinite if a stop is touched now."""
+        """Return a bound on abs(p) at all later times without contact [m]; infinite in contact."""
         return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
 def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
-    """Return address and size of an array; return a structure unchanged."""
+    """Return address and size of an array, or a structure unchanged."""
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -264,16 +264,16 @@ def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
 
 
 def library_path() -> Path:
-    """Return the library of the fastest family for this processor; build it if missing in a checkout.
+    """Return the path of the fastest library for this processor; in a checkout, build it if it is missing.
 
-    Raises EngineError when there is none, or when it was built from other sources and cannot be rebuilt.
+    Raises EngineError when there is no library, or when it is older than its sources and cannot be rebuilt.
     """
     families = usable_families()
     current = sources_digest()
     found = _newest_of(families, current)
     if found is None and current is not None and importlib.util.find_spec("ziglang") is not None:
         command = [sys.executable, str(BUILD), *families[:1]]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - a script of this checkout
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - own script
         found = _newest_of(families, current)
     if found is not None:
         return found
@@ -285,7 +285,7 @@ def library_path() -> Path:
 
 
 def native_digest() -> str:
-    """Return the digest of the native sources, in a checkout and in an installed wheel; empty if unknown."""
+    """Return the digest of the native sources, also for an installed wheel; empty if unknown."""
     digest = sources_digest()
     if digest is not None:
         return digest
@@ -294,7 +294,7 @@ def native_digest() -> str:
 
 
 def sources_digest() -> str | None:
-    """Return the digest of the native sources; None without sources, as in an installed wheel."""
+    """Return the digest of the native sources; None if there are no sources, as in an installed wheel."""
     if not BUILD.is_file():
         return None
     spec = importlib.util.spec_from_file_location("vibench_native_build", BUILD)
@@ -318,7 +318,7 @@ SIM = Path(__file__).parents[1]
 
 @cache
 def physics_digest() -> str:
-    """Return the digest of all code of the simulation, the same in a checkout and an installed wheel."""
+    """Return the digest of all code of the simulation; equal for a checkout and an installed wheel."""
     digest = hashlib.sha256(native_digest().encode())
     for path in sorted(each for kind in ("*.py", "*.pyi") for each in SIM.rglob(kind)):
         digest.update(path.relative_to(SIM).as_posix().encode())

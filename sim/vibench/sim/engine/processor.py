@@ -1,6 +1,6 @@
-"""Families of processors for which the native engine is compiled, and those of this computer.
+"""Families of processors for which the native engine is compiled, and the families of this processor.
 
-The build hook also imports this file, so it may use only the standard library.
+The build hook also imports this file, so this file may import only the standard library.
 """
 
 import ctypes
@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 FAMILIES = ("x86_64", "x86_64_v3", "x86_64_v4", "arm64")
-"""Names as in compilers: every x86-64 processor; those with AVX2; those with AVX-512; ARM."""
+"""Families, named as in compilers: all x86-64 processors, those with AVX2, those with AVX-512, and ARM."""
 _ARM = {"arm64", "aarch64"}
 _X86 = {"x86_64", "amd64"}
 _V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}
@@ -19,7 +19,7 @@ _WINDOWS_AVX2, _WINDOWS_AVX512 = 40, 41
 
 
 def usable_families() -> tuple[str, ...]:
-    """Return the families whose code this processor runs, the fastest first; empty for an unknown one."""
+    """Return the families whose code this processor can run, the fastest first; empty if unknown."""
     machine = platform.machine().lower()
     if machine in _ARM:
         return ("arm64",)
@@ -30,7 +30,7 @@ def usable_families() -> tuple[str, ...]:
 
 
 def _level() -> int:
-    """Return 3 for AVX-512, 2 for AVX2, else 1; unknown features count as absent."""
+    """Return 3 for AVX-512, 2 for AVX2, otherwise 1; unknown features count as absent."""
     if sys.platform == "win32":
         has = ctypes.windll.kernel32.IsProcessorFeaturePresent
         return 1 + bool(has(_WINDOWS_AVX2)) * (1 + bool(has(_WINDOWS_AVX512)))

@@ -1,4 +1,4 @@
-"""A motion of a specimen under a harmonic drive, advanced by the native engine. SI units."""
+"""Motion of a specimen under a harmonic or sampled drive, integrated by the native engine. SI units."""
 
 import math
 from copy import copy
@@ -23,15 +23,15 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most steps of flight in a run: seconds of computing, two days of motion of the paper's specimen."""
+"""Most steps without contact in a run: seconds of computing, two days of motion of the paper's specimen."""
 MOST_IMPACTS = 1 << 26
-"""Most impacts in one run: 0.5 GB for their times, allocated when they happen."""
+"""Most impacts in one run; their times need 0.5 GB, which is allocated as impacts occur."""
 SPARE_IMPACTS = 100
 """Impacts allowed in addition to the rate, for short runs."""
 DIRECTIONS = 6
-"""Number of directions of a state: the most small changes that can be carried along."""
+"""Dimension of a state, and largest number of tangent vectors."""
 INSIDE = 1e-9
-"""Relative tolerance within which a start beyond a rigid stop counts as on the stop."""
+"""Relative tolerance within which a start beyond a rigid stop counts as a start on the stop."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -41,9 +41,9 @@ KNOWN_MOTION = (
     2.63303389e-02,
     -1.20895040e-02,
 )
-"""Known result for the paper's specimen with a loss of 0.5 s/m, under 20 um at 130 Hz from rest."""
+"""Known final state of the paper's specimen with a loss of 0.5 s/m, driven by 20 um at 130 Hz from rest."""
 KNOWN_TO = 1e-6
-"""Tolerance of this result, over 100 um and 0.1 m/s."""
+"""Tolerance of the known state, over 100 um and 0.1 m/s."""
 
 
 class Watch(IntEnum):
@@ -51,13 +51,13 @@ class Watch(IntEnum):
 
     NOTHING = 0
     PEAKS = 1
-    """Extremes of x and p."""
+    """Largest abs(x) and abs(p)."""
     PEAKS_AND_LINES = 2
-    """Also their components at the drive frequency."""
+    """Also the components of x and p at the drive frequency."""
 
 
 class RunRecord:
-    """Record of a run, which does not affect its steps."""
+    """Record of a run: impacts, samples and observations, which do not affect the steps."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class RunRecord:
         engine: Engine | None = None,
     ) -> None:
         """Allocate memory for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
-        # Not cleared, because that takes as long as a short run; only filled entries are read.
+        # Only filled entries are read. Initialising the arrays would take as long as a short run.
         self._samples = np.empty((samples, DIRECTIONS))
         self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
@@ -81,42 +81,42 @@ class RunRecord:
         record["steps_left"] = MOST_STEPS if steps is None else steps
 
     def watch(self, what: Watch) -> None:
-        """Observe ``what`` from now on."""
+        """Set what is observed from now on."""
         self.structure["watch"] = what
 
     @property
     def impacts(self) -> int:
-        """Number of contacts that began so far."""
+        """Number of contacts that have begun."""
         return int(self.structure["impacts"])
 
     @property
     def impact_times_s(self) -> Floats:
-        """Start times of contacts."""
+        """Start times of contacts, shape (impacts,) [s]."""
         return self._times[: self.impacts]
 
     @property
     def samples(self) -> Floats:
-        """x, y, z, vx, vy, vz at the samples so far, shape (n, 6)."""
+        """Samples of x, y, z, vx, vy, vz so far, shape (n, 6)."""
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples; ``last`` is used for samples that rounding places beyond the end."""
+        """Return all samples, shape (samples, 6); samples after the end, due to rounding, are ``last``."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
     @property
     def steps_left(self) -> int:
-        """Number of steps left."""
+        """Number of steps that the run may still take."""
         return max(0, int(self.structure["steps_left"]))
 
     @property
     def peak_x_m(self) -> float:
-        """Largest abs(x) observed."""
+        """Largest observed abs(x) [m]."""
         return float(self.structure["peak_x"])
 
     @property
     def peak_p_m(self) -> float:
-        """Largest abs(p) observed."""
+        """Largest observed abs(p) [m]."""
         return float(self.structure["peak_p"])
 
     @property
@@ -126,7 +126,7 @@ class RunRecord:
 
     @property
     def area_p(self) -> complex:
-        """The same integral for p."""
+        """Integral of p exp(-i (omega t + phase)) over the time with observed lines [m s]."""
         return complex(self.structure["line_p"])
 
 
@@ -135,17 +135,17 @@ class _Run:
 
     @property
     def motion(self) -> Floats:
-        """x, y, z, vx, vy, vz now, shape (6,)."""
+        """Current x, y, z, vx, vy, vz, shape (6,)."""
         return np.array(self._state["motion"])
 
     @property
     def time_s(self) -> float:
-        """Return the current time of the motion [s]."""
+        """Current time of the motion [s]."""
         return float(self._state["clock_high"])
 
 
 class NativeRun(_Run):
-    """One motion with its state and small changes (tangent vectors)."""
+    """Motion under a harmonic drive, with its state and tangent vectors."""
 
     def __init__(
         self,
@@ -157,9 +157,9 @@ class NativeRun(_Run):
         start_time_s: float = 0.0,
         engine: Engine | None = None,
     ) -> None:
-        """Start from x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
+        """Start from x, y, z, vx, vy, vz in the inertial frame, shape (6,) [m, m/s].
 
-        Raises ValueError when the engine refuses the specimen, the drive or the start.
+        Raises ValueError when the engine rejects the specimen, the drive or the start.
         """
         self.engine = engine = native_engine() if engine is None else engine
         self.specimen = specimen
@@ -168,18 +168,18 @@ class NativeRun(_Run):
         self._state = engine.new("State")
         self._state["clock_high"] = start_time_s
         self.tolerance = tolerance
-        """Relative error allowed in a step of a contact."""
+        """Relative tolerance of a time step in contact."""
         self.place(initial_state)
 
     def place(self, motion: ArrayLike) -> None:
-        """Set x, y, z, vx, vy, vz, shape (6,), and find any contact.
+        """Set x, y, z, vx, vy, vz, shape (6,), and determine whether m1 is in contact.
 
         Raises ValueError when the motion is inside a rigid stop.
         """
         start_at(self.engine, self._tables, self.specimen, self._state, motion, self.tolerance)
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Return a copy; a copy with another tolerance has no small changes."""
+        """Return a copy; a copy with another tolerance has no tangent vectors."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
@@ -188,25 +188,25 @@ class NativeRun(_Run):
         return twin
 
     def carry(self, changes: Floats) -> None:
-        """Propagate small changes of the state from now on, shape (n, 6); none if n = 0."""
+        """Propagate tangent vectors from now on, shape (n, 6); none if n = 0."""
         self._tangent["changes"] = len(changes)
         self._tangent["rows"][: len(changes)] = changes
         self._tangent["growth"] = 0.0
 
     @property
     def changes(self) -> Floats:
-        """The propagated changes, shape (n, 6), divided by exp(`growth`)."""
+        """Tangent vectors divided by exp(`growth`), shape (n, 6)."""
         return np.array(self._tangent["rows"][: int(self._tangent["changes"])])
 
     @property
     def growth(self) -> Floats:
-        """Logarithm of the factor that was divided out of each of `changes`, shape (n,)."""
+        """Natural logarithm of the factor by which each tangent vector was divided, shape (n,)."""
         return np.array(self._tangent["growth"][: int(self._tangent["changes"])])
 
     def advance(self, until_s: float, record: RunRecord) -> Outcome:
-        """Advance to an instant [s]; do nothing if it has already passed.
+        """Advance to a time [s] and return the outcome; a time in the past changes nothing.
 
-        Raises ValueError when the engine refuses the instant.
+        Raises ValueError when the engine rejects the time.
         """
         tangent = self._tangent if self._tangent["changes"] > 0 else None
         code = self.engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
@@ -217,7 +217,7 @@ class NativeRun(_Run):
         return Outcome(code)
 
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
-        """Advance up to reading ``last`` of the growth of the changes."""
+        """Advance to the end of interval ``last``, recording the growth of tangent vectors."""
         return Outcome(
             self.engine.take_readings(
                 *(self._tables, self._state, self.tolerance, record.structure),
@@ -227,31 +227,31 @@ class NativeRun(_Run):
 
     @property
     def addresses(self) -> tuple[int, int]:
-        """Addresses of tables and state for a batch; valid as long as the run."""
+        """Memory addresses of tables and state for a batch; valid as long as the run exists."""
         return self._tables.ctypes.data, self._state.ctypes.data
 
     def pass_over(self, length_s: float) -> None:
-        """Advance only the time, by a period after which the motion repeats."""
+        """Advance the time without changing the state, by a period after which the motion repeats [s]."""
         clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
         self._state["clock_high"] = high = math.fsum(clock)
         self._state["clock_low"] = math.fsum((*clock, -high))
 
     @property
     def is_in_flight(self) -> bool:
-        """Return whether no stop is touched now."""
+        """Whether no stop is in contact."""
         return bool(self._state["side"] == 0.0)
 
     @property
     def reach_m(self) -> float:
-        """Return a bound on later abs(p) in free flight; infinite if a stop is touched now."""
+        """Bound on abs(p) at all later times without contact [m]; infinite in contact."""
         return self.engine.reach(self._tables, self._state)
 
 
 class GrowthReadings:
-    """Growth of changes between instants, orthonormalised in a metric."""
+    """Growth of tangent vectors in equal intervals, orthonormalised in a metric."""
 
     def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
-        """Allocate readings at multiples of ``interval_s``, each in equal ``parts``."""
+        """Allocate memory for ``room`` intervals of ``interval_s``, each divided into equal ``parts``."""
         self._growth = np.zeros((room, changes))
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
@@ -263,27 +263,27 @@ class GrowthReadings:
 
     @property
     def made(self) -> int:
-        """Number of readings so far."""
+        """Number of intervals so far."""
         return int(self.structure["made"])
 
     @property
     def growth(self) -> Floats:
-        """Logarithm of the factor by which each change grew in each interval, shape (n, m)."""
+        """Natural logarithm of the growth of each tangent vector in each interval, shape (n, m)."""
         return self._growth[: self.made]
 
     @property
     def impacts(self) -> NDArray[np.int64]:
-        """Impacts in each interval, shape (n,)."""
+        """Number of impacts in each interval, shape (n,)."""
         return self._impacts[: self.made]
 
     @property
     def motions(self) -> Floats:
-        """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
+        """x, y, z, vx, vy, vz at the end of each interval, shape (n, 6)."""
         return self._motions[: self.made]
 
 
 def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
-    """Raise ValueError when a motion begins beyond a rigid stop."""
+    """Raise ValueError for a start beyond a rigid stop."""
     if not isinstance(specimen.contact, RigidStops):
         return
     lower, upper = specimen.gaps_m
@@ -297,15 +297,15 @@ def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
 
 
 def most_impacts(rate_hz: float, duration_s: float) -> int:
-    """Return the number of impacts allowed in a run for a largest mean rate."""
+    """Return the largest number of impacts in a run, from the largest mean impact rate."""
     return min(math.ceil(rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)
 
 
 @lru_cache(maxsize=1)
 def native_engine() -> Engine:
-    """Load the engine of this processor and check it with a known scene.
+    """Return the engine for this processor, loaded and checked with a known scene.
 
-    Raises EngineError when there is none or its result is wrong.
+    Raises EngineError when there is no engine or its result is wrong.
     """
     engine = Engine(library_path())
     check_known_answer(engine)
@@ -313,7 +313,7 @@ def native_engine() -> Engine:
 
 
 def check_known_answer(engine: Engine) -> None:
-    """Raise EngineError for a wrong result, for example by a miscompiled engine."""
+    """Raise EngineError if the engine gives a wrong result, for example because it was compiled wrongly."""
     specimen, drive = gong2025(contact="hunt_crossley:0.5"), Harmonic(130.0, 20e-6)
     run = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance, engine=engine)
     outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
@@ -325,9 +325,9 @@ def check_known_answer(engine: Engine) -> None:
 
 
 def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Tables:
-    """Prepare runs over intervals of one length; threads may share the tables.
+    """Return the tables for runs over intervals of one length; threads may share them.
 
-    Raises ValueError when the engine refuses the interval or the specimen.
+    Raises ValueError when the engine rejects the interval or the specimen.
     """
     require_positive("Interval", interval_s, "s")
     scene = engine.new("CubicScene", interval=interval_s)
@@ -341,7 +341,7 @@ def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Table
 def start_at(
     engine: Engine, tables: Tables, specimen: Specimen, state: Structure, motion: ArrayLike, tolerance: float
 ) -> None:
-    """Set a `State` to x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,), and find any contact.
+    """Set a `State` to x, y, z, vx, vy, vz, shape (6,), and determine whether m1 is in contact.
 
     Raises ValueError when the motion is inside a rigid stop, or the tolerance is not allowed.
     """
@@ -352,7 +352,7 @@ def start_at(
 
 
 class CubicRun(_Run):
-    """One motion, advanced interval by interval."""
+    """Motion under a piecewise cubic base displacement, advanced interval by interval."""
 
     def __init__(
         self,
@@ -363,7 +363,7 @@ class CubicRun(_Run):
         *,
         start_time_s: float = 0.0,
     ) -> None:
-        """Start from x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
+        """Start from x, y, z, vx, vy, vz in the inertial frame, shape (6,) [m, m/s].
 
         Raises ValueError when the interval, the specimen or the start is not allowed.
         """
@@ -377,16 +377,16 @@ class CubicRun(_Run):
     def advance(
         self, pieces: Floats, record: RunRecord, *, first_from_s: float = 0.0, last_to_s: float | None = None
     ) -> Outcome:
-        """Advance over a row of intervals.
+        """Advance over consecutive intervals and return the outcome.
 
         Parameters
         ----------
         pieces
-            c0 ... c3 of the base's displacement on each interval, shape (intervals, 4).
+            Coefficients c0 to c3 of the base displacement on each interval, shape (intervals, 4).
         record
             Record of the run.
         first_from_s, last_to_s
-            Start of the run within the first interval, and its end within the last [s].
+            Start of the run within the first interval, and end within the last interval [s].
         """
         drive = self._engine.new("CubicDrive", base=pieces, first_from=first_from_s)
         drive["last_to"] = self._interval_s if last_to_s is None else last_to_s
@@ -395,7 +395,7 @@ class CubicRun(_Run):
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
         """Advance over whole intervals, as far as possible.
 
-        Returns motions at the ends of completed intervals, shape (passed, 6), and impacts in each.
+        Return states at the ends of the completed intervals, shape (passed, 6), and their impact counts.
         """
         motions, impacts = np.empty((len(pieces), DIRECTIONS)), np.empty(len(pieces))
         drive = self._engine.new("CubicDrive", base=pieces, motions=motions, impacts=impacts)
@@ -413,11 +413,11 @@ class CubicRun(_Run):
 
 MAX_IMPACT_RATE_HZ = 200_000.0
 """Default limit of the impact rate, several times the largest known rate of the paper's specimen: at 50 um,
-4300 per second on Hertz's stops, and 23000 in chatter on rigid stops of restitution 0.8."""
+4300 per second with Hertz contacts, and 23000 in chatter on rigid stops with restitution 0.8."""
 
 
 def start_motion(initial_state: ArrayLike | None) -> Floats:
-    """Return the checked initial state; rest if None."""
+    """Return the checked initial state, shape (6,); zeros (rest) for None."""
     motion = np.zeros(6) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != (6,) or not bool(np.all(np.isfinite(motion))):
         raise ValueError(

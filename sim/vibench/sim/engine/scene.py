@@ -1,4 +1,4 @@
-"""Convert a specimen and a harmonic drive to structures of the native engine, with modal forms."""
+"""Conversion of a specimen and a harmonic drive to structures of the native engine."""
 
 import cmath
 import math
@@ -44,7 +44,7 @@ Phasors = NDArray[np.complex128]
 
 
 def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
-    """Fill a `Scene` of native/structures.hpp.
+    """Return the `Scene` of native/structures.hpp for a specimen and a drive.
 
     Raises ValueError when two modes coincide.
     """
@@ -72,11 +72,11 @@ def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
 
 
 def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_damping: float) -> None:
-    """Fill a `CellKind`: a cell of a chain and the next link [N/m], [N s/m]."""
+    """Fill a `CellKind` with a cell of a chain and the link to the next cell [N/m], [N s/m]."""
     fill_specimen(target["specimen"], cell)
     match cell.contact:
         case LinearGap():
-            # In a chain contacts with springs are resolved in steps.
+            # In a chain, contacts with linear stops are integrated in time steps.
             target["specimen"]["law"] = YIELDING
         case PowerLaw() as law:
             _fill_power(target["power"], law)
@@ -84,7 +84,7 @@ def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_dam
 
 
 def fill_drive(target: Structure, drive: Harmonic, first: Specimen) -> None:
-    """Fill a `Drive`: its force on the m0 coupled to the base."""
+    """Fill a `Drive` with its frequency, its phase and its force on the m0 coupled to the base."""
     _, force = harmonic_motion(first, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
     target["frequency"] = drive.frequency_hz
     target["start"] = cmath.exp(1j * drive.phase_rad)
@@ -103,8 +103,8 @@ def collision_structure(engine: Engine) -> Structure:
         return _collision_structure(engine)
 
 
-# The tables of a run point into these structures, so they must never be freed. Without the lock, two threads
-# could each create one at the first call, and the cache would drop the other.
+# The tables of a run contain pointers to these structures, which must therefore never be freed. Without the
+# lock, two threads could both create a structure at the first call, and the cache would free one of them.
 _ONE_THREAD = Lock()
 
 
@@ -171,7 +171,7 @@ def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m:
 
 
 def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
-    """Fill the case of m1 held on a rigid stop, which can only push."""
+    """Fill the motion with m1 held on a rigid stop, whose force can only be compressive."""
     bound = bound_motion(specimen, omega, amplitude_m)
     _fill_motion(target["motion"], bound.modes, bound.steady)
     m1, m2 = specimen.masses[1:]
@@ -182,14 +182,14 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """Fill the case of m1 on a spring stop: a spring parallel to k1, with another equilibrium."""
+    """Fill the motion with m1 on a linear stop, a spring parallel to k1 with another equilibrium."""
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]
     try:
         _fill_free(held["motion"], pressed, omega, amplitude_m)
     except ValueError:
-        # Two of its modes coincide: contacts are resolved in steps.
+        # Two modes of this motion coincide: integrate contacts in time steps.
         scene["specimen"]["law"] = YIELDING
         return
     steady = held["motion"]["steady"]

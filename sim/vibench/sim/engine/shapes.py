@@ -1,11 +1,10 @@
-"""Tables that are the same for every specimen: Hertz collisions, and steps under power laws.
+"""Tables that are the same for every specimen: Hertz collisions, and time steps under power laws.
 
-Hertz collisions are solved in advance.
-
-With t = T (1 - cos phi) / 2, where T is the duration, depth and force are smooth in phi, including the square
-roots at both ends: sixteen Gauss points in phi describe a whole collision. Scaled by the depth and time of a
-free collision of the same speed, collisions differ only by the press of the other springs. The shapes and
-their derivatives are tabulated over that press (docs/decisions/0008-speed-of-contacts.md).
+With t = T (1 - cos phi) / 2, where T is the duration, depth and force are smooth in phi, even at both ends,
+where they are square roots in t. Sixteen Gauss points in phi therefore describe a whole collision. In units
+of the depth and time of a free collision at the same speed, collisions differ only by the acceleration due to
+the other springs, called press. The shapes of collisions and their derivatives are tabulated over the press
+(docs/decisions/0008-speed-of-contacts.md).
 """
 
 import math
@@ -18,32 +17,32 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""Gauss points in phi, which determine the duration to 1e-8 and the speed to rounding."""
+"""Number of Gauss points in phi; the duration is accurate to 1e-8 and the speed to rounding."""
 TERMS = 8
-"""Terms of the series for forces that are slow compared with a collision."""
+"""Number of terms of the series for forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
-"""First and last tabulated press, and their number. A press is the acceleration by all other springs over
-speed^2 / depth."""
+"""First and last tabulated press, and number of values. The press is the acceleration due to all other
+springs, over speed^2 / depth."""
 SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
 QUADRATURE = 60
 NEWTON_STEPS = 60
 HALF_FORCE = 1.25
-"""k / m in units of the depth and the speed: m v^2 / 2 = 2 k d^(5/2) / 5."""
+"""Ratio k / m in units of depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5."""
 TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
 """Rows of a shape, after sixteen rows of derivatives by the residuals of depth: derivatives by the residual
-of the end; derivatives of the duration by the residuals; depths at the points; derivatives of the depths by
-the press, by its rate, and by the force through dampers and springs (two or three integrals)."""
+at the end; derivatives of the duration by the residuals; depths at the points; derivatives of the depths by
+the press, by its rate, and by the force through dampers (two integrals) and springs (three integrals)."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
-"""Columns of the scalars of a shape. DEEPER is the largest depth over that of the polynomial through the
-points, whose error is 1e-5 in the middle and 1e-8 at the end. From LASTS_BY on: derivatives of the
-duration, in the order of the derivatives of depths."""
+"""Columns of the scalars of a shape. DEEPER is the ratio of the largest depth to that of the polynomial
+through the points, whose error is 1e-5 in the middle and 1e-8 at the end. From LASTS_BY on, columns are
+derivatives of the duration, in the order of the derivatives of depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 
 
 def _cardinal(at: Table, points: Vector) -> Table:
-    """Return the polynomials that are 1 at one of the points and 0 at the others; shape (..., points)."""
+    """Return the Lagrange polynomials of ``points`` at the arguments ``at``, shape (..., points)."""
     others = ~np.eye(len(points), dtype=np.bool_)
     away = np.where(others, at[..., None, None] - points, 1.0)
     apart = np.where(others, points[:, None] - points, 1.0)
@@ -51,7 +50,7 @@ def _cardinal(at: Table, points: Vector) -> Table:
 
 
 def _about_middle() -> Table:
-    """Return the map from depths at the points to Taylor terms about the middle of phi."""
+    """Return the matrix that maps depths at the points to Taylor terms about the middle of phi."""
     cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
     return np.ascontiguousarray(cardinal[:TERMS].T)
 
@@ -59,12 +58,12 @@ def _about_middle() -> Table:
 ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
-"""Distance from the middle of phi at which eight terms are accurate to 1e-7; at a tenth of it, to
-rounding."""
+"""Largest distance from the middle of phi [rad]; eight terms are accurate to 1e-7 there, and to rounding at a
+tenth of it."""
 
 
 def _top_of(terms: Vector) -> float:
-    """Return the largest value of a Taylor polynomial near its middle."""
+    """Return the maximum of a Taylor polynomial near its centre."""
     polynomial = np.polynomial.Polynomial(terms)
     slope, bend = polynomial.deriv(), polynomial.deriv(2)
     at = 0.0
@@ -74,7 +73,7 @@ def _top_of(terms: Vector) -> float:
 
 
 def _shares() -> Table:
-    """Integrals of (t_i - t)^m times the cardinal polynomials, shape (TERMS, POINTS, POINTS + 1)."""
+    """Return the integrals of (t_i - t)^m times Lagrange polynomials, shape (TERMS, POINTS, POINTS + 1)."""
     places, weights = np.polynomial.legendre.leggauss(QUADRATURE)
     ends = np.append(PHI, math.pi)
     phi = 0.5 * (places + 1.0) * ends[:, None]
@@ -88,7 +87,7 @@ SHARES: Table = _shares()
 
 
 def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Table]:
-    """Return the residual of a collision's equations in unit speed and depth, and its derivative."""
+    """Return the residual of the equations of a collision at unit speed and depth, and its derivative."""
     times = np.append(HEIGHTS, 1.0)
     root = np.sqrt(np.maximum(depths, 0.0))
     pushed = HALF_FORCE * (depths * root) @ SHARES[1]
@@ -103,9 +102,9 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Solve the tabulated collisions, each starting from the previous one."""
+    """Return the tabulated collisions and their scalars; each is solved from the one before."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
-    # Without a press a collision lasts 2.943, and its depth is close to half a sine.
+    # Without press, a collision lasts 2.943 and its depth is nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
     for softer in np.linspace(0.0, SOFTEST, SHAPES):
         depths, duration, _ = _solve_collision(depths, duration, float(softer))
@@ -132,7 +131,7 @@ def collision_shapes() -> tuple[Table, Table]:
 
 
 def _deepest(press: float) -> float:
-    """Return the depth with all energy in the stop: d^(5/2) = 1 + 2 press d, in units of speed and depth."""
+    """Return the largest depth d, from the energy balance d^(5/2) = 1 + 2 press d in unit speed and depth."""
     depth = 1.0
     for _ in range(NEWTON_STEPS):
         depth -= (depth**2.5 - 1.0 - 2.0 * press * depth) / (2.5 * depth**1.5 - 2.0 * press)
@@ -140,7 +139,7 @@ def _deepest(press: float) -> float:
 
 
 def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
-    """Solve a collision by Newton's method to rounding."""
+    """Return depths, duration and derivative of a collision, solved by Newton's method to rounding."""
     for _ in range(NEWTON_STEPS):
         found, slopes = _misfits(depths, duration, press)
         step = np.linalg.solve(slopes, found)
@@ -150,32 +149,32 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
     return depths, duration, _misfits(depths, duration, press)[1]
 
 
-# Sums over the Gauss points of a step under a power law, the same for every law and length. In a step from 0
-# to 1 the force F is a polynomial through its values at eight points; all results are linear in these values
+# Weights for time steps under power laws, the same for every law and step length. In a step from 0 to 1 the
+# force F is a polynomial through its values at eight Gauss points; all results are linear in these values
 # (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
-"""Gauss points in a step; ten would cost 50 % more for steps 10 % longer."""
+"""Number of Gauss points in a step; ten points would cost 50 % more, for steps that are 10 % longer."""
 ORDER = 32
-"""Terms of the series: the next is 1e-20 of the largest in the longest step."""
+"""Number of terms of the series; the next term is 1e-20 of the largest in the longest step."""
 POWER_QUADRATURE = 24
-"""Points of the integrals of the series, exact for all terms."""
+"""Number of quadrature points for the series; exact for all terms."""
 COURSE_DEGREE = 5
-"""Degree of the first guess of F in a step, fitted to the step before."""
+"""Degree of the polynomial that predicts F in a step, fitted to the step before."""
 END_WEIGHT = 3.0
-"""Weight of the end of that step in the fit."""
+"""Weight in this fit of the value at the end of the step before."""
 POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
-"""Gauss's points c_i on [0, 1]."""
+"""Gauss points c_i on [0, 1]."""
 GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
 
 
 AT_START: Vector = _cardinal(np.array(0.0), POINTS_AT)
 AT_END: Vector = _cardinal(np.array(1.0), POINTS_AT)
-"""Weights of the values at the points for the polynomial's values at a step's start and end."""
+"""Weights of the values at the Gauss points, for the polynomial at the start and the end of a step."""
 
 
 def _course() -> Table:
-    """Return the map from F at the points and the end of a step to coefficients in powers of (s - 1).
+    """Return the matrix from F at the points and the end of a step to coefficients in powers of (s - 1).
 
     Shape (GAUSS_POINTS + 1, GAUSS_POINTS); entries beyond the degree are zero.
     """
@@ -189,7 +188,7 @@ COURSE: Table = _course()
 
 
 def _power_shares() -> Table:
-    """Integrals of (c_i - s)^m times cardinal polynomials, shape (ORDER, GAUSS_POINTS, GAUSS_POINTS + 1)."""
+    """Return integrals of (c_i - s)^m times Lagrange polynomials, shape (ORDER, points, points + 1)."""
     places, weights = np.polynomial.legendre.leggauss(POWER_QUADRATURE)
     places, weights = 0.5 * (places + 1.0), 0.5 * weights
     ends = np.append(POINTS_AT, 1.0)
@@ -201,16 +200,16 @@ def _power_shares() -> Table:
 
 POWER_SHARES: Table = _power_shares()
 INSTANTS: Vector = np.concatenate([[0.0], POINTS_AT, [1.0]])
-"""Instants at which a step is observed: its start, points and end."""
+"""Times at which a step is observed: its start, its Gauss points and its end."""
 
 
 def _between(places: Vector) -> Table:
-    """Return the differences between all places, with 1 on the diagonal."""
+    """Return the differences between all pairs of points, with 1 on the diagonal."""
     return np.asarray(places[:, None] - places + np.eye(len(places)))
 
 
 POINT_WEIGHTS: Vector = 1.0 / np.prod(_between(POINTS_AT), axis=1)
 INSTANT_WEIGHTS: Vector = 1.0 / np.prod(_between(INSTANTS), axis=1)
-"""Barycentric weights: Berrut and Trefethen, SIAM Rev. 46 (2004) 501."""
+"""Barycentric weights (Berrut and Trefethen, SIAM Rev. 46 (2004) 501)."""
 INSTANT_SLOPES: Vector = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
-"""Slope, at each instant, of the polynomial that is 1 there and 0 at all other instants."""
+"""Slope, at each observed time, of the Lagrange polynomial of that time."""
