@@ -1,7 +1,7 @@
 """One motion of one specimen: integrated, observed, sampled, or reduced to one state per drive period.
 
-`integrate` gives a `Trajectory`; `steady_response` Responses I and II over the window at the end of a run;
-`follow_samples` a motion sample by sample of a recorded base. `poincare` finds the period of a
-motion and the derivative of its flow. A run that cannot continue ends with an `Outcome`, not an exception
-(docs/decisions/0004-contact-integration.md).
+`integrate` returns a `Trajectory`. `steady_response` returns Responses I and II in the window at the end of a
+run. `follow_samples` returns the motion at each sample of a recorded base motion. `poincare` finds the period
+of a motion and the derivative of its flow. A run that cannot continue ends with an `Outcome`, not an
+exception (docs/decisions/0004-contact-integration.md).
 """

@@ -15,34 +15,33 @@ from ..specimen.specimen import Specimen
 from ..specimen.state import Floats, Table, Vector
 from ..specimen.stops import chosen
 
-# A drive cut into intervals on which the base displacement is a cubic polynomial. SI units.
+# Division of a drive into intervals on which the base displacement is a cubic polynomial. SI units.
 #
-# Sampled drives: the C2 spline through the samples, which is the definition of the drive. Sweeps: the cubic
-# that matches displacement and velocity at both ends of each interval (C1). Its error in displacement is at
-# most amplitude (omega h)^4 / 384 for the highest frequency; h is chosen so that this is a thousandth of
-# the tolerance.
+# A sampled drive is defined as the C2 spline through its samples. For a sweep, the cubic has the displacement
+# and the velocity of the sweep at both ends of each interval (C1). Its displacement error is at most
+# amplitude (omega h)^4 / 384 for the highest frequency; h is chosen for a thousandth of the tolerance.
 
 HERMITE = 384.0
-"""The error of cubic Hermite interpolation is h^4 / 384 times the fourth derivative."""
+"""Denominator of the error of cubic Hermite interpolation, h^4 / 384 times the fourth derivative."""
 SHARE = 1e-3
-"""Part of the accuracy's tolerance for the interpolation of a sweep."""
+"""Share of the tolerance that is used for the interpolation of a sweep."""
 SHORTEST_TURN = 0.005
-"""Shortest interval [rad]; its error is 2e-12 of the amplitude, so shorter ones gain nothing."""
+"""Shortest interval [rad]; its error of 2e-12 of the amplitude needs no shorter interval."""
 
 
 class BaseMotion(NamedTuple):
-    """Base displacement as cubics on equal intervals."""
+    """Base displacement as cubic polynomials on equal intervals."""
 
     interval: float
-    """[s]."""
+    """Length of an interval [s]."""
     pieces: NDArray[np.float64]
-    """Shape (intervals, 4): c0 ... c3 of U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3."""
+    """Coefficients c0 to c3 of U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3, shape (intervals, 4)."""
 
 
 def sampled_motion(drive: Sampled) -> BaseMotion:
-    """Cut a sampled drive at its samples."""
+    """Return the cubics of a sampled drive between its samples."""
     interval = 1.0 / drive.sample_rate_hz
-    # In units of the interval, so that the knots of the spline are exact.
+    # Use units of the interval, in which the knots of the spline are exact.
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 - harmonic drives do without scipy
 
     spline = CubicSpline(np.arange(len(drive.displacement_m), dtype=np.float64), drive.displacement_m)
@@ -50,7 +49,7 @@ def sampled_motion(drive: Sampled) -> BaseMotion:
 
 
 def sweep_interval_s(drive: Sweep, accuracy: Accuracy) -> float:
-    """Longest interval for which the interpolation error stays within its part of the tolerance."""
+    """Return the longest interval whose interpolation error is `SHARE` times the tolerance [s]."""
     turn = max(SHORTEST_TURN, (HERMITE * SHARE * accuracy.tolerance) ** 0.25)
     intervals = math.ceil(drive.duration_s * 2.0 * math.pi * drive.highest_hz / turn)
     interval: float = drive.duration_s / intervals
@@ -58,7 +57,7 @@ def sweep_interval_s(drive: Sweep, accuracy: Accuracy) -> float:
 
 
 def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> BaseMotion:
-    """Cut ``count`` intervals of a sweep, beginning with interval ``first``."""
+    """Return the cubics of ``count`` intervals of a sweep, beginning with interval ``first``."""
     time_s = np.arange(first, first + count + 1, dtype=np.float64) * interval_s
     turns = drive.turns(time_s)
     angle = 2.0 * np.pi * (turns - np.floor(turns))
@@ -72,11 +71,11 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
 
 
 LATEST_START_S = 1e8
-"""Three years: later, double precision cannot resolve 1e-8 s."""
+"""Latest start, three years; after it, double precision does not resolve 1e-8 s."""
 MOST_SAMPLES = 1e9
-"""Limit of 48 GB of memory."""
+"""Largest number of samples, which need 48 GB of memory."""
 ROUNDING = 1e-9
-"""A duration this close to a whole number of samples or intervals counts as whole."""
+"""Relative tolerance within which a duration contains a whole number of samples or intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +83,7 @@ class Impacts:
     """Impacts of m1 on its stops."""
 
     times_s: Floats
-    """Ascending, shape (count,) [s]."""
+    """Start times of contacts, ascending, shape (count,) [s]."""
 
     @property
     def count(self) -> int:
@@ -97,15 +96,15 @@ class Trajectory:
     """States, impacts and outcome of a run."""
 
     time_s: Floats
-    """Shape (n,); empty when no sample rate was requested."""
+    """Sample times, shape (n,) [s]; empty if no sample rate was requested."""
     states: Floats
-    """Shape (n, 6): x, y, z, vx, vy, vz [m, m/s], absolute."""
+    """x, y, z, vx, vy, vz in the inertial frame, shape (n, 6) [m, m/s]."""
     final_state: Floats
-    """Shape (6,), at ``end_time_s``."""
+    """State at ``end_time_s``, shape (6,)."""
     end_time_s: float
     impacts: Impacts
     outcome: Outcome
-    """Only REACHED_END means that the run reached the requested time."""
+    """Outcome; only with REACHED_END the run reached the requested time."""
     accuracy: Accuracy
 
 
@@ -120,29 +119,29 @@ def integrate(
     start_time_s: float = 0.0,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> Trajectory:
-    """Follow a specimen under a drive.
+    """Integrate the motion of a specimen under a drive.
 
-    Flight is exact (harmonic drives in closed form, others as cubics on intervals), contacts are proved or
-    excluded by bounds and resolved with the tolerance of ``accuracy``. Sampling changes no step, so the
-    motion is the same with any sample rate. Raises ValueError when an argument is not allowed, or the drive
-    ends before the run.
+    Motion without contact is exact: a harmonic drive in closed form, other drives as piecewise cubics. Bounds
+    ensure that no contact is missed. Contacts are integrated with the tolerance of ``accuracy``. Sampling
+    changes no step, so the motion is the same with any sample rate. Raises ValueError when an argument is not
+    allowed, or the drive ends before the run.
 
     Parameters
     ----------
     specimen, drive
         Specimen, and motion of its base.
     duration_s
-        [s]; a sweep or a sampled drive must last as long.
+        Length of the run [s]; a sweep or a sampled drive must be at least as long.
     accuracy
-        Relative error allowed in a step of a contact.
+        Accuracy level, which sets the relative tolerance of a time step in contact.
     initial_state
-        x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,); at rest when None. May be in contact.
+        x, y, z, vx, vy, vz in the inertial frame, shape (6,) [m, m/s]; None for rest. May be in contact.
     sample_rate_hz
-        Samples at start_time_s + k / sample_rate_hz up to the end; no samples when None.
+        Rate of the samples at start_time_s + k / sample_rate_hz up to the end; None for no samples.
     start_time_s
-        Start time on the drive's clock, to continue from an earlier final state.
+        Start time on the time axis of the drive, to continue from an earlier final state.
     max_impact_rate_hz
-        Mean impact rate above which a run ends with TOO_MANY_IMPACTS.
+        Mean impact rate above which the run ends with TOO_MANY_IMPACTS.
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
@@ -160,7 +159,7 @@ def integrate(
     else:
         run, outcome = integrate_cubics(specimen, drive, float(start_time_s), end, accuracy, start, record)
     is_whole = outcome is Outcome.REACHED_END
-    # Rounding may place the last sample at or just beyond the end.
+    # Rounding may place the last sample at or just after the end.
     states = record.all_samples(run.motion) if is_whole else record.samples
     return Trajectory(
         time_s=start_time_s + np.arange(len(states)) / rate_hz,
@@ -174,7 +173,7 @@ def integrate(
 
 
 def check_impact_rate(max_impact_rate_hz: float) -> None:
-    """Refuse a negative or infinite limit of the impact rate."""
+    """Raise ValueError for a negative or infinite limit of the impact rate."""
     if not 0.0 <= max_impact_rate_hz < math.inf:
         raise ValueError(
             f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
@@ -182,7 +181,7 @@ def check_impact_rate(max_impact_rate_hz: float) -> None:
 
 
 def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | None) -> None:
-    """Refuse impossible times and sample rates."""
+    """Raise ValueError for times or sample rates that are not allowed."""
     if not 0.0 <= duration_s < math.inf:
         raise ValueError(f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite.")
     if not 0.0 <= start_time_s <= LATEST_START_S:
@@ -201,7 +200,7 @@ def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | 
 
 
 def check_within(available_s: float, end_s: float) -> None:
-    """Refuse a run that lasts longer than its drive."""
+    """Raise ValueError for a run that is longer than its drive."""
     if end_s > available_s * (1.0 + ROUNDING):
         raise ValueError(
             f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."
@@ -209,7 +208,7 @@ def check_within(available_s: float, end_s: float) -> None:
 
 
 BATCH = 1 << 16
-"""Number of intervals of a sweep made at once; bounds the memory of a long sweep."""
+"""Number of intervals of a sweep computed at once; limits the memory for a long sweep."""
 
 
 def integrate_cubics(
@@ -221,7 +220,7 @@ def integrate_cubics(
     start: Vector,
     record: RunRecord,
 ) -> tuple[CubicRun, Outcome]:
-    """Follow a specimen as `integrate` does, from one instant to another.
+    """Integrate a motion from ``start_s`` to ``end_s``, as `integrate` does; return the run and its outcome.
 
     Raises ValueError when the drive ends before the run.
     """
@@ -258,7 +257,7 @@ def integrate_cubics(
 
 
 def _place(time_s: float, interval_s: float) -> tuple[int, float]:
-    """Return the interval that contains an instant, and the time from its beginning."""
+    """Return the index of the interval that contains a time, and the time since its start [s]."""
     position = time_s / interval_s
     nearest = round(position)
     if abs(position - nearest) < ROUNDING * max(1.0, position):
@@ -266,26 +265,26 @@ def _place(time_s: float, interval_s: float) -> tuple[int, float]:
     return int(position), time_s - int(position) * interval_s
 
 
-# The motion at each sample of the recorded base, for overlays of a model on a recording. SI units.
+# Motion at each sample of a recorded base motion, to overlay a model on a recording. SI units.
 #
-# `integrate` gives more (impact times, any sample rate, any end) and costs several times as much per
-# interval. Here every interval is whole, the state at its end is kept, and impacts are only counted.
+# `integrate` returns more (impact times, any sample rate, any end) and takes several times longer per
+# interval. Here all intervals are whole, the state at each end is stored, and impacts are only counted.
 
 
 @dataclass(frozen=True, eq=False)
 class FollowedMotion:
-    """States at the samples that were reached, and impacts between them."""
+    """States at the samples that the run reached, and impacts between them."""
 
     states: NDArray[np.float64]
-    """x, y, z, vx, vy, vz at every sample, absolute, shape (reached, 6) [m, m/s]."""
+    """x, y, z, vx, vy, vz at every sample in the inertial frame, shape (reached, 6) [m, m/s]."""
     impacts: NDArray[np.int64]
-    """Contacts that began between a sample and the next, shape (reached - 1,)."""
+    """Number of contacts that began between a sample and the next, shape (reached - 1,)."""
     requested: int
-    """Number of requested samples; more than reached if the motion was lost."""
+    """Number of requested samples; larger than the number of states if the motion was lost."""
 
     @property
     def reached_end(self) -> bool:
-        """Return whether there is a state for every requested sample."""
+        """Whether there is a state for every requested sample."""
         return len(self.states) == self.requested
 
 
@@ -298,15 +297,15 @@ def follow_samples(
     first: int = 0,
     last: int | None = None,
 ) -> FollowedMotion:
-    """Follow a specimen from one sample of its base's displacement to another.
+    """Return the motion of a specimen at each sample of its base displacement.
 
     Parameters
     ----------
     initial_state
-        x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,); at rest when None. May be in contact.
+        x, y, z, vx, vy, vz in the inertial frame, shape (6,) [m, m/s]; None for rest. May be in contact.
     first, last
-        Samples at which the run begins and ends; the whole drive if absent. Samples outside
-        this range still affect the spline.
+        Samples at which the run begins and ends; by default the whole drive. Samples outside this range
+        also affect the spline.
     """
     accuracy = chosen(Accuracy, accuracy)
     base = sampled_motion(drive)

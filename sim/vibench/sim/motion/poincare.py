@@ -1,4 +1,4 @@
-"""The period of a motion from one state per drive period, and the derivative of its flow. SI units."""
+"""Period of a motion, from its states once per drive period, and derivative of its flow. SI units."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +17,11 @@ def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, mo
     Parameters
     ----------
     section
-        Shape (n, 6), settled; at least twice the period long.
+        States of the settled motion once per drive period, at least two periods long, shape (n, 6).
     scales
-        From `state_scales`.
+        Scales of a state from `state_scales`, shape (6,).
     tolerance
-        Largest change of a state over its scale that counts as the same.
+        Largest change of a state, over its scale, in a section that repeats.
     most
         Longest period to try.
     """
@@ -40,11 +40,10 @@ def flow_derivative(
     duration_s: float,
     accuracy: Accuracy = Accuracy.REFERENCE,
 ) -> tuple[Floats, Floats]:
-    """Integrate from the drive's time zero, and differentiate the final state by the initial one.
+    """Return the final state of a run from the drive's time zero, and its derivative by the initial state.
 
-    At a grazing impact on a rigid stop no derivative exists, and very large numbers are returned. Returns
-    the state at the end, shape (6,), and its derivative by ``state``, shape (6, 6); NaN when the run was
-    lost.
+    The shapes are (6,) and (6, 6); NaN if the run was lost. At a grazing impact on a rigid stop the
+    derivative does not exist, and very large numbers are returned.
 
     Parameters
     ----------
@@ -53,7 +52,7 @@ def flow_derivative(
     state
         x, y, z, vx, vy, vz at time zero, shape (6,).
     duration_s
-        [s].
+        Length of the run [s].
     accuracy
         Accuracy of the motion and of its derivative.
     """

@@ -1,4 +1,4 @@
-"""Responses I and II of a specimen under one harmonic drive, observed while it runs. SI units."""
+"""Responses I and II of a specimen under a harmonic drive, observed during the integration. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -17,31 +17,31 @@ from .integrate import check_impact_rate
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """One point of a response curve. NaN where the run did not reach its end."""
+    """One point of a response curve; NaN if the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """Time before the end over which the largest values are taken."""
+    """Length of the window at the end of the run, over which largest values are taken [s]."""
     line_periods: int
-    """Number of whole drive periods in the window, over which the lines at the drive frequency are taken."""
+    """Number of whole drive periods at the end of the window, over which lines are taken."""
     largest_x_m: float
-    """Response I of m0, not normalised."""
+    """Largest abs(x) in the window [m]."""
     largest_p_m: float
-    """Response I of p = y - z, not normalised."""
+    """Largest abs(p), p = y - z, in the window [m]."""
     line_x_m: complex
-    """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency; the drive itself is -i A0."""
+    """Phasor at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase))); the drive is -i A0 [m]."""
     line_p_m: complex
-    """The same for p."""
+    """Phasor of p at the drive frequency [m]."""
     impacts: int
-    """Contacts that began within the window."""
+    """Number of contacts that began in the window."""
     impacts_before: int
-    """Contacts that began before the window."""
+    """Number of contacts that began before the window."""
     line_start_state: Floats
-    """x, y, z, vx, vy, vz at the start of these drive periods, shape (6,)."""
+    """x, y, z, vx, vy, vz at the start of the ``line_periods``, shape (6,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz at the end, shape (6,), to start the next point of a sweep."""
+    """x, y, z, vx, vy, vz at the end, as the start of the next point of a sweep, shape (6,)."""
     outcome: Outcome
 
     @property
@@ -75,14 +75,14 @@ def steady_response(
     *,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> Response:
-    """Drive a specimen for some time and measure its motion at the end.
+    """Integrate a motion and return its responses in the window at the end of the run.
 
-    The defaults are those of Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed. In
-    chaos Response I scatters by a few per cent at every accuracy. The motion that is reached may depend on
-    ``initial_state``, shape (6,) [m, m/s]; record it with the result.
+    The defaults are those of Gong et al. 2025, section 2: 30 s from rest, of which the last 5 s are observed.
+    In chaos Response I scatters by a few per cent at every accuracy. The final motion may depend on
+    ``initial_state``, shape (6,) [m, m/s]; state it together with the result.
 
-    Raises ValueError when the drive has no amplitude, or the window is longer than the run or shorter
-    than one drive period.
+    Raises ValueError when the drive amplitude is zero, or the window is longer than the run or shorter than
+    one drive period.
     """
     accuracy = chosen(Accuracy, accuracy)
     periods = whole_periods(drive, duration_s, window_s)
@@ -119,7 +119,7 @@ def steady_response(
 
 
 def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
-    """Refuse windows that cannot be observed; return the number of whole periods in the window."""
+    """Return the number of whole drive periods in a window; raise ValueError if it cannot be observed."""
     if drive.amplitude_m == 0.0:
         raise ValueError(
             "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
