@@ -1,9 +1,9 @@
 """Amplifier, coil and table under a voltage, simulated in steps with the specimen's force on the table.
 
-The specimen exerts a force on the table, so base and specimen respond to the voltage together.
-A `LoadedShaker` takes an `Amplifier`, a `Shaker`, a specimen and the mean voltage of each step, and
-returns means over the step (docs/decisions/0006-virtual-rig.md). The default amplifier passes every voltage
-unchanged, for voltages recorded at the coil. `linear_motion` gives the motion under sines in closed form,
+The specimen exerts a force on the table, so table and specimen are simulated together. A `LoadedShaker` is
+built from an `Amplifier`, a `Shaker` and a specimen. Its input is the mean voltage of each step, its outputs
+are means over each step (docs/decisions/0006-virtual-rig.md). The default amplifier passes all voltages
+unchanged, for voltages recorded at the coil. `linear_motion` returns the motion under sines in closed form,
 with impacts to first order. SI units.
 
 >>> import numpy as np

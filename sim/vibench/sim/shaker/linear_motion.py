@@ -1,9 +1,9 @@
-"""Amplifier, coil, table and specimen under sines: exact while no stop is touched, else to first order.
+"""Amplifier, coil, table and specimen under sines: exact without contact, otherwise to first order.
 
-While collisions hold abs(p) at the gap, the fundamental of the stops' force equals the force of a spring
-between m1 and m2 that reduces p to the gap (first-order harmonic balance, as in Gong et al. 2025, eq. 5,
-with rigid stops without loss). The force acts along one coordinate, so the motion follows in closed form
-from the motion without stops and the response to a unit force.
+While collisions limit abs(p) to the gap, the fundamental of the stop force equals the force of a spring
+between m1 and m2 that reduces p to the gap. This is a first-order harmonic balance (as in Gong et al. 2025,
+eq. 5) with rigid stops without loss. The stop force acts along one coordinate, so the motion has a closed
+form: the sum of the motion without stops and the response to this force.
 """
 
 from dataclasses import dataclass
@@ -16,22 +16,22 @@ from .loaded_shaker import Amplifier, FloatArray, Shaker
 
 ComplexArray = NDArray[np.complex128]
 SINE_COLUMNS = ("voltage", "current", "base", "m0", "p")
-"""Phasors at the coil [V, A] and of displacements [m], absolute except for p; time goes as exp(+i w t)."""
+"""Phasors at the coil [V, A] and of displacements [m], absolute except p, for the factor exp(+i w t)."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """Response to the voltage and to the stops' force at each of n frequencies; columns SINE_COLUMNS."""
+    """Response to voltage and stop force at n frequencies; the columns are SINE_COLUMNS."""
 
     per_volt: ComplexArray
-    """Motion per volt at the amplifier's input while no stop is touched, shape (n, 5)."""
+    """Motion without contact per volt at the amplifier's input, shape (n, 5)."""
     per_newton: ComplexArray
-    """Motion per newton by which the stops push m1 up and m2 down, shape (n, 5)."""
+    """Motion per newton of stop force, positive on m1 and negative on m2, shape (n, 5)."""
 
     @property
     def lever(self) -> ComplexArray:
-        """Motion per metre of a p imposed by the stops, shape (n, 5)."""
+        """Motion per metre of p, with p imposed by the stops, shape (n, 5)."""
         return self.per_newton / self.per_newton[:, [_P]]
 
     @property
@@ -40,14 +40,14 @@ class LinearMotion:
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
 
     def under(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
-        """Return the motion under sines of these amplitudes, shape (n, 5).
+        """Return the motion under sines of given amplitudes, shape (n, 5).
 
         Parameters
         ----------
         volts
-            At the amplifier's input, peak, shape (n,) or one for all [V].
+            Amplitude at the amplifier's input for each frequency, shape (n,), or for all [V].
         gap_m
-            Clearance to which the stops limit abs(p) [m]; infinite without stops.
+            Gap, to which the stops limit abs(p) [m]; infinite without stops.
         """
         free = (
             self.per_volt * np.broadcast_to(np.asarray(volts, dtype=np.float64), len(self.per_volt))[:, None]
@@ -56,10 +56,10 @@ class LinearMotion:
         return np.asarray(free + self.per_newton * push[:, None])
 
     def volts_for(self, base_m: ArrayLike, gap_m: float) -> FloatArray:
-        """Return the amplitudes at the amplifier's input for a base amplitude ``base_m``, shape (n,) [V]."""
+        """Return the amplitudes at the amplifier's input for base amplitudes ``base_m``, shape (n,) [V]."""
         free, by_push = self.per_volt, self.per_newton
         per_base = free[:, _P] / free[:, _BASE]
-        # Response of p to the stops' force while the voltage keeps the base motion unchanged.
+        # Response of p to the stop force while the voltage is adjusted to keep the base motion unchanged.
         on_held_base = by_push[:, _P] - per_base * by_push[:, _BASE]
         held_m = np.asarray(base_m, dtype=np.float64)
         push = _push(per_base * held_m, on_held_base, gap_m)
@@ -69,19 +69,19 @@ class LinearMotion:
 def linear_motion(
     amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: ArrayLike
 ) -> LinearMotion:
-    """Solve the equations that `LoadedShaker` follows in time for sines, without impacts and limits.
+    """Return the response to sines of the equations in `LoadedShaker`, without impacts and limits.
 
-    With Z the coil's impedance and G the force constant, coil and table are (m s^2 + d s + k + s G^2/Z) x =
-    (G/Z) u + k0 (x0 - x) + c0 s (x0 - x) (Beranek, Acoustics, ch. 3; Gong et al. 2025, eq. 1).
+    With the coil impedance Z and the force constant G, the equation of coil and table is (m s^2 + d s + k +
+    s G^2/Z) x = (G/Z) u + k0 (x0 - x) + c0 s (x0 - x) (Beranek, Acoustics, ch. 3; Gong et al. 2025, eq. 1).
 
     Parameters
     ----------
     amplifier, shaker
-        Only band edges, gain and linear parts are used; clipping and stroke limits are ignored.
+        Amplifier and shaker; limits of voltage, current and stroke are ignored.
     specimen
         Specimen on the table; None for a bare table, with m0 and p zero.
     frequency_hz
-        Zero and above, shape (n,) [Hz].
+        Frequencies, zero or positive, shape (n,) [Hz].
     """
     s = np.asarray(2j * np.pi * np.atleast_1d(frequency_hz), dtype=np.complex128)
     impedance: ComplexArray = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h
@@ -91,7 +91,7 @@ def linear_motion(
         + (shaker.suspension_damping_ns_per_m + shaker.force_constant_n_per_a * per_volt_n) * s
         + shaker.suspension_stiffness_n_per_m
     )
-    # Output volts per input volt, shape of ``s``.
+    # Output voltage over input voltage, shape of ``s``.
     low_cut = 2 * np.pi * amplifier.low_cut_hz
     below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
     voltage = np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))
@@ -126,9 +126,9 @@ def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray)
 
 
 def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
-    """Return the stops' force that reduces a free p to the gap, as a spring would, shape (n,) [N].
+    """Return the force of a spring between m1 and m2 that reduces abs(p) to the gap, shape (n,) [N].
 
-    The stiffness K follows from abs(p / (1 + K H)) = gap: the positive root of a quadratic.
+    Its stiffness K is the positive root of the quadratic equation abs(p / (1 + K H)) = gap.
     """
     excess = np.maximum((np.abs(p) / gap_m) ** 2 - 1.0, 0.0)
     size = np.maximum(np.abs(receptance) ** 2, np.finfo(np.float64).tiny)

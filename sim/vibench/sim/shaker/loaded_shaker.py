@@ -1,8 +1,8 @@
 """Amplifier, coil, table and specimen under a voltage, with the specimen's force on the table.
 
-All quantities are means over a step: the voltage is held, and the integrals of base acceleration and m0's
-velocity are known at both ends. Means do not alias impacts within a step and refer to its centre, so all
-channels agree in phase.
+All quantities are means over a step: the voltage is constant in a step, and the integrals of base
+acceleration and m0 velocity are known at both ends. Means over a step do not alias impacts. They refer to the
+centre of the step, so that all channels agree in phase.
 """
 
 import math
@@ -20,29 +20,29 @@ from ..specimen.specimen import Specimen
 FloatArray = NDArray[np.float64]
 
 STOP_STIFFNESS_N_PER_M = 2e5
-"""Stiffness of the rubber stops that end the stroke; assumed: 45 N press 0.23 mm into them."""
+"""Assumed stiffness of the rubber stops at the ends of the stroke: 45 N compress them by 0.23 mm."""
 STOP_DAMPING_NS_PER_M = 50.0
-"""Damping of these stops; assumed: the table rebounds with about half its energy."""
+"""Assumed damping of the rubber stops: the table rebounds with about half its energy."""
 
 
 @dataclass(frozen=True)
 class Amplifier:
-    """A gain between two first-order band edges, a largest voltage and a largest current.
+    """Amplifier with a gain, two first-order band edges, and limits of voltage and current.
 
-    The defaults pass every voltage unchanged, for a voltage recorded at the coil. Raises ValueError when a
-    number is not allowed.
+    The default amplifier passes all voltages unchanged, for a voltage recorded at the coil. Raises ValueError
+    when a number is not allowed.
     """
 
     gain: float = 1.0
-    """Output volts per input volt, not zero; negative where the amplifier inverts."""
+    """Output voltage over input voltage, not zero; negative for an inverting amplifier."""
     low_cut_hz: float = 0.0
-    """Lower -3 dB frequency [Hz]; 0 where direct voltage passes."""
+    """Lower -3 dB frequency [Hz]; 0 for DC coupling."""
     high_cut_hz: float = math.inf
     """Upper -3 dB frequency [Hz]."""
     clip_v: float = math.inf
     """Largest output voltage, peak [V]."""
     current_limit_a: float = math.inf
-    """Largest current, peak [A]; the voltage is limited to keep it."""
+    """Largest current, peak [A]; the amplifier limits its voltage accordingly."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
@@ -61,17 +61,17 @@ class Amplifier:
 
 @dataclass(frozen=True)
 class StateSpace:
-    """A linear system s' = A s + B u; of a shaker s = (displacement, velocity, current) in SI units."""
+    """Linear system s' = A s + B u; for a shaker s = (displacement, velocity, current) in SI units."""
 
     A: FloatArray
-    """Shape (3, 3)."""
+    """State matrix, shape (3, 3)."""
     B: FloatArray
-    """Shape (3, 2): columns for the voltage at the coil [V] and an external force on the table [N]."""
+    """Input matrix, for the voltage at the coil [V] and an external force on the table [N], shape (3, 2)."""
 
 
 @dataclass(frozen=True)
 class Shaker:
-    """An electrodynamic shaker: a coil and a suspended table, with rubber stops at the ends of the stroke.
+    """Electrodynamic shaker: coil and suspended table, with rubber stops at the ends of the stroke.
 
     Raises ValueError when a number is not allowed.
     """
@@ -81,12 +81,12 @@ class Shaker:
     suspension_stiffness_n_per_m: float
     suspension_damping_ns_per_m: float
     force_constant_n_per_a: float
-    """Force per ampere, and voltage per table velocity [V s/m] (Beranek, Acoustics, ch. 3)."""
+    """Force per current [N/A], equal to voltage per table velocity [V s/m] (Beranek, Acoustics, ch. 3)."""
     coil_resistance_ohm: float
-    """Coil and cable [ohm]."""
+    """Resistance of coil and cable [ohm]."""
     coil_inductance_h: float
     stroke_m: float = math.inf
-    """Displacement from rest at which the table meets its rubber stops [m]."""
+    """Displacement from rest at which the table touches its rubber stops [m]."""
     stop_stiffness_n_per_m: float = STOP_STIFFNESS_N_PER_M
     stop_damping_ns_per_m: float = STOP_DAMPING_NS_PER_M
 
@@ -97,9 +97,9 @@ class Shaker:
                 raise ValueError(f"{each.name} = {value} is not allowed: it must be positive.")
 
     def equations(self) -> StateSpace:
-        """Return coil and table as first-order equations, driven by the coil's voltage and a force.
+        """Return the equations of coil and table as a linear first-order system.
 
-        With m the moving mass, G the force constant and F a force on the table::
+        With moving mass m, force constant G, coil voltage u and a force F on the table::
 
             m x'' + d x' + k x = G i + F          L i' + R i + G x' = u
         """
@@ -119,29 +119,29 @@ class Shaker:
 
 
 MOTION_COLUMNS = ("base_displacement", "base_velocity", "current", "x", "y", "z", "vx", "vy", "vz")
-"""Columns of shaker and specimen at the end of a step, SI units; x, y and z are absolute."""
+"""State of shaker and specimen at the end of a step, in SI units; x, y and z are absolute."""
 _SHAKER_SIZE = 3
 _CONTACT_TOLERANCE = Accuracy.STANDARD.tolerance
 
 
 @dataclass(frozen=True)
 class ShakenMotion:
-    """Motion in a stretch of steps; each array has one value per step, the mean over it."""
+    """Motion in consecutive steps; values are means over a step, shape (steps,)."""
 
     amplifier_voltage: FloatArray
     """Voltage at the coil [V]."""
     base_acceleration: FloatArray
-    """[m/s2]"""
+    """Acceleration of the table [m/s2]."""
     m0_velocity: FloatArray
-    """[m/s]"""
+    """Absolute velocity of m0 [m/s]."""
     ends: FloatArray
-    """Motion at the ends of the steps, shape (steps, 9), columns MOTION_COLUMNS; no rows unless requested."""
+    """States at the ends of the first steps, columns MOTION_COLUMNS, shape (rows, 9); empty by default."""
     begun: FloatArray
-    """Number of contacts up to the end of each block of steps, shape (blocks,); empty unless requested."""
+    """Number of contacts up to the end of each block of steps, shape (blocks,); empty by default."""
 
     @classmethod
     def of(cls, count: int, end_rows: int, block: int = 0) -> Self:
-        """Allocate arrays for ``count`` steps, the first ``end_rows`` ends, and blocks of contacts."""
+        """Return arrays for ``count`` steps, ``end_rows`` states, and contacts in blocks of steps."""
         ends, begun = (
             np.empty((end_rows, len(MOTION_COLUMNS))),
             np.empty(math.ceil(count / block) if block else 0),
@@ -150,16 +150,16 @@ class ShakenMotion:
 
 
 class MotionFailed(ArithmeticError):
-    """The motion is no longer finite, or a contact makes no progress; the shaker cannot continue."""
+    """Error: the motion is no longer finite, or a contact makes no progress; the shaker cannot continue."""
 
 
 class LoadedShaker:
-    """Amplifier, shaker and specimen, moved by the voltage at the amplifier's input.
+    """Amplifier, shaker and specimen, driven by the voltage at the amplifier's input.
 
-    Coil and table are solved exactly for a voltage and a force that are held over a step. The specimen is
-    solved exactly between impacts, which are resolved inside a step (native/cubic.hpp). The specimen's
-    force on the table is extrapolated and held over the step, with a relative error of the motion due to it
-    of about (omega h)^2 / 12 (docs/decisions/0006-virtual-rig.md). One thread at a time.
+    Coil and table are solved exactly for a voltage and a force that are constant in a step. The specimen is
+    solved exactly between impacts, which are integrated within a step (native/cubic.hpp). The specimen's
+    force on the table is extrapolated and constant in a step, which causes a relative error of about (omega
+    h)^2 / 12 in the motion due to it (docs/decisions/0006-virtual-rig.md). Use in one thread at a time.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class LoadedShaker:
     ) -> None:
         """Start with the table at rest.
 
-        Raises ValueError when the step is not positive and finite, or the start is not possible.
+        Raises ValueError when the step is not positive and finite, or the start is not allowed.
 
         Parameters
         ----------
@@ -181,11 +181,11 @@ class LoadedShaker:
         step_s
             Length of a step [s]; a hundredth of the shortest period of interest gives an error of 1e-3.
         start
-            The specimen's x, y, z, vx, vy, vz [m, m/s], absolute, shape (6,).
+            Initial x, y, z, vx, vy, vz of the specimen in the inertial frame, shape (6,) [m, m/s].
         """
         engine = native_engine()
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
-        """Structure that the engine advances."""
+        """Structure of native/structures.hpp that the engine advances."""
         self.step_s = step_s
         """Length of a step [s]."""
         self._place(specimen, start)
@@ -218,7 +218,7 @@ class LoadedShaker:
 
     @property
     def gain(self) -> float:
-        """Output volts of the amplifier per input volt; may be changed between stretches."""
+        """Output voltage of the amplifier over input voltage; may be changed between calls of `move`."""
         return float(self.structure["gain"])
 
     @gain.setter
@@ -226,9 +226,9 @@ class LoadedShaker:
         self.structure["gain"] = gain
 
     def change_specimen(self, specimen: Specimen) -> None:
-        """Continue with another specimen in the state of the last one.
+        """Continue with another specimen, from the state of the present specimen.
 
-        Raises ValueError when the state is not possible for it.
+        Raises ValueError when this state is not allowed for the new specimen.
         """
         self._place(specimen, np.array(self.structure["specimen"]["motion"]))
 
@@ -241,7 +241,7 @@ class LoadedShaker:
     def move(
         self, drive_v: FloatArray, noise_v: FloatArray | None = None, end_rows: int = 0, block: int = 0
     ) -> ShakenMotion:
-        """Advance by as many steps as ``drive_v`` has values.
+        """Advance by one step for each value of ``drive_v``, and return the motion.
 
         Raises MotionFailed when the motion is no longer finite; the shaker cannot continue.
 
@@ -250,11 +250,11 @@ class LoadedShaker:
         drive_v
             Mean voltage at the amplifier's input over each step [V], shape (steps,).
         noise_v
-            Added at the amplifier's output [V], shape (steps,).
+            Voltage that is added at the amplifier's output [V], shape (steps,).
         end_rows
-            Number of first steps for which the state at the end is kept.
+            Number of first steps for which the state at the end is stored.
         block
-            Steps of a block for counting contacts; 0 for none.
+            Number of steps in a block for counting contacts; 0 for no counts.
         """
         drive = np.ascontiguousarray(drive_v, np.float64)
         motion = ShakenMotion.of(len(drive_v), end_rows, block)
@@ -264,12 +264,12 @@ class LoadedShaker:
         return motion
 
     def move_into(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
-        """Advance like `move`, into given arrays."""
+        """Advance as `move` does, and write the motion into given arrays."""
         self.prepare(motion, drive_v, noise_v)
         self.account(native_engine().call("move_shaker", self.structure), len(drive_v))
 
     def prepare(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
-        """Set the arrays of a stretch that the engine reads and fills."""
+        """Set the arrays that the engine reads and fills in the next steps."""
         native_engine().fill(
             self.structure,
             drive=drive_v,
@@ -282,7 +282,7 @@ class LoadedShaker:
         )
 
     def account(self, good: int, count: int) -> None:
-        """Raise MotionFailed if only ``good`` steps of a stretch were completed."""
+        """Raise MotionFailed if only ``good`` of ``count`` steps were completed."""
         if good < count:
             raise MotionFailed(
                 f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "
@@ -291,5 +291,5 @@ class LoadedShaker:
 
 
 def _mean_of_decay(steps_per_time_constant: float) -> float:
-    """Return the mean of exp(-t) from zero to the argument; 1 for no decay."""
+    """Return the mean of exp(-t) over t from zero to the argument; 1 for an argument of zero."""
     return -math.expm1(-steps_per_time_constant) / steps_per_time_constant if steps_per_time_constant else 1.0

@@ -1,7 +1,7 @@
-"""Motion of shaker and specimen under a sampled voltage: base and m0 on the same grid of samples.
+"""Motion of shaker and specimen under a sampled voltage, at the times of its samples.
 
-The voltage is resampled to the steps of a `LoadedShaker`, and the motion back to the samples, as band-limited
-signals (Shannon). This is done piece by piece, so that a recording of any length fits in memory. SI units.
+The voltage is resampled to the steps of a `LoadedShaker`, and the motion is resampled to the samples of the
+voltage, as band-limited signals (Shannon). Recordings are processed piece by piece to limit memory. SI units.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,53 +19,53 @@ from .loaded_shaker import Amplifier, FloatArray, LoadedShaker, Shaker
 ComplexArray = NDArray[np.complex128]
 Singles = NDArray[np.float32]
 Gain = Callable[[FloatArray], ComplexArray]
-"""Complex gain of a sensor over frequency [Hz], shape kept."""
+"""Function that returns the complex gain of a sensor at frequencies [Hz], of the same shape."""
 
 FINEST_STEP_HZ = 5e4
-"""Fewest steps per second; the specimen's force on the table then has an error of 5e-4 at 600 Hz."""
+"""Smallest step rate; the specimen's force on the table then has an error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
-"""End of the pass band over the sample rate; a cosine edge follows up to half the rate, as in a converter."""
+"""End of the pass band over the sample rate; a cosine edge to half the rate follows, as in a converter."""
 _MARGIN = 2048
-"""Margin of samples on each side of a piece: the filters' memory beyond is below 1e-8."""
+"""Samples on each side of a piece that are also filtered; the impulse responses beyond are below 1e-8."""
 _PIECE = 1 << 15
-"""Samples that are filtered together."""
+"""Number of samples that are filtered together."""
 _BLOCK_S = 0.02
-"""Impacts are counted in blocks of this length."""
+"""Length of the blocks in which impacts are counted [s]."""
 
 
 def identity(frequency_hz: FloatArray) -> ComplexArray:
-    """Return a gain of 1."""
+    """Return a gain of 1 at each frequency, shape of ``frequency_hz``."""
     return np.ones(frequency_hz.shape, dtype=np.complex128)
 
 
 @dataclass(frozen=True)
 class DrivenTable:
-    """Amplifier, shaker, specimen and sensors under a voltage."""
+    """Amplifier, shaker, specimen and sensors."""
 
     amplifier: Amplifier
-    """Amplifier; the default if the voltage is at the coil."""
+    """Amplifier; use the default for a voltage at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
-    """Sensor of the base acceleration."""
+    """Gain of the sensor of the base acceleration."""
     m0_sensor: Gain = identity
-    """Sensor of m0's velocity; a delay is a falling phase."""
+    """Gain of the sensor of the m0 velocity; a delay is a falling phase."""
     base_low_cut_hz: float = 0.0
-    """-3 dB frequency of the AC coupling of the base's channel, first order [Hz]; 0 for DC coupling."""
+    """-3 dB frequency of the first-order AC coupling of the base channel [Hz]; 0 for DC coupling."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """Outputs of the sensors, shape (samples,), in single precision (error far below converter noise)."""
+    """Outputs of the sensors, shape (samples,), in single precision, far below converter noise."""
 
     base_acceleration: Singles
-    """[m/s2]"""
+    """Base acceleration [m/s2]."""
     m0_velocity: Singles
-    """[m/s]"""
+    """Velocity of m0 [m/s]."""
     impact_times_s: FloatArray
-    """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
+    """Time zero and the ends of blocks of 20 ms, shape (blocks + 1,)."""
     impacts: FloatArray
-    """Number of contacts up to these times, shape (blocks + 1,)."""
+    """Number of contacts up to each of these times, shape (blocks + 1,)."""
 
 
 def follow_voltage(
@@ -75,7 +75,7 @@ def follow_voltage(
     *,
     start: ArrayLike = (0.0,) * 6,
 ) -> SampledMotion:
-    """Move table and specimen, from rest, by a sampled voltage.
+    """Return the motion of table and specimen under a sampled voltage; the table starts at rest.
 
     Raises MotionFailed when the motion is no longer finite.
 
@@ -84,10 +84,10 @@ def follow_voltage(
     table
         Amplifier, shaker, specimen and sensors.
     volts
-        Voltage at the amplifier's input, or at the coil with the default amplifier [V], shape
-        (samples,), finite. Best with silence at both ends.
+        Voltage at the amplifier's input, or at the coil with the default amplifier, finite, shape
+        (samples,) [V]. It should be zero at both ends.
     start
-        The specimen's x, y, z, vx, vy, vz [m, m/s], absolute.
+        Initial x, y, z, vx, vy, vz of the specimen in the inertial frame, shape (6,) [m, m/s].
     """
     ratio = ceil(FINEST_STEP_HZ / sample_rate_hz)
     step_s = 1 / (sample_rate_hz * ratio)
@@ -106,7 +106,7 @@ def follow_voltage(
         motion = shaken.move(fine, block=block)
         impacts.append(motion.begun)
         tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
-        # The last samples need the motion that follows them, except at the end of the record.
+        # Filtering the last samples requires the motion after them, except at the end of the record.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         seen = resampling.samples(tail, gains)[:, done - held : upto - held]
@@ -121,20 +121,20 @@ def follow_voltage(
 
 
 class _Resampling:
-    """Resample samples to steps, and means over steps to samples after a sensor and a converter.
+    """Resampling of samples to steps, and of means over steps to samples after a sensor and a converter.
 
-    Means lie half a step after the resampled voltage and are evaluated there: both shifts cancel.
+    Means over steps refer to half a step after the resampled voltage. Both shifts cancel.
     """
 
     def __init__(self, sample_rate_hz: float, ratio: int, shaker: Shaker) -> None:
         self._sample_rate_hz = sample_rate_hz
         self._ratio = ratio
         self._shaker = shaker
-        # All pieces of a record have the same length, except the last.
+        # Weights are reused, because all pieces of a record except the last have the same length.
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
     def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the end of each stretch of samples, and the voltage's means over their steps."""
+        """Yield the end of each piece of samples, and the mean voltage of its steps."""
         ratio = self._ratio
         block = max(1, round(_BLOCK_S * self._sample_rate_hz))
         length = ceil(_PIECE / block) * block
@@ -148,7 +148,7 @@ class _Resampling:
             yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
 
     def samples(self, means: FloatArray, gains: Sequence[Gain]) -> FloatArray:
-        """Return the samples after a sensor of each gain, shape of ``means`` (sensors, steps)."""
+        """Return the samples of each sensor; ``means`` are its inputs over steps, shape (sensors, steps)."""
         count = means.shape[1] // self._ratio
         size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
         padded = np.zeros((len(gains), size * self._ratio))
@@ -159,12 +159,12 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Return factors of the spectral lines of ``size`` samples: to steps, or from them after a sensor."""
+        """Return factors for the spectral lines of ``size`` samples: to steps, or from steps via a sensor."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
             mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
-            # 1 up to 0.45 cycles per sample, then a cosine edge down to 0 at half a cycle.
+            # Band: 1 up to 0.45 cycles per sample, then a cosine edge to 0 at half a cycle per sample.
             edge = ((frequency_hz / self._sample_rate_hz) - _PASS_PART) / (0.5 - _PASS_PART)
             band = np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))
             if gain is None:
@@ -175,7 +175,7 @@ class _Resampling:
         return known
 
     def _held(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the ratio of mean coil currents, held over continuous voltage: 1 - (omega h)^2 / 12."""
+        """Return the mean coil current for a stepped over a continuous voltage, 1 - (omega h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s
         turns = self._sample_rate_hz * self._ratio * time_constant_s
