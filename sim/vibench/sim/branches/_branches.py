@@ -1,4 +1,4 @@
-"""Branches of exact motions, from a search and from bifurcations, and of harmonic balances."""
+"""Branches of exact motions and of harmonic balances, found by a search and at bifurcations."""
 
 import math
 import time
@@ -31,12 +31,12 @@ from ..specimen.state import Floats, Vector
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 INTERPOLATED = 0.06
-"""Largest distance of a branch from the chord between two of its points, over the chord's length (set by the
-largest turn of the tangent)."""
+"""Largest distance of a branch from the chord between two of its points, over the length of the chord; set by
+the largest rotation of the tangent."""
 SAME_MOTION = 1e-5
-"""Distance that is always allowed in addition, over the state's scale."""
+"""Additional allowed distance, over the scale of a state."""
 LENGTHS = 10.0
-"""Length of the parameter's range in the units in which branches are followed."""
+"""Length of the parameter range, in the scaled units in which branches are followed."""
 
 
 class BranchOrigin(StrEnum):
@@ -51,26 +51,26 @@ class BranchOrigin(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoundBranch:
-    """A branch with the kind of its motions, its origin and its cost."""
+    """A branch with the kind of its motions, its origin and its computing time."""
 
     branch: Branch
     shape: OrbitShape
     periods: int
-    """Period of a motion in drive periods."""
+    """Period of the motions in drive periods."""
     origin: BranchOrigin
     has_twin: bool
-    """Whether the mirror images of these motions form another branch."""
+    """Whether the mirror images of the motions form another branch."""
     elapsed_s: float = 0.0
-    """Time to find and follow the branch."""
+    """Time for finding and following the branch [s]."""
 
     @property
     def is_isolated(self) -> bool:
-        """Return whether the branch is closed, so that no sweep from outside reaches it."""
+        """Whether the branch is closed, so that no sweep from other branches reaches it."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
 def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats) -> bool:
-    """Return whether any of some states at one drive, shape (n, 6), belongs to a branch."""
+    """Return whether any of the states at one drive, shape (n, 6), is on a branch."""
     branch, value = found.branch, parameter_value(path, drive)
     scales = state_scales(specimen, drive)
     along = branch.parameters
@@ -87,18 +87,18 @@ def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harm
 
 
 M = TypeVar("M")
-"""Type of a motion: depends on the method of finding it."""
+"""Type of a motion, which depends on the method by which it is found."""
 
 
 @dataclass(frozen=True, eq=False)
 class BranchStart(Generic[M]):
-    """A motion from which a branch may be started."""
+    """A motion at which a branch may be started."""
 
     motion: M
     origin: BranchOrigin
     drive: Harmonic
     states: Floats
-    """States once a drive period of the motion and, if known, of its mirror image, shape (n, 6)."""
+    """States once per drive period of the motion and, if known, of its mirror image, shape (n, 6)."""
 
 
 def branches_from(
@@ -111,7 +111,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Follow branches from starts that lie on no known branch, and from bifurcations, until an instant."""
+    """Yield branches from starts that are on no known branch and from bifurcations, until a time limit."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -132,11 +132,11 @@ def branches_from(
 
 SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Distances from a bifurcation at which to search for a new branch, relative to the gap."""
+"""Distances of the state from a bifurcation in the search for a new branch, over the gap."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Distances of the parameter from a bifurcation for this search, relative to the range."""
+"""Distances of the parameter from a bifurcation in this search, over the range."""
 LEFT = 1e-4
-"""Distance from the simpler motion, relative to the gap, beyond which a motion is different."""
+"""Distance from a simpler motion, over the gap, above which a motion is a different motion."""
 SWITCHED = {
     BifurcationKind.SYMMETRY_BREAKING: BranchOrigin.SYMMETRY_BREAKING,
     BifurcationKind.PERIOD_DOUBLING: BranchOrigin.PERIOD_DOUBLING,
@@ -156,20 +156,20 @@ def shot_branches(
     Parameters
     ----------
     specimen
-        Any contact law. On rigid stops a branch ends at grazing, because no derivative exists there.
+        Specimen with any contact law. With rigid stops a branch ends at grazing, where no derivative exists.
     path
         `FrequencyPath` or `AmplitudePath`.
     low, high
         Range of the parameter, ascending [Hz, or m].
     search
-        Settings of the search. It may miss branches; more starts find more.
+        Settings of the search. It may miss branches; more starts find more branches.
     steps
-        Step lengths and tolerances; the range is ten units long, a displacement of one gap is one unit.
+        Step lengths and tolerances; the range is ten units long, and a displacement of one gap is one unit.
 
     Yields
     ------
-    Branches with the stability, the events and the error of each point; chaotic and quasi-periodic motions
-    are not included.
+    Branches with stability, events and error of each point; chaotic and quasi-periodic motions are not
+    included.
     """
     steps = replace(steps, until_s=time.monotonic() + search.time_s)
 
@@ -201,12 +201,12 @@ def _branch_switches(
     bounds: tuple[float, float],
     search: MotionSearch,
 ) -> Iterator[BranchStart[PeriodicOrbit]]:
-    """Find a motion on each branch that branches off this one."""
+    """Yield a motion on each branch that leaves this branch at a bifurcation."""
     mapping = PeriodMap(specimen, found.shape, found.periods)
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
-        # If a branch joins a simpler one, the event is used on the simpler one only.
+        # If two branches meet at a bifurcation, switch only from the branch of simpler motions.
         is_own = (event.kind is BifurcationKind.SYMMETRY_BREAKING) == (found.shape is OrbitShape.MIRRORED)
         if not leaves or not is_own:
             continue
@@ -241,27 +241,27 @@ def _has_left(orbit: PeriodicOrbit) -> bool:
 
 
 def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
-    """Return the scaled eigenvector of the multiplier nearest to -1; its largest component is 1."""
+    """Return the scaled eigenvector of the multiplier nearest to -1, shape (6,); its largest entry is 1."""
     values, vectors = np.linalg.eig(mapping.derivative(state, drive))
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(direction / np.abs(direction).max())
 
 
 UPDATES_TO_HOLD = 10.0
-"""Shortest growth time by a factor of e that a control loop can stabilise, in loop updates."""
+"""Shortest growth time (by a factor of e) of a motion that a control loop can stabilise, in loop updates."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
-    """Return the time in which a small distance from a motion grows by e; infinite if it does not grow.
+    """Return the time in which a small perturbation of a motion grows by e [s]; infinite if stable.
 
-    It is T / ln|mu| with T the period of the motion, for a prescribed motion of the base.
+    It is T / ln|mu| with the period T of the motion, for a prescribed motion of the base.
 
     Parameters
     ----------
     frequency_hz
         Drive frequency.
     multiplier
-        Magnitude of the largest Floquet multiplier over the whole period of the motion; same shape.
+        Magnitude of the largest Floquet multiplier over the whole period of the motion, of the same shape.
     periods
         Period of the motion in drive periods.
     """
@@ -272,7 +272,7 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
 
 
 def least_growth_time_s(loop_time_s: float) -> float:
-    """Return the shortest growth time that a control loop can stabilise [s].
+    """Return the shortest growth time of a motion that a control loop can stabilise [s].
 
     Raises ValueError when ``loop_time_s`` is not positive and finite.
 
@@ -303,13 +303,13 @@ def balanced_branches(
     Parameters
     ----------
     specimen
-        Any law except rigid stops. For power laws, every first-order solution at ``search.places`` values
-        starts a branch (Gong et al. 2025, eq. 5); for other laws, every motion of the
-        drive's period that `periodic_motions` finds there.
+        Specimen with any law except rigid stops. Branches start at ``search.places`` values. For power laws,
+        every first-order solution is a start (Gong et al. 2025, eq. 5); for other laws, every motion with the
+        drive's period from `periodic_motions`.
     path, low, high, steps
         As for `shot_branches`.
     options
-        Harmonics from ``fewest`` to ``most``; 1 and 1 is the paper's first-order balance.
+        Harmonics from ``fewest`` to ``most``; 1 and 1 give the paper's first-order balance.
     search
         Settings of the search for starts.
 

@@ -19,16 +19,16 @@ from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats, Vector
 
 SETTLED = 1e-3
-"""Relative change per period below which a section repeats, close enough for Newton's iteration."""
+"""Relative change per period below which Newton's iteration is started."""
 SAME_MOTION = 1e-5
-"""Relative distance at one moment below which two motions are equal."""
+"""Relative distance at the same drive phase below which two motions are equal."""
 SIMPLER = 1e-6
-"""Relative distance below which a motion counts as one of half the period, or as mirrored."""
+"""Relative distance below which a motion is a motion of half the period, or mirrored."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
-"""Range of random starts between the stops, as a share of each gap."""
+"""Range of p in random starts, over each gap."""
 RANDOM_REACH = 3.0
-"""Range of other coordinates, relative to the gap, or to the motion without stops if that is larger."""
+"""Range of the other coordinates, over the gap or, if larger, the motion without stops."""
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,16 @@ class MotionSearch:
     """Settings of the search for periodic motions."""
 
     places: int = 8
-    """Number of evenly spaced values of the parameter for the search, including the ends."""
+    """Number of evenly spaced values of the parameter at which to search, including the ends."""
     starts: int = 12
-    """Number of random states at each value, in addition to rest."""
+    """Number of random starts at each value, in addition to rest."""
     settling_periods: int = 300
     most_periods: int = 4
-    """Longest period to search, in drive periods."""
+    """Longest period of a motion, in drive periods."""
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Time to search and follow [s]; then the current branch ends where it is."""
+    """Time limit for search and branches [s]; at the limit, the current branch ends at its last point."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -63,19 +63,19 @@ class MotionSearch:
 def periodic_motions(
     specimen: Specimen, drive: Harmonic, search: MotionSearch, until_s: float = math.inf
 ) -> Iterator[PeriodicOrbit]:
-    """Find periodic motions at one drive, mainly stable ones.
+    """Yield periodic motions at one drive, which are mainly stable.
 
-    Each start is integrated for ``search.settling_periods``. If it then nearly repeats, Newton's iteration
-    finds the exact motion. Only one of a motion and its mirror image is returned.
+    Each start is integrated for ``search.settling_periods``. If the motion then nearly repeats, Newton's
+    iteration finds the exact motion. Of a motion and its mirror image, only one is returned.
 
     Parameters
     ----------
     specimen, drive
         Specimen, and drive with phase zero.
     search
-        Number of starts, and their seed.
+        Settings of the search, such as the number of starts.
     until_s
-        Instant of `time.monotonic` after which no further start is tried [s].
+        Time limit as a value of `time.monotonic`; then no further start is tried [s].
     """
     scales = state_scales(specimen, drive)
     met: list[Floats] = []
@@ -92,7 +92,7 @@ def periodic_motions(
 
 
 def orbit_states(orbit: PeriodicOrbit) -> Floats:
-    """Return states of a motion and its mirror image at the start of each drive period, shape (n, 6)."""
+    """Return the states of a motion and of its mirror image once per drive period, shape (n, 6)."""
     mapping = orbit.period_map
     states = [orbit.state]
     one = PeriodMap(mapping.specimen)
@@ -110,7 +110,7 @@ def orbit_states(orbit: PeriodicOrbit) -> Floats:
 
 
 def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[Vector]:
-    """Yield rest, the motion without stops if it stays between them, then random states."""
+    """Yield the starts: rest, the motion without contact if it exists, then random states."""
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     yield np.zeros(6)
     if linear[3] < min(specimen.gaps_m):
@@ -121,10 +121,10 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
 
 
 def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
-    """Draw a state between the stops by ``rng``, shape (6,) [m, m/s].
+    """Return a random state with m1 between the stops, drawn by ``rng``, shape (6,) [m, m/s].
 
-    m0 and m2 lie within three times the gap, or three times the motion without stops if that is larger.
-    Velocities lie within this range times 2 pi f.
+    Displacements of m0 and m2 are within three times the gap or, if larger, three times the motion without
+    stops. Velocities are within this range times 2 pi f.
     """
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     lower, upper = specimen.gaps_m
@@ -162,7 +162,7 @@ def _orbit_from(
 
 
 def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
-    """Return the simplest motion of this many periods found from a state by shooting, or None."""
+    """Return the simplest motion of ``periods`` drive periods that shooting finds from a state, or None."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
     if lower == upper and periods % 2 == 1:
@@ -177,7 +177,7 @@ def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: i
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Describe a motion by the shortest map of which it is a fixed point."""
+    """Return a motion as a fixed point of the shortest possible map."""
     mapping = orbit.period_map.simpler
     while mapping is not None:
         off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(
