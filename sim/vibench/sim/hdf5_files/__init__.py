@@ -1,8 +1,8 @@
 """Open HDF5 files that may be damaged or malicious.
 
-HDF5 files can include data of other files (external storage, external links, virtual datasets), and HDF5
-trusts the sizes stated in a file. `open_hdf5` refuses such external data, unless `allow_external_data` is
-active, and compares the stated sizes with the length of the file before reading.
+HDF5 files can include data of other files (external storage, external links, virtual datasets), and the HDF5
+library does not check the sizes stated in a file. `open_hdf5` rejects external data unless
+`allow_external_data` is active, and compares the stated sizes with the length of the file before reading.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

@@ -1,4 +1,4 @@
-"""Check an HDF5 file before reading: it must have no external data and no impossible sizes."""
+"""Checks of an HDF5 file before reading: no external data, and no impossible sizes."""
 
 import errno
 import math
@@ -10,18 +10,18 @@ from pathlib import Path
 import h5py
 
 MOST_OBJECTS = 20_000
-"""Most links to groups and datasets in one file; a recording has about forty."""
+"""Most links to groups and datasets in a file; a recording has about forty."""
 MOST_ATTRIBUTES = 1_000
-"""Most attributes of one object; a channel of a recording has about twenty-five."""
+"""Most attributes of an object; a channel of a recording has about twenty-five."""
 DEEPEST = 32
 """Deepest nesting of groups."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
-"""Largest chunk; those of recordings have 200 kB."""
+"""Largest chunk; chunks of recordings have 200 kB."""
 LARGEST_RATIO = 1100
 """Largest ratio of declared to stored bytes; Deflate reaches at most 1030 (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
-"""Bytes that a dataset may declare without stored data."""
+"""Largest size that a dataset may declare without stored data."""
 OWN_FILTERS = frozenset(
     {
         h5py.h5z.FILTER_DEFLATE,
@@ -33,24 +33,24 @@ OWN_FILTERS = frozenset(
         h5py.h5z.FILTER_LZF,
     }
 )
-"""Allowed filters; any other is a plug-in library that HDF5 would load and execute."""
+"""Allowed filters; other filters are plug-in libraries, which HDF5 would load and execute."""
 
 UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
 """Errors that h5py raises for unreadable headers or number types."""
 
 _SYSTEM_ERROR = re.compile(r"errno = (?!22,)\d+, error message = '([^']*)'")
-"""System error in a message of HDF5, except 22: an impossible address, so the file is damaged."""
+"""Pattern of a system error in a message of HDF5; not 22, an impossible address in a damaged file."""
 
 _allowances: list[None] = []
-"""One entry for each active `allow_external_data`; it is valid in all threads of the process."""
+"""One entry for each active `allow_external_data`, valid in all threads of the process."""
 
 
 class UnsafeHdf5(ValueError):
-    """The file refers to other files or is inconsistent; the message does not contain its path."""
+    """Error: a file refers to other files or is inconsistent; the message does not contain its path."""
 
 
 def system_error(error: BaseException) -> str:
-    """Return the system's message for a read error ("Input/output error"), or an empty text."""
+    """Return the system's message for a read error ("Input/output error"); empty if there is none."""
     if found := _SYSTEM_ERROR.search(str(error)):
         return found[1]
     return error.strerror or "" if isinstance(error, OSError) and error.errno else ""
@@ -67,16 +67,16 @@ def allow_external_data() -> Iterator[None]:
 
 
 def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
-    """Open a file for reading, and check everything in it except the data.
+    """Return a file opened for reading, after a check of all its content except the data.
 
-    Raises OSError when HDF5 cannot open it; UnsafeHdf5 when it refers to other files or has impossible sizes.
+    Raises OSError when HDF5 cannot open the file; UnsafeHdf5 for external data or impossible sizes.
 
     Parameters
     ----------
     path
         Path of the file.
     locking
-        As for ``h5py.File``; None leaves the choice to HDF5.
+        As for ``h5py.File``; None for the default of HDF5.
     """
     file = h5py.File(path, "r", locking=locking)
     try:
@@ -96,7 +96,7 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
 
 
 def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
-    """Yield path and object of a group and of everything below it, each once and ordered by name.
+    """Yield path and object of a group and of all objects below it, each once, ordered by name.
 
     Raises UnsafeHdf5 at a link to another file, unless that is allowed. Soft links are not followed.
     """
@@ -110,7 +110,7 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             continue
         if depth == DEEPEST:
             raise UnsafeHdf5(f"its groups lie more than {DEEPEST} deep in one another")
-        links += len(item)  # counted first, because many links may lead to one object
+        links += len(item)  # count links, because many links may lead to one object
         if links > MOST_OBJECTS:
             raise UnsafeHdf5(f"it holds more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):

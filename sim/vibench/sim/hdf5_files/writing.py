@@ -1,8 +1,8 @@
-"""Write an HDF5 file with reliable errors on a failing disk, without crashes or silent gaps.
+"""Write HDF5 files with reliable errors on a failing disk, without crashes or silent gaps.
 
-HDF5 2.0 crashes if a write fails while it closes a file, and h5py only prints errors that occur while it
-closes an object. Therefore HDF5 writes to a file object that reports every write as done and stores the first
-error. That error is raised after HDF5 has closed the file. A Ctrl-C during a write is also delayed.
+HDF5 2.0 crashes if a write fails while a file is being closed, and h5py only prints errors that occur while
+an object is being closed. HDF5 therefore writes to a file object that reports every write as successful and
+stores the first error. This error is raised after HDF5 has closed the file. A Ctrl-C is also delayed.
 """
 
 import signal
@@ -42,7 +42,7 @@ class _Disk(FileIO):
 def open_hdf5_to_write(
     path: Path, mode: Literal["x", "r+"], libver: tuple[str, str] | None = None
 ) -> Iterator[h5py.File]:
-    """Create (``x``) or change (``r+``) a file; raises OSError if any write fails."""
+    """Create (``x``) or change (``r+``) a file; raise OSError at the end if any write failed."""
     with _Disk(path, "x+" if mode == "x" else mode) as disk:
         try:
             with _interrupts(disk), h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:
@@ -54,7 +54,7 @@ def open_hdf5_to_write(
 
 @contextmanager
 def _interrupts(disk: _Disk) -> Iterator[None]:
-    """Store a KeyboardInterrupt during a write and raise it after closing the file."""
+    """Delay a KeyboardInterrupt that occurs during a write until the file is closed."""
     is_reached = threading.current_thread() is threading.main_thread()
     found = {each: signal.getsignal(each) for each in (signal.valid_signals() if is_reached else ())}
     handlers: dict[int, Any] = {number: handler for number, handler in found.items() if callable(handler)}
