@@ -15,14 +15,14 @@ assert sys.platform != "win32"  # for the type checker
 
 
 def open_to_write(path: Path) -> int:
-    """Open an existing file for writing; return its descriptor."""
+    """Return the descriptor of an existing file, opened for writing."""
     return os.open(path, os.O_RDWR)
 
 
 def open_for_all(path: Path) -> int:
-    """Open a lock file shared by all users, created if missing; return its descriptor.
+    """Return the descriptor of a lock file for all users, which is created if missing.
 
-    Raises OSError if the path is not a regular file with a single name, for example a link or a pipe.
+    Raises OSError if the path is not a regular file with a single name, but for example a link or a pipe.
     """
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:
@@ -34,7 +34,7 @@ def open_for_all(path: Path) -> int:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | flags, 0o666)
         except FileExistsError:  # created meanwhile
             return open_for_all(path)
-        # The sticky bit protects a file from cleaning (systemd-tmpfiles, XDG base directories).
+        # The sticky bit protects a file from automatic deletion (systemd-tmpfiles, XDG base directories).
         for mode in (0o666, 0o1666):
             with suppress(OSError):
                 os.fchmod(descriptor, mode)
@@ -46,12 +46,12 @@ def open_for_all(path: Path) -> int:
 
 
 def write_at(descriptor: int, data: bytes | memoryview, offset: int) -> int:
-    """Write bytes at an offset; return how many were written."""
+    """Write bytes at an offset; return the number of bytes written."""
     return os.pwrite(descriptor, data, offset)
 
 
 def read_at(descriptor: int, size: int, offset: int) -> bytes:
-    """Read bytes at an offset; fewer at the end of the file."""
+    """Return up to ``size`` bytes at an offset; fewer at the end of the file."""
     return os.pread(descriptor, size, offset)
 
 
@@ -61,7 +61,7 @@ def sync_data(descriptor: int) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder to the disk."""
+    """Flush the file names in a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -70,7 +70,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def allocate(descriptor: int, offset: int, size: int) -> None:
-    """Allocate blocks to a range of a file, where the system can."""
+    """Allocate disk blocks for a range of a file, if the system can."""
     if sys.platform == "linux":
         try:
             os.posix_fallocate(descriptor, offset, size)
@@ -85,17 +85,17 @@ def lock_in_use(descriptor: int) -> None:
 
 
 def lock_sole_writer(descriptor: int) -> None:
-    """Lock a file for writing by this process only; others may read. Raises OSError if another writes.
+    """Lock a file as its only writer; others may read. Raises OSError if another process writes.
 
-    An exclusive lock becomes a shared one, under which h5py opens the file for reading. If another process
-    takes the lock between the two, the second step fails.
+    The exclusive lock is then replaced by a shared lock, which allows h5py to open the file for reading. If
+    another process takes the lock in between, the second step fails.
     """
     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     lock_in_use(descriptor)
 
 
 def is_locked_alone(descriptor: int) -> bool:
-    """Lock a file exclusively while it is open; return False if another process uses it."""
+    """Lock an open file exclusively; return False if another process uses it."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -116,22 +116,22 @@ def bound_memory(most_bytes: int) -> None:
 
 
 def usual_state_folder() -> Path:
-    """Return the system's folder for the state of a user's programs."""
+    """Return vibench's folder within the system's folder for the state of a user's programs."""
     home = Path.home()
     linux = Path(os.environ.get("XDG_STATE_HOME", home / ".local" / "state"))
     return (home / "Library" / "Application Support" if sys.platform == "darwin" else linux) / "vibench"
 
 
 def usual_shared_folder() -> Path:
-    """Return a folder where every user may create files but not remove those of others."""
+    """Return a folder in which every user may create files, but not remove files of other users."""
     return Path("/tmp")  # noqa: S108 - TMPDIR may be each user's own
 
 
 def process_start(pid: int) -> str | None:
     """Return the start time of a process in the system's notation; None if there is no such process.
 
-    A zombie counts as ended. Empty if the process is alive but its start is unknown. On Linux, identifiers
-    of the boot and the container precede the start (`Place`).
+    A zombie counts as ended. The text is empty if the process is alive but its start is unknown. On Linux,
+    the text begins with identifiers of the boot and the container (`Place`).
     """
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
@@ -139,15 +139,15 @@ def process_start(pid: int) -> str | None:
         return None if Path("/proc/self/stat").exists() else _start_by_ps(pid)
     except ProcessLookupError:
         return None
-    # Split at the last bracket: a process name may contain brackets and spaces. In proc(5) the state is
-    # field 3 and the start is field 22.
+    # Split at the last bracket, because a process name may contain brackets and spaces. In proc(5) the state
+    # is field 3 and the start is field 22.
     state, *others = text.rpartition(")")[2].split()
     return None if state in "ZX" else f"{_here()}_{others[18]}"
 
 
 @cache
 def _here() -> str:
-    """Return the scope in which process numbers are unique: this boot and container."""
+    """Return the identifiers of this boot and container, within which process numbers are unique."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")[:8]
         return f"{boot}_{Path('/proc/self/ns/pid').stat().st_ino}"

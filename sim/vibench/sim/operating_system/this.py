@@ -34,7 +34,7 @@ Buffer = bytes | memoryview
 
 
 def write_all(descriptor: int, data: Buffer, offset: int) -> None:
-    """Write bytes at an offset; continue after a short write."""
+    """Write all bytes at an offset, with repeated calls after short writes."""
     rest = memoryview(data).cast("B")
     while len(rest):
         written = write_at(descriptor, rest, offset)
@@ -42,9 +42,9 @@ def write_all(descriptor: int, data: Buffer, offset: int) -> None:
 
 
 class OpenFile:
-    """An existing file, open for writing; the system releases its locks when the process ends.
+    """Existing file opened for writing; the system releases its locks when the process ends.
 
-    Raises OSError when it cannot be opened.
+    Raises OSError when the file cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -72,11 +72,11 @@ class OpenFile:
 
     @property
     def has_a_name(self) -> bool:
-        """Return whether the file still has a name in a folder, that is, was not removed."""
+        """Whether the file still has a name in a folder, which means that it was not removed."""
         return os.fstat(self._descriptor).st_nlink > 0
 
     def reserve(self, offset: int, size: int) -> None:
-        """Allocate disk blocks if the system can; otherwise only a check of free space guards the disk."""
+        """Allocate disk blocks for a range of the file, if the system can."""
         allocate(self._descriptor, offset, size)
 
     def close(self) -> None:
@@ -96,7 +96,7 @@ def sync_file(path: Path) -> None:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a path to write to; the new file then replaces the old one, which stays after an error."""
+    """Yield a path for a new file, which then replaces ``path``; after an error the old file remains."""
     target = path.resolve()  # follow a link, do not replace it
     if target.exists():
         target.open("r+b").close()  # raises OSError if write-protected
@@ -113,7 +113,7 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 
 def rename(unfinished: Path, final: Path) -> None:
-    """Rename a file, replacing `final`; ignore errors of network folders if the renaming succeeded."""
+    """Rename a file, replacing `final`; ignore an error of a network folder if the renaming succeeded."""
     made = unfinished.stat()
     try:
         os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
@@ -123,21 +123,21 @@ def rename(unfinished: Path, final: Path) -> None:
 
 
 UNKNOWN = ""
-"""Start of a living process whose start the system does not report."""
+"""Start time of a living process for which the system reports none."""
 
 
 class Place(Enum):
-    """Place where a process was started; process numbers are only valid `HERE`."""
+    """Place where a process was started; process numbers are valid only for `HERE`."""
 
     HERE = auto()
     CONTAINER = auto()
-    """On this computer since its last start, but in another container."""
+    """On this computer since its last boot, but in another container."""
     ELSEWHERE = auto()
-    """On another computer, or before the last start of this one."""
+    """On another computer, or on this computer before its last boot."""
 
 
 def place_of(start: str) -> Place:
-    """Return where a process was started; `Place.HERE` if the system does not report it."""
+    """Return the place where a process was started; `Place.HERE` if the system does not report it."""
     own, other = ((each or "").split("_") for each in (process_start(os.getpid()), start))
     if len(own) != len(other) or own[:-1] == other[:-1]:
         return Place.HERE
@@ -145,7 +145,7 @@ def place_of(start: str) -> Place:
 
 
 def is_process(pid: int, start: str) -> bool:
-    """Return whether the process is alive; if a start is `UNKNOWN`, only the process number is compared."""
+    """Return whether a process is alive; if a start time is `UNKNOWN`, only its number is compared."""
     now = process_start(pid)
     return now is not None and (UNKNOWN in (now, start) or now == start)
 
@@ -161,7 +161,7 @@ def state_place() -> Path:
 
 
 def state_folder() -> Path:
-    """Return the user's state folder, created if missing; raises PermissionError if it cannot be created."""
+    """Return the user's state folder, created if missing; raise PermissionError if that fails."""
     folder = state_place()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -173,5 +173,5 @@ def state_folder() -> Path:
 
 
 def shared_folder() -> Path:
-    """Return the folder where every user may create files; ``VIBENCH_LOCK_DIR`` overrides it."""
+    """Return the folder in which every user may create files; ``VIBENCH_LOCK_DIR`` overrides it."""
     return Path(os.environ.get(LOCK_VARIABLE) or usual_shared_folder())

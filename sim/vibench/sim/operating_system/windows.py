@@ -1,4 +1,4 @@
-"""Functions for Windows, which locks bytes of a file and flushes the names in a folder itself."""
+"""Functions for Windows, which locks bytes of a file and flushes the file names in a folder itself."""
 
 import ctypes
 import msvcrt
@@ -17,12 +17,12 @@ _STILL_ACTIVE = 259
 
 
 def open_to_write(path: Path) -> int:
-    """Open an existing file for writing; return its descriptor."""
+    """Return the descriptor of an existing file, opened for writing."""
     return os.open(path, os.O_RDWR | os.O_BINARY)
 
 
 def open_for_all(path: Path) -> int:
-    """Open a lock file shared by all users, created if missing; return its descriptor."""
+    """Return the descriptor of a lock file for all users, which is created if missing."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
     except PermissionError:  # another user's file: reading is enough to lock it
@@ -30,13 +30,13 @@ def open_for_all(path: Path) -> int:
 
 
 def write_at(descriptor: int, data: bytes | memoryview, offset: int) -> int:
-    """Write bytes at an offset; return how many were written."""
+    """Write bytes at an offset; return the number of bytes written."""
     os.lseek(descriptor, offset, os.SEEK_SET)
     return os.write(descriptor, data)
 
 
 def read_at(descriptor: int, size: int, offset: int) -> bytes:
-    """Read bytes at an offset; fewer at the end of the file."""
+    """Return up to ``size`` bytes at an offset; fewer at the end of the file."""
     os.lseek(descriptor, offset, os.SEEK_SET)
     return os.read(descriptor, size)
 
@@ -47,11 +47,11 @@ def sync_data(descriptor: int) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Do nothing: Windows flushes folders itself."""
+    """Do nothing, because Windows flushes folders itself."""
 
 
 def allocate(descriptor: int, offset: int, size: int) -> None:
-    """Do nothing: NTFS allocates a file when its length is set."""
+    """Do nothing, because NTFS allocates a file when its length is set."""
 
 
 def lock_in_use(descriptor: int) -> None:
@@ -61,12 +61,12 @@ def lock_in_use(descriptor: int) -> None:
 
 
 def lock_sole_writer(descriptor: int) -> None:
-    """Lock a file for writing by this process only; others may read. Raises OSError if another writes."""
+    """Lock a file as its only writer; others may read. Raises OSError if another process writes."""
     lock_in_use(descriptor)
 
 
 def is_locked_alone(descriptor: int) -> bool:
-    """Lock a file exclusively while it is open; return False if another process uses it."""
+    """Lock an open file exclusively; return False if another process uses it."""
     try:
         lock_in_use(descriptor)
     except OSError:
@@ -81,21 +81,21 @@ def lower_priority(by: int) -> None:  # noqa: ARG001 - there are classes of prio
 
 
 def bound_memory(most_bytes: int) -> None:
-    """Do nothing: only a job object can limit memory, and a process cannot leave its job object."""
+    """Do nothing: memory can be limited only by a job object, which a process cannot leave."""
 
 
 def usual_state_folder() -> Path:
-    """Return the system's folder for the state of a user's programs."""
+    """Return vibench's folder within the system's folder for the state of a user's programs."""
     return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "vibench"
 
 
 def usual_shared_folder() -> Path:
-    """Return a folder where every user may create files but not remove those of others."""
+    """Return a folder in which every user may create files, but not remove files of other users."""
     return Path(os.environ.get("PROGRAMDATA", "C:\\ProgramData"))
 
 
 def process_start(pid: int) -> str | None:
-    """Return the start time of a process as a text; None if there is no such process."""
+    """Return the start time of a process as text; None if there is no such process."""
     kernel = ctypes.windll.kernel32
     handle = kernel.OpenProcess(_QUERY_LIMITED_INFORMATION, 0, pid)
     if not handle:
