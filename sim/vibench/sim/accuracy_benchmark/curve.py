@@ -1,4 +1,4 @@
-"""Error over computing time of every method that can solve one scene, measured on this machine."""
+"""Error over computing time of every method that can solve a scene, measured on this machine."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -21,37 +21,37 @@ from ..specimen.state import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)
-"""Tolerances of the many-harmonic balance."""
+"""Tolerances of the harmonic balance with many harmonics."""
 
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One result of one method."""
+    """One result of a method."""
 
     method: str
     time_s: float
-    """Processor time."""
+    """Processor time [s]."""
     error: float
-    """The largest relative error of the four responses."""
+    """Largest relative error of the four responses."""
     response_i: float
     response_ii: float
     is_stated: bool
-    """Whether the method states the error; otherwise it is the difference from the best answer."""
+    """Whether the method estimates its error; otherwise ``error`` is the difference from the best result."""
     is_chosen: bool = False
-    """Whether it is the result for the requested error and time."""
+    """Whether this is the result for the requested error and time."""
 
 
 Answer = tuple[Floats, float | None]
-"""The four responses, and their largest relative error where the method states one."""
+"""The four responses, and their largest relative error; None if the method gives no estimate."""
 
 
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
-    """Solve a scene with a target by every suitable method, first to its target.
+    """Yield the results of all suitable methods for a scene with a target.
 
-    Unsuitable methods are left out. Raises ValueError when the scene has no target, or
-    cannot be simulated.
+    The first results are those of `refine_scene` up to the target. Raises ValueError when the scene has no
+    target, or cannot be simulated.
     """
-    next(refine_scene(scene))  # one-time costs of a process are not counted
+    next(refine_scene(scene))  # not timed, because it includes one-time work of the process
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
     for found in refine_scene(scene):
         refined.append(found)
@@ -113,7 +113,7 @@ def _shot(scene: Scene) -> Answer | None:
 
 
 def _first_order(scene: Scene) -> Answer | None:
-    """Return the responses of the stable motion with the smallest amplitude, as reached from rest."""
+    """Return the responses of the stable motion with the smallest amplitude, which is reached from rest."""
     spring = spring_of(scene.specimen)
     if not isinstance(spring, PowerSpring):
         return None
