@@ -1,10 +1,10 @@
 """The physics of the specimen: models, exact integration, responses, exponents, periodic motions.
 
-Three masses in a chain on a moving base, m1 between two stops on m2 (Gong et al. 2025): absolute
-displacements x, y, z [m]; m1 touches a stop where abs(y - z) reaches the gap. Free flight is solved in
-closed form, contact in steps of controlled error (docs/decisions/0004-contact-integration.md). SI units
-everywhere. This package imports no other package of vibench. `vibench.sim.study` solves many scenes at once,
-`vibench.sim.chain` joins many specimens; docs/accuracy.md states the cost of each level of `Accuracy`.
+The specimen is a chain of three masses on a moving base, with m1 between two stops on m2 (Gong et al. 2025).
+x, y, z are absolute displacements [m]; m1 touches a stop where abs(y - z) reaches the gap. Motion without
+contact is exact, contact is integrated (docs/decisions/0004-contact-integration.md). SI units. No other
+package of vibench is imported. Use `vibench.sim.study` for many scenes, `vibench.sim.chain` for coupled
+specimens. docs/accuracy.md states the cost of each level of `Accuracy`.
 
 >>> from vibench.sim import Harmonic, base_transmissibility, gong2025, steady_response
 >>> specimen = gong2025(damping_time_s=2e-5, gap_m=45e-6, contact="hertz")
@@ -16,8 +16,8 @@ everywhere. This package imports no other package of vibench. `vibench.sim.study
 >>> round(response.relative_i, 2), round(response.relative_ii, 2), response.impacts
 (2.31, 1.21, 260)
 
-`integrate` follows a motion from any state; `lyapunov_exponent` shows with its error whether it is chaotic.
-Periodic motions are found by shooting or harmonic balance and followed along frequency or amplitude:
+`integrate` computes a motion from any state; `lyapunov_exponent` shows whether it is chaotic. Periodic
+motions are found by shooting or harmonic balance and followed along frequency or amplitude:
 
 >>> from vibench.sim import Precision, integrate, lyapunov_exponent, periodic_branch, periodic_orbit
 >>> run = integrate(specimen, drive, duration_s=0.1, initial_state=response.final_state, sample_rate_hz=1e4)

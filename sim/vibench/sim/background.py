@@ -1,6 +1,6 @@
-"""Jobs in other processes, with progress, results in pieces, and cancellation.
+"""Jobs in other processes, with progress reports, partial results and cancellation.
 
-A job is a function call in a spawned process of low priority. The process ends with its parent, even if
+A job is a function call in a spawned process of low priority. The process ends when its parent ends, even if
 the parent is killed.
 """
 
@@ -26,9 +26,9 @@ NICE = 10
 MOST_BYTES = 6 << 30
 """Memory limit of a process [bytes], where the system supports one."""
 MOST_WAITING = 200
-"""Most unread messages of a process; beyond this it waits until `Pool.poll` reads some."""
+"""Most unread messages of a process; it then waits until `Pool.poll` reads messages."""
 GRACE_S = 2.0
-"""Time that the process of a dropped job has to stop it; then the process is killed [s]."""
+"""Time after which the process of a dropped job is killed unless the job has stopped [s]."""
 
 
 @dataclass(frozen=True)
@@ -37,20 +37,20 @@ class Progress:
 
     done: int
     of: int
-    """Total; 0 if unknown."""
+    """Total amount of work, in the unit of ``done``; 0 if unknown."""
     left_s: float | None = None
     """Expected remaining time [s]; None if unknown."""
     note: str = ""
 
 
 Observer = Callable[[Progress], None]
-"""Called with each progress, in the thread that does the work."""
+"""Function that receives progress reports; called in the thread that does the work."""
 Cancelled = Callable[[], bool]
-"""Whether to end early; called several times a second, in the thread that does the work."""
+"""Function that returns whether to end early; called several times per second in the working thread."""
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Ignore the progress."""
+    """Ignore a progress report."""
 
 
 def stage(observer: Observer, note: str) -> Callable[[int, int], None]:
@@ -71,7 +71,7 @@ def _ignore(*_: object) -> None:
 
 @dataclass(eq=False)
 class Job:
-    """A job for another process, with callbacks from `Pool.poll`."""
+    """Job for another process, with callbacks that `Pool.poll` calls."""
 
     work: Callable[..., Any]
     on_part: Callable[[Any], None]
@@ -80,14 +80,14 @@ class Job:
     longest_s: float
     is_wanted: bool = True
     is_answered: bool = False
-    """Whether result or error were delivered."""
+    """Whether the result or the error has been delivered."""
     end_s: float = math.inf
-    """Time at which its process is ended, if still working."""
+    """Time at which the process is killed if it still works, as a value of `monotonic` [s]."""
     cancel: Callable[[], None] = _ignore
 
     @property
     def is_over(self) -> bool:
-        """Return whether the job is over."""
+        """Whether the job has delivered its result or error, or was dropped."""
         return self.is_answered or not self.is_wanted
 
     def drop(self) -> None:
@@ -100,8 +100,8 @@ class Job:
 class Pool:
     """Pool of worker processes; its owner must call `poll` regularly.
 
-    Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the
-    process ended, TimeoutError or MemoryError beyond a limit, else the function's own exception.
+    Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the process
+    ended, TimeoutError or MemoryError if a limit was exceeded, otherwise the exception of the function.
     """
 
     def __init__(self, workers: int, longest_s: float = math.inf) -> None:
@@ -113,11 +113,11 @@ class Pool:
 
     @property
     def is_busy(self) -> bool:
-        """Return whether a job is waiting or running."""
+        """Whether a job is waiting or running."""
         return bool(self._waiting) or any(worker.job is not None for worker in self.workers)
 
     def prepare(self) -> None:
-        """Start the processes in advance."""
+        """Start all processes before the first job."""
         while len(self.workers) < self._most:
             self.workers.append(Worker(self._arrived))
 
@@ -141,11 +141,11 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; `poll` gives each part to ``on_part``."""
+        """Call ``function(question, tell, cancelled)`` in a worker; `poll` calls ``on_part`` per part."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:
-        """Start a job as soon as a process is free, unless the pool was closed."""
+        """Start a job when a process is free, unless the pool is closed."""
         self._waiting.append(job)
         if self._is_closed:
             job.drop()
@@ -153,7 +153,7 @@ class Pool:
         return job
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Deliver messages, waiting at most ``wait_s``; end jobs that take too long."""
+        """Deliver messages, after a wait of at most ``wait_s``; end jobs that exceed their time limit."""
         self._arrived.wait(wait_s)
         self._arrived.clear()
         for worker in tuple(self.workers):
@@ -164,7 +164,7 @@ class Pool:
         self._hand_out()
 
     def close(self) -> None:
-        """End the processes at once; unfinished jobs are dropped."""
+        """Kill all processes; unfinished jobs are dropped."""
         self._is_closed = True
         for job in (*self._waiting, *(worker.job for worker in self.workers)):
             if job is not None:
@@ -226,7 +226,7 @@ def _call_back(job: Job, kind: str, value: Any) -> None:
 
 
 class Worker:
-    """One process with its job and a thread that receives its messages."""
+    """Process with its job, and a thread that receives its messages."""
 
     def __init__(self, arrived: Event) -> None:
         context = get_context("spawn")
@@ -242,14 +242,14 @@ class Worker:
         self._thread.start()
 
     def begin(self, job: Job) -> None:
-        """Start this job; the worker must be idle."""
+        """Start a job; the worker must be idle."""
         self._send(job.work)
         self.job = job
         job.end_s = monotonic() + job.longest_s
         job.cancel = partial(self._send, None)
 
     def end(self) -> None:
-        """End the process at once, and the thread."""
+        """Kill the process and end the thread."""
         self._is_ended = True
         self.process.kill()
         with suppress(Empty):

@@ -86,7 +86,7 @@ class RunRecord:
 
     @property
     def impacts(self) -> int:
-        """Number of contacts that have begun."""
+        """Number of contacts that began so far."""
         return int(self.structure["impacts"])
 
     @property
