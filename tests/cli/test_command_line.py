@@ -250,7 +250,7 @@ def test_a_page_path_that_is_a_folder_is_refused_before_computation(refusal, tmp
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--notify", "no-such-program --now"), "is not a program"),
+        (("--notify", "no-such-program --now"), "was not found"),
         (("--notify", "mail 'me"), "close every quotation mark"),
     ],
 )

@@ -142,7 +142,7 @@ def test_a_read_only_folder_can_be_listed(folder, monkeypatch):
 
 
 def test_a_missing_folder_is_refused_with_advice(tmp_path):
-    with pytest.raises(RecordingError, match="give the folder that the recordings are in"):
+    with pytest.raises(RecordingError, match="give the folder that contains the recordings"):
         list_recordings(tmp_path / "nowhere")
 
 

@@ -306,7 +306,7 @@ def test_a_restored_recording_of_a_repeated_point_is_reported_as_damaged(bench, 
 def test_an_inconsistent_journal_is_refused_in_a_sentence(bench, folder, damage):
     damage(folder)
     older = sorted((folder / "older").iterdir())
-    with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite cannot be understood"):
+    with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite has invalid contents"):
         run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert sorted((folder / "older").iterdir()) == older
 
@@ -358,7 +358,7 @@ def test_a_renamed_campaign_ignores_recordings_that_its_old_journal_rejects(benc
 
 def test_a_campaign_without_journal_ignores_recordings_of_another_bench(new_bench, rig, folder):
     other = new_bench(rig.model_copy(update={"name": "another bench"}))
-    with pytest.raises(CheckFailed, match=r"name was .* and is 'another bench'"):
+    with pytest.raises(CheckFailed, match=r"name was .* and is now 'another bench'"):
         run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)
     made = run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME, changed_bench="accept")
     assert {each.outcome for each in made} == {PointOutcome.KEPT}

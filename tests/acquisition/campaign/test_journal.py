@@ -67,7 +67,7 @@ def test_added_points_follow_the_point_that_requested_them(journal):
 
 
 def test_an_added_point_with_an_existing_name_is_refused(journal):
-    with pytest.raises(RecordingError, match="give every further measurement its own name"):
+    with pytest.raises(RecordingError, match="give every added measurement a new name"):
         journal.follow_up("one", (Point("new", dwell("new")), Point("Three", dwell("Three"))))
     assert [point.name for point in journal.points()] == ["one", "two", "three"]
     assert not journal.points()[0].is_followed_up

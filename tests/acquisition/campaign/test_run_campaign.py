@@ -25,7 +25,7 @@ CAMPAIGN = campaign("one", "two", "three")
 def test_a_file_in_place_of_the_folder_is_refused_before_output(bench, tmp_path):
     taken = tmp_path / "taken"
     taken.write_text("mine")
-    with pytest.raises(RecordingError, match=r"taken cannot be made a folder .* Nothing was played"):
+    with pytest.raises(RecordingError, match=r"taken cannot be created .* Nothing was played"):
         run_campaign(bench, CAMPAIGN, taken)
     assert taken.read_text() == "mine"
     assert not any(name == "start" for name, _, _ in bench.world.calls)
@@ -95,7 +95,7 @@ def test_resuming_keeps_complete_points_and_records_the_remaining_points(bench, 
 
 def test_resuming_with_another_plan_is_refused(bench, recorded):
     changed = Campaign(name="c", measurements=(dwell("one", amplitude_vpp=2.0),))
-    with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite was begun with another plan"):
+    with pytest.raises(RecordingError, match=r"has changed since .*c\.campaign\.sqlite was written"):
         run_campaign(bench, changed, recorded[0], ExistingRecordings.RESUME)
 
 

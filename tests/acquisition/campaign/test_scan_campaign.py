@@ -223,7 +223,7 @@ def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
             found = run_campaign(bench, scan(), tmp_path, switch=switch, on_event=happened)
     assert outcomes(found) == ALL[:2]
     assert asked[0] == (
-        "move the beam to top on m2 (x 0, y -0.5, z 0 m), then continue with 'vibench release' or Go on"
+        "move the beam to top on m2 (x 0, y -0.5, z 0 m), then run 'vibench release' or press 'Go on'"
     )
     assert len(asked) == 3
     assert [each.state.value for each in read_journal(journal_path(tmp_path, "c"))][2:] == ["queued"] * 2

@@ -111,7 +111,7 @@ class TestAnotherBench:
     def test_a_resume_on_a_changed_bench_is_refused_with_the_differences(self, begun, new_bench, rig):
         heavier = rig.model_copy(update={"shaker": rig.shaker.model_copy(update={"fixture_mass_kg": 0.2})})
         bench = new_bench(heavier)
-        with pytest.raises(CheckFailed, match=r"rig\.shaker\.fixture_mass_kg was 0\.07 and is 0\.2"):
+        with pytest.raises(CheckFailed, match=r"rig\.shaker\.fixture_mass_kg was 0\.07 and is now 0\.2"):
             run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
@@ -180,7 +180,7 @@ class TestResuming:
 
     def test_two_programs_cannot_run_one_campaign(self, bench, tmp_path):
         def second(progress):
-            with pytest.raises(RecordingError, match="by another program"):
+            with pytest.raises(RecordingError, match="another program is running"):
                 run_campaign(bench, campaign("one"), tmp_path, ExistingRecordings.RESUME)
 
         run_campaign(bench, campaign("one"), tmp_path, on_progress=second)

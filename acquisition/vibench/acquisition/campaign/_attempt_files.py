@@ -104,8 +104,8 @@ def complete_attempt(
             continue
         if not found.is_of_this_plan:
             raise RecordingError(
-                f"{path} is complete, but was made by another plan than the campaign's {name!r}. "
-                "Nothing was recorded; give the measurement another name, or another folder"
+                f"{path} is complete, but its plan is not that of {name!r} in this campaign. "
+                "Nothing was recorded; give the measurement another name, or choose another folder"
             )
         return found
     return damaged

@@ -40,7 +40,7 @@ class BeamMover:
         if point is None or point == self._at or moves_itself:
             return
         self._switch.hold()
-        text = f"move the beam to {point.text}, then continue with 'vibench release' or Go on"
+        text = f"move the beam to {point.text}, then run 'vibench release' or press 'Go on'"
         self._say(CampaignEvent(CampaignEventKind.MOVE_BEAM, text, {"point": point.name}))
         while self._switch.is_holding:
             bench.idle(BLOCK_S)

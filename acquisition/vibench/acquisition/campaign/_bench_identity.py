@@ -56,7 +56,7 @@ def _differences(place: str, before: Any, now: Any) -> Iterator[str]:
             for number, (one, other) in enumerate(zip(before, now, strict=True)):
                 yield from _differences(f"{place}.{number}", one, other)
         case _ if before != now:
-            yield f"{place} was {before!r} and is {now!r}"
+            yield f"{place} was {before!r} and is now {now!r}"
 
 
 class _Absent:

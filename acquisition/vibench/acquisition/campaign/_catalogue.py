@@ -157,7 +157,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
     if seal.state in (SealState.UNSEALED, SealState.SEAL_GONE):
         concerns.append("no seal" if seal.state is SealState.UNSEALED else "seal gone")
     if seal.state is SealState.OTHER_KEY:
-        concerns.append("not signed with the key given")
+        concerns.append("not signed with the given key")
     roles = ", ".join(dict.fromkeys(each.channel for each in recording.overloads))
     if roles:
         concerns.append(f"near full scale: {roles}")
@@ -194,7 +194,7 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
     or ``catalogue.sqlite`` is not a catalogue.
     """
     if not folder.is_dir():
-        raise RecordingError(f"{folder} is not a folder; give the folder that the recordings are in.")
+        raise RecordingError(f"{folder} is not a folder; give the folder that contains the recordings.")
     try:
         with closing(_open_catalogue(folder, chosen(Refresh, refresh))) as connection:
             _update(folder, connection)
@@ -205,8 +205,8 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
             return _entries(connection)
     except sqlite3.DatabaseError as error:
         raise RecordingError(
-            f"{folder / CATALOGUE_NAME} is not a catalogue ({error}). Nothing was changed; rebuild it, or "
-            "move it away if it is something else"
+            f"{folder / CATALOGUE_NAME} is not a catalogue ({error}). Nothing was changed; rebuild the "
+            "catalogue (vibench catalogue --rebuild), or move the file away if it is something else"
         ) from error
 
 
@@ -370,11 +370,11 @@ def _verify(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> Ve
     sentence = found.sentence
     bad = [name for name, each in results.items() if each in BAD]
     if bad:
-        sentence += f"; not as they were saved: results {', '.join(bad)}"
+        sentence += f"; changed since they were saved: results {', '.join(bad)}"
     return VerifiedRecording(where, found.state.value, sentence, found.seal, results)
 
 
 def _missing(path: Path, root: Path, point: JournalPoint) -> VerifiedRecording:
     return VerifiedRecording(
-        place_below(root, path), MISSING, f"the campaign made it for {point.name}", point.seal, {}
+        place_below(root, path), MISSING, f"the campaign recorded {point.name} in it", point.seal, {}
     )

@@ -254,7 +254,7 @@ def require_version(path: Path, connection: sqlite3.Connection) -> None:
         row = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
     except sqlite3.Error as error:
         raise RecordingError(
-            f"{path} is not a journal of a campaign ({error}). Nothing was changed; give another folder"
+            f"{path} is not a campaign's journal ({error}). Nothing was changed; give another folder"
         ) from error
     if row is None or int(row["value"]) > VERSION:
         raise RecordingError(
@@ -269,13 +269,13 @@ def sentences(path: Path) -> Iterator[None]:
         yield
     except (ValueError, TypeError, LookupError) as error:  # invalid contents or missing columns
         raise RecordingError(
-            f"the journal {path} cannot be understood ({str(error).splitlines()[0]}): it is damaged, or of "
-            "another version. Nothing was changed; put back a copy, or move it away and resume"
+            f"the journal {path} has invalid contents ({str(error).splitlines()[0]}): it is damaged, or was "
+            "written by another version. Nothing was changed; restore a copy, or move it away and resume"
         ) from error
     except sqlite3.Error as error:
         raise RecordingError(
-            f"the journal {path} cannot be read or written ({error}). What was recorded is kept; see that "
-            "the disk has room and the folder may be written, and resume"
+            f"the journal {path} cannot be read or written ({error}). The recordings are kept; check that "
+            "the disk has space and the folder is writable, then resume"
         ) from error
 
 
@@ -330,7 +330,7 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
 def _own_name(file: str) -> str:
     """Return ``file`` if it is a plain file name: files outside the journal's folder must not be touched."""
     if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
-        raise ValueError(f"{file[:80]!r} is not a name of a recording")
+        raise ValueError(f"{file[:80]!r} is not the file name of a recording")
     return file
 
 
@@ -502,8 +502,8 @@ class Journal(ClosedOnLeaving):
         except sqlite3.IntegrityError as error:
             names = ", ".join(repr(each.name) for each in points)
             raise RecordingError(
-                f"{added_after!r} adds {names}, but a point of that name is already in the campaign. "
-                "Nothing was recorded over it; give every further measurement its own name"
+                f"{added_after!r} adds {names}, but the campaign already has a point with such a name. "
+                "Nothing was overwritten; give every added measurement a new name"
             ) from error
 
     @contextmanager

@@ -87,8 +87,8 @@ class CampaignLog(ClosedOnLeaving):
                 self._file.write("\n")
         except OSError as error:
             raise RecordingError(
-                f"{path} cannot be written ({error.strerror}). Nothing was played; give a folder that may be "
-                "written"
+                f"{path} cannot be written ({error.strerror}). Nothing was played; give a folder that is "
+                "writable"
             ) from error
 
     def __call__(self, event: CampaignEvent) -> None:
@@ -276,7 +276,7 @@ class CommandMessenger:
             raise ConfigurationError("the command is empty; give a program and its arguments")
         if shutil.which(arguments[0]) is None:
             raise ConfigurationError(
-                f"the command {arguments[0]!r} is not a program that can be run here; give the path of one"
+                f"the program {arguments[0]!r} was not found, or is not executable; give its path"
             )
         return cls(arguments)
 
@@ -296,7 +296,7 @@ class CommandMessenger:
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            return f"{self.arguments[0]} took more than {longest_s:g} s and was ended"
+            return f"{self.arguments[0]} took more than {longest_s:g} s and was stopped"
         except OSError as error:
             return f"{self.arguments[0]} could not be run ({error.strerror})"
         return f"{self.arguments[0]} ended with {ended.returncode}" if ended.returncode else ""

@@ -29,7 +29,7 @@ from ._journal import (
     read_journal,
 )
 
-PROGRAM_ENDED = "its program ended in the middle of it"
+PROGRAM_ENDED = "the program ended during the recording"
 
 
 def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
@@ -122,7 +122,7 @@ def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointSt
         case RecordingState.STOPPED:
             return JournalPointState.INTERRUPTED, ReasonCode.STOPPED, found.reason, found.seal
         case RecordingState.INTERRUPTED:
-            reason = f"{PROGRAM_ENDED}, {found.duration_s:.1f} s into its recording"
+            reason = f"{PROGRAM_ENDED}, after {found.duration_s:.1f} s of samples"
             return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, reason, found.seal
         case _:
             return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, found.reason, found.seal
@@ -236,8 +236,8 @@ def _require_no_differences(found: tuple[str, ...]) -> None:
         shown = "; ".join(found[:MOST_DIFFERENCES])
         more = f"; and {len(found) - MOST_DIFFERENCES} more" if len(found) > MOST_DIFFERENCES else ""
         raise CheckFailed(
-            f"the bench differs from the one that the campaign was begun on: {shown}{more}. Nothing was "
-            "played; put it back as it was, or accept the change (--accept-changed-bench)"
+            f"the bench has changed since the campaign started: {shown}{more}. Nothing was played; "
+            "restore the bench as it was, or accept the change (--accept-changed-bench)"
         )
 
 
@@ -247,8 +247,8 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RecordingError(
-            f"{folder} cannot be made a folder for recordings ({error.strerror}). Nothing was played; "
-            "give a folder that exists, or the name of a new one"
+            f"the folder {folder} cannot be created ({error.strerror}). Nothing was played; "
+            "give a folder that exists, or another name for the new one"
         ) from error
 
 
@@ -279,8 +279,8 @@ def _resumed_journal(
 def _require_same_plan(journal: Journal, campaign: Campaign) -> None:
     if _points_to_make(journal.campaign) != _points_to_make(campaign):
         raise RecordingError(
-            f"{journal.path} was begun with another plan than {campaign.name!r} has now. Nothing was "
-            "recorded; give the changed campaign another name, or another folder"
+            f"the plan of {campaign.name!r} has changed since {journal.path} was written. Nothing was "
+            "recorded; give the changed campaign another name, or choose another folder"
         )
 
 

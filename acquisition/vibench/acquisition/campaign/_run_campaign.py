@@ -94,7 +94,7 @@ class CampaignRunner:
             if any(point.attempts for point in self._coming) or done
             else CampaignEventKind.BEGUN
         )
-        text = f"{campaign.name}: {self._count} points, {done} done before"
+        text = f"{campaign.name}: {self._count} points, {done} already done"
         self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
         self._name_damaged()
         try:
@@ -173,7 +173,7 @@ class CampaignRunner:
         added = [each for each in self._journal.points() if each.name in names]
         self._coming.extendleft(reversed(added))
         self._count += len(added)
-        text = f"{point.name} asks for {', '.join(each.name for each in added)}"
+        text = f"after {point.name}, these points follow: {', '.join(each.name for each in added)}"
         self._say(CampaignEvent(CampaignEventKind.FURTHER, text, {"point": point.name, "points": len(added)}))
 
     def _closing(self) -> str:
@@ -297,8 +297,8 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
             mark.enter_context(sole_use(log.path))
         except RecordingError as error:
             raise RecordingError(
-                f"the campaign {campaign.name!r} is being carried out in {folder} by another program. "
-                "Nothing was changed; let it end, or stop it"
+                f"another program is running the campaign {campaign.name!r} in {folder}. "
+                "Nothing was changed; wait until it has ended, or stop it"
             ) from error
         yield log
 
@@ -380,7 +380,7 @@ def _confirmed_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
     if missing:
         raise CheckFailed(
             f"the reopened bench has unconfirmed settings: {', '.join(missing)}. Nothing was "
-            "energised; look at them and resume the campaign"
+            "energised; check these settings and resume the campaign"
         )
     return sheet
 
