@@ -125,7 +125,7 @@ def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path,
     for path in list(shared.iterdir()):
         path.unlink()
         trap(path, aim)
-    with pytest.raises(InstrumentBusy, match=r"cannot be marked as in use: .*\.lock is not to be locked"):
+    with pytest.raises(InstrumentBusy, match=r"cannot be marked as in use: .*\.lock cannot be locked"):
         BenchLock.of(RIG)
     assert aim.read_text() == "kept"
 

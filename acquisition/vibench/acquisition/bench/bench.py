@@ -97,13 +97,13 @@ class BenchLock:
             is_there = os.path.samestat(os.fstat(descriptor), path.stat())
         except OSError as error:
             raise InstrumentBusy(
-                f"{rig.name} cannot be marked as in use: {path} is not to be locked ({error}). Nothing was "
-                "opened; have it removed, by its owner or as root, when nobody measures"
+                f"{rig.name} cannot be marked as in use: the file {path} cannot be locked ({error}). Nothing "
+                "was opened; when nobody measures, have its owner or root delete that file"
             ) from error
         if not (is_ours and is_there):
             raise InstrumentBusy(
                 f"{rig.name} is in use by process {_holder(descriptor)}. Nothing was opened; end that "
-                "program, or let it finish"
+                "program, or wait until it has ended"
             )
         try:
             os.ftruncate(descriptor, 0)
