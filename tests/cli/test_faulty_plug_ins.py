@@ -196,7 +196,7 @@ def test_a_check_finds_a_converter_that_omits_samples(stranger, tmp_path):
         return found(*given)
 
     path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", skips))
-    with open_bench(path) as bench, pytest.raises(DataLost, match="where 0 was due: it loses samples"):
+    with open_bench(path) as bench, pytest.raises(DataLost, match="instead of 0: it loses samples"):
         check_bench(bench, tmp_path)
 
 

@@ -49,7 +49,7 @@ def real(bench_of, rig, state_folder):
 def test_an_unchecked_real_bench_is_not_armed(real, tmp_path):
     bench, virtual = real
     before_s = virtual.world.time_s
-    with pytest.raises(CheckFailed, match=r"was never checked on this account.*bench check.*--check waived"):
+    with pytest.raises(CheckFailed, match=r"checked under this user account.*bench check.*--check waived"):
         require_fresh(bench, tmp_path)
     assert virtual.world.time_s == before_s
 
@@ -57,7 +57,7 @@ def test_an_unchecked_real_bench_is_not_armed(real, tmp_path):
 @pytest.mark.parametrize(
     ("age_h", "verdict", "said"),
     [
-        (12.1, Verdict.OK, r"is 12\.1 h old, 12 h are allowed \(check_valid_h\)"),
+        (12.1, Verdict.OK, r"is 12\.1 h old; 12 h are allowed \(check_valid_h\)"),
         (-0.1, Verdict.OK, r"is -0\.1 h old"),
         (1.0, Verdict.FAIL, "did not pass: amplifier gain is 13 dB, expected 10 dB within 1 dB"),
     ],
@@ -82,7 +82,7 @@ def test_a_check_of_another_configuration_does_not_arm_the_bench(real, tmp_path)
     bench, _ = real
     turned = bench.rig.amplifier.model_copy(update={"gain_db": 20.0})
     kept_result(bench.rig.model_copy(update={"amplifier": turned}))
-    with pytest.raises(CheckFailed, match="was of another configuration"):
+    with pytest.raises(CheckFailed, match="was made with another configuration"):
         require_fresh(bench, tmp_path, clock=lambda: NOW)
 
 

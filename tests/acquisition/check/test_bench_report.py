@@ -82,7 +82,7 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
         (lambda v: v.faults.disconnect("cDAQ1Mod1/ai1"), "amplifier_voltage hears the sine", "cable"),
         (lambda v: v.faults.disconnect("cDAQ1Mod1/ai0"), "drive over setting", "cable"),
         (lambda v: v.faults.over_range(60.0), "offset of m0_velocity", "bias"),
-        (lambda v: v.faults.reverse("cDAQ1Mod1/ai2"), "sign of base_acceleration", "accelerometer round"),
+        (lambda v: v.faults.reverse("cDAQ1Mod1/ai2"), "sign of base_acceleration", "reverse the acceler"),
         (lambda v: v.faults.reverse("cDAQ1Mod1/ai1"), "sign of amplifier_voltage", "two wires"),
         (lambda v: v.faults.stick_output(), "drive left after stop", "switch the amplifier off"),
     ],
@@ -99,10 +99,10 @@ def test_a_laser_drop_out_is_distinguished_from_hum(checked, rig, tmp_path):
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 10.0})
     dark = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
     assert dark.verdict is not Verdict.OK
-    assert "a laser that loses its light" in dark.advice
+    assert "a laser that loses its signal" in dark.advice
     virtual = rig.virtual.model_copy(update={"vibrometer_noise_m_per_s_per_rthz": 1e-3})
     loud = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
-    assert "look for hum" in loud.advice
+    assert "look for mains hum" in loud.advice
 
 
 @pytest.mark.thorough
@@ -166,7 +166,7 @@ def test_a_wrong_load_setting_is_found_with_advice(checked, rig, tmp_path):
     # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
     report = checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
     assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
-    assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
+    assert "a factor of 2 means a wrong load" in report["drive over setting"].advice
 
 
 def test_a_correct_load_setting_passes_even_if_it_cannot_be_read(checked, rig, tmp_path):

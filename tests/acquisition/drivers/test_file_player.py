@@ -108,6 +108,6 @@ def test_playback_with_another_sensor_scale_is_refused(playing, rig):
 
 def test_a_replayed_recording_needs_no_bench_check_and_no_waiver(playing, tmp_path):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
-        with pytest.raises(ConfigurationError, match="a recording is played back"):
+        with pytest.raises(ConfigurationError, match="plays back a recording"):
             check_bench(bench, tmp_path)
         assert require_fresh(bench, tmp_path) is None

@@ -92,8 +92,8 @@ def _write(result: CheckResult, *, passed: bool) -> None:
             coming.write_text(result.model_dump_json(indent=2), encoding="utf-8")
     except OSError as error:
         raise RecordingError(
-            f"The result of the bench check cannot be kept in {error.filename} ({error.strerror}). The bench "
-            "is as it was; make its folder writable, or name another one in VIBENCH_STATE_DIR"
+            f"The result of the bench check cannot be saved as {error.filename} ({error.strerror}). The "
+            "bench is unchanged; make that folder writable, or set VIBENCH_STATE_DIR to another folder"
         ) from error
 
 
@@ -103,9 +103,9 @@ CLOCK_PPM = Bounds(20.0, inf)
 """Drift of the ratio of two clocks [ppm]; oscillators age by some ppm per year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
-    "the configuration has not changed: look for a changed knob, a cable, a loose sensor or a failing "
-    "amplifier; if you changed something that is not in the configuration, check once as a new reference "
-    "(menu Test, or vibench bench check --new-reference)"
+    "the configuration has not changed: look for a changed knob, a bad cable, a loose sensor or a failing "
+    "amplifier; if you changed something that is not in the configuration, run the check once as a new "
+    "reference (menu Test, or vibench bench check --new-reference)"
 )
 
 
@@ -239,8 +239,8 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
             return _require_passed(check_bench(bench, folder, clock, switch))
         case BenchKind.REAL:
             raise CheckFailed(
-                f"{complaint}. Nothing was played; check it with 'vibench bench check --bench FILE', or "
-                "--check now, or go on without with --check waived"
+                f"{complaint}. Nothing was played; run 'vibench bench check --bench FILE', or measure with "
+                "--check now, or skip the check with --check waived"
             )
 
 
@@ -262,12 +262,12 @@ def require_on_record(bench: Bench) -> None:
 def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
     """Return the reason why a check is not valid for a rig; None if it is valid."""
     if last is None:
-        return f"the bench {rig.name!r} was never checked on this account"
+        return f"the bench {rig.name!r} was never checked under this user account"
     when = f"the last check of {rig.name!r}, at {last.checked:%Y-%m-%d %H:%M %Z},"
     if last.rig_digest != rig_digest(rig):
-        return f"{when} was of another configuration"
+        return f"{when} was made with another configuration"
     if not 0 <= last.age_h(now) <= rig.check_valid_h:
-        return f"{when} is {last.age_h(now):.1f} h old, {rig.check_valid_h:g} h are allowed (check_valid_h)"
+        return f"{when} is {last.age_h(now):.1f} h old; {rig.check_valid_h:g} h are allowed (check_valid_h)"
     if last.verdict is Verdict.FAIL:
         return f"{when} did not pass: {_failures(last)}"
     return None
@@ -277,7 +277,7 @@ def _require_passed(result: CheckResult) -> CheckResult:
     if result.verdict is Verdict.FAIL:
         raise CheckFailed(
             f"the bench {result.rig!r} did not pass its check: {_failures(result)}. {_output_after(result)} "
-            "put right what 'vibench bench check' advises, and check again"
+            "fix what 'vibench bench check' reports, and check again"
         )
     return result
 
@@ -286,7 +286,7 @@ def _output_after(result: CheckResult) -> str:
     """Return a clause that states whether the output was measured as off."""
     left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
     if left is None or left.verdict is Verdict.FAIL:
-        return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand,"
+        return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand, then"
     return "The output is off;"
 
 

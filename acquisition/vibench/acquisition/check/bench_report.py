@@ -66,8 +66,8 @@ def bench_report(
     """
     if bench.rig.plays_back:
         raise ConfigurationError(
-            f"on the bench {bench.rig.name!r} a recording is played back: there is nothing to check. Measure "
-            "with the plan that it was made with"
+            f"the bench {bench.rig.name!r} plays back a recording, so there is nothing to check. Measure "
+            "with the plan of that recording"
         )
     findings = [*_identities(bench), *_calibrations(bench), _room(bench, folder)]
     if amplitude_vpp is None:
@@ -148,8 +148,8 @@ class _BlockReader:
             self._advance()
             if block.first_sample != self._due:
                 raise DataLost(
-                    f"the converter handed over sample {block.first_sample} where {self._due} was due: it "
-                    "loses samples although nothing else uses it. Look for what keeps the bus busy"
+                    f"the converter returned sample {block.first_sample} instead of {self._due}: it loses "
+                    "samples although no other program uses it. Look for other traffic on its bus"
                 )
             self._due += block.volts.shape[1]
             blocks.append(block.volts)
@@ -206,7 +206,7 @@ def _room(bench: Bench, folder: Path) -> Finding:
 
 def _idle(output: AnalogOutput) -> Finding:
     is_zero = output.idle is IdleOutput.ZERO
-    advice = "a program that dies leaves the last value on the shaker: keep the amplifier's knob within reach"
+    advice = "if the program crashes, the output holds its last value: keep the gain knob within reach"
     return Finding(
         name="output without a program",
         value=output.idle.value,
@@ -219,24 +219,24 @@ def _idle(output: AnalogOutput) -> Finding:
 def _latency(bench: Bench) -> Finding:
     latency_s = bench.generator.measured_latency_s()
     verdict = LATENCY_S.verdict(latency_s)
-    advice = "shorten generator.settle_s, or look for what keeps the bus busy: a stop takes as long"
+    advice = "shorten generator.settle_s, or reduce other traffic on the bus: a stop takes this long too"
     return finding_of("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
 
 
 def _noise(channel: Channel, row: Samples) -> Finding:
     rms_v = float(np.std(row))
     verdict = NOISE_SHARE.verdict(rms_v / channel.full_scale_v)
-    advice = "look for hum, a loose shield, or a cable that picks it up"
+    advice = "look for mains hum, a loose shield, or a cable that picks up interference"
     usual_v = float(np.median(np.abs(row - np.median(row)))) / _MEDIAN_OF_NORMAL
     if usual_v < _IN_MOMENTS * rms_v:
         advice = (
-            f"it comes in moments, and is {usual_v:.2g} V otherwise: look for a loose contact, or a laser "
-            "that loses its light; refocus it, or stick on reflective tape"
+            f"the noise comes in bursts, with {usual_v:.2g} V between them: look for a loose contact, or a "
+            "laser that loses its signal; refocus the laser, or apply reflective tape"
         )
     if rms_v == 0.0:
         verdict, advice = (
             Verdict.FAIL,
-            "a living input is never quite still: see whether it is sampled at all",
+            "a working input always has some noise: check that this input is sampled",
         )
     expected = f"{NOISE_SHARE.well * channel.full_scale_v:.3g} V or less"
     return finding_of(f"noise of {channel.role.value}", rms_v, "V", expected, verdict, advice)
@@ -245,6 +245,6 @@ def _noise(channel: Channel, row: Samples) -> Finding:
 def _offset(channel: Channel, row: Samples) -> Finding:
     mean_v = float(np.mean(row))
     verdict = OFFSET_SHARE.verdict(abs(mean_v) / channel.full_scale_v)
-    advice = "look for an open input, a sensor's bias on DC coupling, or a shaker off its centre"
+    advice = "look for an open input, a sensor's bias voltage with DC coupling, or an off-centre shaker"
     expected = f"0 V within {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
     return finding_of(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)

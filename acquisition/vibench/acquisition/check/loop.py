@@ -171,10 +171,10 @@ class LoopCheck:
         fit = self._fit(role)
         is_detected = self._detects(role)
         advice = {
-            "voltage": "see whether the cable is open, its source plugged in, and the amplifier on",
-            "velocity": "see whether the laser is on, focused, and its beam free",
-            "acceleration": "see whether the accelerometer is plugged in and its current on",
-        }.get(role.quantity, "see whether the sensor is plugged in, in range, and its supply on")
+            "voltage": "check that the cable is intact, its source plugged in, and the amplifier on",
+            "velocity": "check that the laser is on and focused, and its beam not blocked",
+            "acceleration": "check that the accelerometer is plugged in and its supply current is on",
+        }.get(role.quantity, "check that the sensor is plugged in, within its range, and powered")
         return Finding(
             name=detection_name(role),
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
@@ -190,12 +190,12 @@ class LoopCheck:
         fit = self._fit(Role.DRIVE_VOLTAGE)
         ratio = fit.amplitude / self._terminal_v
         verdict = DRIVE_DEVIATION.verdict(abs(ratio - 1))
-        advice = "check the cable to the drive_voltage input, its range and its attenuation"
+        advice = "check the cable to the drive_voltage input, and the range and attenuation of this input"
         for wrong in (WRONG_LOAD, 1 / WRONG_LOAD):
             if abs(ratio / wrong - 1) <= DRIVE_DEVIATION.fail:
                 advice = (
-                    f"a factor of {wrong:g} is a wrong load: compare the load on the generator's panel with "
-                    "generator.load_ohm (or the divider with daq.channels.attenuation)"
+                    f"a factor of {wrong:g} means a wrong load: compare the load on the generator's panel "
+                    "with generator.load_ohm (or the divider with daq.channels.attenuation)"
                 )
         return finding_of(
             DRIVE_OVER_SETTING, ratio, "", f"1 within {DRIVE_DEVIATION.well:.0%}", verdict, advice,
@@ -205,7 +205,7 @@ class LoopCheck:
     def _silence(self) -> Finding:
         volts = self._after[Role.DRIVE_VOLTAGE] * self._channels[Role.DRIVE_VOLTAGE].units_per_volt
         left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
-        advice = "the output reports off but plays: switch the amplifier off, and have the output repaired"
+        advice = "the output reports 'off' but plays: switch the amplifier off, and have the output repaired"
         return finding_of(
             DRIVE_LEFT,
             left,
@@ -218,7 +218,7 @@ class LoopCheck:
     def _clocks(self) -> Finding:
         ratio = clock_ratio(self._rows[Role.DRIVE_VOLTAGE], CHECK_FREQUENCY_HZ, self._rate_hz)
         verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
-        advice = "compare daq.sample_rate_hz and the reference of what plays; phases over a minute need it"
+        advice = "compare daq.sample_rate_hz with the source's clock; a drift spoils phases over minutes"
         expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
         return finding_of(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
 
@@ -239,7 +239,7 @@ class LoopCheck:
         modelled = nearest_expected(fit.amplitude, self._base_modelled)
         verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
-        advice = "check the accelerometer's sensitivity, fixture, specimen, the amplifier's power and gain"
+        advice = "check the accelerometer's sensitivity, fixture, specimen, and amplifier power and gain"
         return finding_of(
             BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty
         )
@@ -250,12 +250,12 @@ class LoopCheck:
         each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
         off_deg = each_deg[np.argmin(np.abs(each_deg))]
         advice = {
-            Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
-            Role.AMPLIFIER_VOLTAGE: "swap the two wires of this input, or see whether the amplifier inverts",
+            Role.BASE_ACCELERATION: "reverse the accelerometer, or swap the wires of the coil or amplifier",
+            Role.AMPLIFIER_VOLTAGE: "swap the two wires of this input, or check if the amplifier inverts",
         }.get(
             role,
-            "if the base's sign is right, that of this sensor is reversed (its direction, or the side that "
-            "a laser sees), or the specimen is not the one described",
+            "if the sign of the base is right, this sensor is reversed (its direction, or the side that the "
+            "laser hits), or the specimen is not the configured one",
         )
         expected = f"0 deg within {bounds.well:g} deg"
         verdict = bounds.verdict(abs(off_deg))
