@@ -168,7 +168,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         (("--vibench-instrument=afg1022x", "--vibench-bench=nowhere.toml"), "nowhere.toml: cannot be read"),
         (
             ("--vibench-instrument=file",),
-            "no shipped virtual bench names 'file' as one of vibench.generators",
+            "no shipped virtual bench uses 'file' as one of vibench.generators",
         ),
         (
             ("--vibench-instrument=plain_python", "--vibench-bench=BENCH"),
@@ -176,7 +176,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         ),
         (
             ("--vibench-instrument=file", "--vibench-bench=BENCH"),
-            "virtual_rig.toml does not name 'file' as one of",
+            "virtual_rig.toml does not use 'file' as one of",
         ),
     ],
 )

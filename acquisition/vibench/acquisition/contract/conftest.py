@@ -65,9 +65,9 @@ def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | N
 
 def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
     """Return the error text for an instrument that no bench names."""
-    who = "no shipped virtual bench names" if given is None else f"{given} does not name"
+    who = "no shipped virtual bench uses" if given is None else f"{given} does not use"
     kinds_in_words = " or ".join(each.value for each in kinds)
-    return f"{who} {name!r} as one of {kinds_in_words}; give a bench that does with --vibench-bench"
+    return f"{who} {name!r} as one of {kinds_in_words}; give a bench that uses it with --vibench-bench"
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:

@@ -126,7 +126,7 @@ def test_a_burst_plays_its_cycles_and_ends_by_itself(bench: Bench) -> None:
     bench.generator.arm_burst(cycles)
     bench.generator.start()
     bench.digitizer.start()
-    assert is_quiet(bench), "an armed burst waits for its trigger"
+    assert is_quiet(bench), "an armed burst must wait for its trigger"
     bench.generator.trigger()
     volts = heard_v(bench, 1.0)
     played_s = np.count_nonzero(np.abs(volts) > 0.3 * terminal_v(bench)) / bench.digitizer.sample_rate_hz

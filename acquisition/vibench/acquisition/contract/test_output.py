@@ -62,7 +62,7 @@ def test_a_tone_appears_at_the_terminal_from_its_first_sample(bench: Bench) -> N
         volts = row.volts[drive] * bench.channels[drive].units_per_volt
     assert line_v(volts[len(volts) // 4 :], TONE_HZ, rate_hz) == pytest.approx(level_v(bench), rel=0.03)
     begun = int(np.argmax(np.abs(volts) > 0.3 * level_v(bench)))
-    assert begun < 0.01 * rate_hz, "output and converter must begin with the same sample"
+    assert begun < 0.01 * rate_hz, "output and converter must start at the same sample"
 
 
 @pytest.mark.parametrize("peak", [1.01, float("nan"), float("inf")])
