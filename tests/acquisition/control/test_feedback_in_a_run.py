@@ -98,7 +98,7 @@ def test_a_detached_accelerometer_ends_a_feedback_run_at_a_low_setting(bench, tm
     while next(iter(run)).state is not RunState.RECORDING:
         pass
     bench.world.base_factor = 1e-4
-    with pytest.raises(LimitExceeded, match="look at the accelerometer"):
+    with pytest.raises(LimitExceeded, match="check the accelerometer"):
         list(run)
     assert not bench.world.is_on
     assert bench.recorder.ending[0] is RecordingState.FAILED

@@ -102,14 +102,14 @@ def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(recorded):
 
 
 def test_an_unreachable_spectrum_ends_with_a_ramp_down(recorded):
-    with pytest.raises(LimitExceeded, match=r"needs .* Vpp at .* amplitude_vpp = 0\.1 is the most"):
+    with pytest.raises(LimitExceeded, match=r"needs .* Vpp at .* allows at most amplitude_vpp = 0\.1"):
         recorded(noise(amplitude_vpp=0.1))
 
 
 def test_a_density_above_its_abort_limit_ramps_down_the_run(recorded):
     # No equalisation below the spectrum, and a limit of m0 far below what the first realisation makes.
     limits = corners((40, 1e-10))
-    with pytest.raises(LimitExceeded, match=r"velocity of m0 has .* dB above 1e-10; abort_db = 6"):
+    with pytest.raises(LimitExceeded, match=r"velocity of m0 reached .* dB above 1e-10; abort_db = 6"):
         recorded(noise(response_limits=limits))
 
 

@@ -107,7 +107,7 @@ def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
         if role in rows:
             return rows.index(role)
     raise ConfigurationError(
-        f"feedback needs {' or '.join(role.value for role in roles)}, and this rig has no such channel. "
+        f"feedback needs the channel {' or '.join(role.value for role in roles)}, which this rig lacks. "
         "Nothing was played; add it to daq.channels, or use an excitation without feedback"
     )
 
@@ -164,7 +164,7 @@ def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, accelerati
     modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(
-            f"the base moved with {acceleration:.3g} m/s2 at {frequency_hz:g} Hz where the model says "
-            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of that. It was ramped down and "
-            "its recording kept; look at the accelerometer, its cable and the amplifier"
+            f"the base acceleration was {acceleration:.3g} m/s2 at {frequency_hz:g} Hz; the model predicts "
+            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of that. The run was ramped down "
+            "and its recording kept; check the accelerometer, its cable and the amplifier"
         )

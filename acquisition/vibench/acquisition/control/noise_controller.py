@@ -71,8 +71,8 @@ class Equaliser:
         needed_vpp = 2 * float(np.max(np.abs(period)))
         if needed_vpp > plan.amplitude_vpp:
             raise LimitExceeded(
-                f"the spectrum needs {needed_vpp:.3g} Vpp at {level_db:g} dB, and amplitude_vpp = "
-                f"{plan.amplitude_vpp:g} is the most that the plan allows. It was ramped down and kept; "
+                f"the spectrum needs {needed_vpp:.3g} Vpp at {level_db:g} dB, but the plan allows at most "
+                f"amplitude_vpp = {plan.amplitude_vpp:g}. The run was ramped down and its recording kept; "
                 "raise amplitude_vpp, or lower the spectrum where the base responds least"
             )
         return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
@@ -108,10 +108,10 @@ class Equaliser:
             worst = int(np.argmax(measured / line))
             if measured[worst] > most * line[worst]:
                 raise LimitExceeded(
-                    f"the {what} has {measured[worst]:.3g} {unit} at {self.frequency_hz[worst]:g} Hz, "
+                    f"the {what} reached {measured[worst]:.3g} {unit} at {self.frequency_hz[worst]:g} Hz, "
                     f"{10 * log10(measured[worst] / line[worst]):.1f} dB above {line[worst]:.3g}; abort_db = "
-                    f"{self._plan.abort_db:g}. It was ramped down and kept; lower the spectrum, "
-                    "or give more equalisations"
+                    f"{self._plan.abort_db:g}. The run was ramped down and its recording kept; lower the "
+                    "spectrum, or give more equalisations"
                 )
 
     def off_db(self, heard: MeasuredDensities, level_db: float) -> Samples:
@@ -131,9 +131,9 @@ class Equaliser:
         measured = sqrt(float(np.sum(heard.base)))
         if measured < LEAST_ANSWER * modelled:
             raise LimitExceeded(
-                f"the base moved with {measured / modelled:.1%} of what the model says, and feedback needs "
-                f"{LEAST_ANSWER:.0%}. It was ramped down and its recording kept; look at the accelerometer, "
-                "its cable and the amplifier"
+                f"the base acceleration was {measured / modelled:.1%} of the model's value; feedback needs "
+                f"{LEAST_ANSWER:.0%}. The run was ramped down and its recording kept; check the "
+                "accelerometer, its cable and the amplifier"
             )
 
 
