@@ -186,7 +186,7 @@ def test_missing_samples_are_reported_and_prevent_playback(stranger, told, tmp_p
     )
     player = FilePlayer.open(rig.model_copy(update={"daq": played}))
     player.start()
-    with pytest.raises(DataLost, match="with a hole cannot be played back"):
+    with pytest.raises(DataLost, match="missing samples cannot be played back"):
         deque(iter(lambda: player.read(5120), None), maxlen=0)
 
 

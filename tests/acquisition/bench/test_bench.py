@@ -202,7 +202,7 @@ class TestCalibration:
     def test_playback_needs_no_valid_calibration(self, laboratory):
         old = aged(laboratory, "2001-01-01")
         played = changed(old, daq={"driver": "file"})
-        with pytest.raises(ConfigurationError, match="none is named"):
+        with pytest.raises(ConfigurationError, match="names none"):
             open_bench(played, confirm_simulated)
 
 

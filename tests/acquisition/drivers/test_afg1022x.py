@@ -94,7 +94,7 @@ class TestLoad:
 
     def test_a_wrong_load_at_the_panel_is_refused_with_advice(self, panel_load):
         with pytest.raises(
-            SettingRefused, match=r"expects a load of 50 ohm.*factor of two.*high-z on its panel"
+            SettingRefused, match=r"set to a load of 50 ohm.*factor of two.*high-z on its panel"
         ):
             AFG1022X.open(panel_load.config)
         assert not panel_load.is_on
@@ -288,7 +288,7 @@ class TestFaults:
                 plugged.instrument.memory.hold(spoilt)
 
         plugged.log.after = spoil
-        with pytest.raises(SettingRefused, match=r"1024 points were put in its memory.*1023 agree"):
+        with pytest.raises(SettingRefused, match=r"1024 points were written to its memory.*1023 agree"):
             generator.load_waveform(SINE, 1.0, 0.1)
 
     @pytest.mark.parametrize(

@@ -185,7 +185,7 @@ class TestConfiguration:
     @pytest.mark.parametrize(
         ("change", "complaint"),
         [
-            (lambda rig: with_daq(rig, device="Dev9"), r"no device of that name"),
+            (lambda rig: with_daq(rig, device="Dev9"), r"no device with this name"),
             (lambda rig: with_daq(rig, product="USB-6211"), r"is a NI 9234"),
             (lambda rig: with_channel(rig, 0, physical="ai7"), r"no such channel"),
             (lambda rig: with_channel(rig, 0, range_v=50.0), r"does not support"),
@@ -205,7 +205,7 @@ class TestConfiguration:
 
 class TestFaults:
     def test_a_device_reserved_by_another_task_is_reported_as_busy(self, rig, digitizer):
-        with pytest.raises(InstrumentBusy, match=r"another program, or a task that was never closed"):
+        with pytest.raises(InstrumentBusy, match=r"in use by another program, or by a task"):
             DaqmxDigitizer.open(rig)
 
     @pytest.mark.parametrize(

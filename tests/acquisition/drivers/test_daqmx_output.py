@@ -178,7 +178,7 @@ def test_a_rate_that_the_output_would_change_is_refused_and_frees_the_output(dig
     ("physical", "changes", "kind", "said"),
     [
         ("Dev1/ao7", {}, ConfigurationError, r"Dev1/ao7 .*no such channel"),
-        ("Dev9/ao0", {}, ConfigurationError, r"Dev9/ao0 .*no device of that name"),
+        ("Dev9/ao0", {}, ConfigurationError, r"Dev9/ao0 .*no device with this name"),
         ("Dev1/ao0", {"limit_v": 5.0}, ConfigurationError, r"not support .*range.*-3\.5 to 3\.5 V"),
         ("Dev1/ao0", {"sample_rate_hz": 2e5}, ConfigurationError, r"not support a rate.*1000 to 96000"),
     ],

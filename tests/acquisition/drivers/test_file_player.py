@@ -71,7 +71,7 @@ def test_the_end_of_the_played_recording_is_reported(playing, original):
 @pytest.mark.parametrize(
     ("daq", "said"),
     [
-        ({"options": {}}, "none is named"),
+        ({"options": {}}, "names none"),
         ({"sample_rate_hz": 25600.0}, "samples a second; the configuration"),
     ],
 )

@@ -107,7 +107,7 @@ def test_an_endless_reply_is_an_error():
     with babbler() as resource:
         instrument = ScpiInstrument(lambda: open_link(resource, "@py"), "the generator")
         try:
-            with pytest.raises(InstrumentError, match=r"\*IDN\? was answered by more than 300 bytes"):
+            with pytest.raises(InstrumentError, match=r"\*IDN\? was answered with more than 300 bytes"):
                 instrument.query("*IDN?")
         finally:
             instrument.disconnect()

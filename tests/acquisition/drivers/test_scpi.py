@@ -81,7 +81,7 @@ def test_a_successful_command_leaves_an_empty_error_queue():
 def test_an_endless_error_queue_raises_an_error():
     instrument = Instrument()
     instrument.errors.extend([b'-102,"Syntax error"\n'] * 1000)
-    with pytest.raises(InstrumentError, match=r"without end"):
+    with pytest.raises(InstrumentError, match=r"still reports errors"):
         port(instrument).command("FREQ 1")
 
 
@@ -120,7 +120,7 @@ def test_every_error_of_a_lost_device_is_recognised(death, act):
     instrument = Instrument()
     instrument.answers["FREQ?"] = [b"1\n"]
     instrument.dies_with = death
-    with pytest.raises(InstrumentLost, match=r"output state is unknown"):
+    with pytest.raises(InstrumentLost, match=r"state of its output is unknown"):
         getattr(port(instrument), act)("FREQ?")
 
 

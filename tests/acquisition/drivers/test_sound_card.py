@@ -107,8 +107,8 @@ def test_a_sound_card_without_a_calibration_is_not_opened(card_rig, audio, missi
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"coupling": "DC"}, "coupled to AC"),
-        ({"iepe_current_a": 0.002}, "feeds no sensor"),
+        ({"coupling": "DC"}, "AC-coupled"),
+        ({"iepe_current_a": 0.002}, "no sensor current"),
         ({"range_v": 5.0}, "reaches 2 V"),
     ],
 )
@@ -144,7 +144,7 @@ def test_an_output_underflow_of_a_sound_card_is_reported(opened):
     bench.output.arm()
     bench.digitizer.start()
     bench.digitizer.read(4096)
-    with pytest.raises(DataLost, match="ran empty"):
+    with pytest.raises(DataLost, match="ran out of samples"):
         bench.output.write(np.zeros(600))
 
 

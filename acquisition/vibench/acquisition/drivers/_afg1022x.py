@@ -164,7 +164,7 @@ class AFG1022X(ScpiInstrument):
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each `trigger`; raises LimitExceeded on channel 2."""
         if self.channel != _BURST_CHANNEL:
-            raise LimitExceeded(f"a burst was asked of channel {self.channel}; only channel 1 has bursts")
+            raise LimitExceeded(f"a burst was requested on channel {self.channel}; use channel 1 for bursts")
         self._arm_burst(cycles)
 
     def trigger(self) -> None:
@@ -206,7 +206,7 @@ class AFG1022X(ScpiInstrument):
         raise InstrumentLost(
             f"THE OUTPUT OF {self.name} MAY STILL BE ON: it could not be switched off in "
             f"{2 * _STOP_ATTEMPTS} attempts, the last two over a new connection. Turn the amplifier's gain "
-            f"down and switch it off now; then check cable and power of the generator ({last})"
+            f"down, switch the amplifier off, then check cable and power of the generator ({last})"
         )
 
     def close(self) -> None:
@@ -258,8 +258,8 @@ class AFG1022X(ScpiInstrument):
             compared = min(points, held.size)
             same = int(np.count_nonzero(held[:compared] == codes.codes[:compared]))
             raise SettingRefused(
-                f"{self.name}: {points} points were put in its memory, and {held.size} read back, "
-                f"of which {same} agree. Upload again; if it fails again, check the USB cable"
+                f"{self.name}: {points} points were written to its memory and {held.size} were read back; "
+                f"{same} agree. Upload the waveform again; if that fails again, check the USB cable"
             )
 
     # Internal helpers
@@ -307,8 +307,8 @@ class AFG1022X(ScpiInstrument):
         maker, model, serial, firmware = (*fields, "", "", "", "")[:4]
         if self.answers.match(f"{maker},{model}") is None:
             raise InstrumentError(
-                f"{self._config.resource} answers *IDN? with {reply!r}; {self.wanted} is needed. "
-                "It was told to switch its output off; correct generator.resource in the configuration"
+                f"{self._config.resource} answers *IDN? with {reply!r}; {self.wanted} is needed. It was sent "
+                "a command to switch its output off; correct generator.resource in the configuration"
             )
         self.identity = Identity(maker, model, serial, firmware, reply)
 
@@ -332,8 +332,8 @@ class AFG1022X(ScpiInstrument):
             return ()
         because = f" ({'; '.join(complaints)})" if complaints else ""
         raise SettingRefused(
-            f"the generator expects a load of {HIGH_Z if is_open else f'{held_ohm:g} ohm'} where "
-            f"generator.load_ohm says {load}: every amplitude would be wrong, by a factor of two between 50 "
+            f"the generator is set to a load of {HIGH_Z if is_open else f'{held_ohm:g} ohm'}, but "
+            f"generator.load_ohm is {load}: every amplitude would be wrong, by a factor of two between 50 "
             f"ohm and high-Z. The output is off; set the load to {wanted} on its panel, or correct the "
             f"configuration{because}"
         )

@@ -256,12 +256,12 @@ class DaqmxDigitizer:
     def identity(self) -> Identity:
         """Product, serial number and driver version."""
         if self._identity is None:
-            raise InstrumentError(f"{self._config.device} is not open; make it with DaqmxDigitizer.open")
+            raise InstrumentError(f"{self._config.device} is not open; open it with DaqmxDigitizer.open")
         return self._identity
 
     def start_trigger(self) -> str:
-        """Return the terminal of this task's start trigger; arm other tasks with it before `start`."""
-        with daqmx_call(f"asking {self._config.device} for its start trigger"):
+        """Terminal of this task's start trigger; arm other tasks on it before `start`."""
+        with daqmx_call(f"reading the start trigger of {self._config.device}"):
             return str(self._open_task().triggers.start_trigger.term)
 
     def start(self) -> None:
@@ -304,7 +304,7 @@ class DaqmxDigitizer:
         """Number of converted samples of every channel that are not read yet."""
         if not self._is_running:
             return 0
-        with daqmx_call(f"asking {self._config.device} how many samples wait"):
+        with daqmx_call(f"reading the number of waiting samples of {self._config.device}"):
             return int(self._open_task().in_stream.avail_samp_per_chan)
 
     def stop(self) -> None:
@@ -340,9 +340,9 @@ class DaqmxDigitizer:
         self.sample_rate_hz = float(task.timing.samp_clk_rate)
         if not rate_hz * (1 - 1e-6) <= self.sample_rate_hz < _MOST_COERCED * rate_hz:
             raise SettingRefused(
-                f"{self._config.device} was set to {rate_hz:g} samples a second and takes "
-                f"{self.sample_rate_hz:g}; the next higher rate of the device was expected. It is released; "
-                "set daq.sample_rate_hz to a rate that it has"
+                f"{self._config.device} was set to {rate_hz:g} samples a second, but uses "
+                f"{self.sample_rate_hz:g}; the next higher rate was expected. The device was released; "
+                "set daq.sample_rate_hz to a rate that it supports"
             )
         task.control(TaskMode.TASK_RESERVE)
         if None in self.volts_per_count:
@@ -357,7 +357,7 @@ class DaqmxDigitizer:
         identity = daqmx_identity(self.session, self._config.device)
         if _plain(identity.model) != _plain(self._config.product):
             raise ConfigurationError(
-                f"{self._config.device} on {self.session.place} is a {identity.model}, and daq.product says "
+                f"{self._config.device} on {self.session.place} is a {identity.model}, but daq.product is "
                 f"{self._config.product!r}. Nothing was reserved; correct daq.device or daq.product"
             )
         return identity
@@ -390,8 +390,8 @@ class DaqmxDigitizer:
             came = read(target, count, count / self.sample_rate_hz + _READ_MARGIN_S)
             if came != count or target[-1, -1] == missing:
                 raise InstrumentError(
-                    f"{self._config.device} announced {came} samples where {count} were requested, or sent "
-                    "fewer than it announced. They were discarded; restart the driver or the device server"
+                    f"{self._config.device} reported {came} samples when {count} were requested, or sent "
+                    "fewer than it reported. They were discarded; restart the driver or the device server"
                 )
             if target is not rows:
                 rows[:, first : first + count] = target

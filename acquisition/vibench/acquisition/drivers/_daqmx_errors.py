@@ -30,15 +30,15 @@ class Meaning:
     advice: str
 
 
-_LOST = "samples were overwritten before they were read, so the record has a hole and ends here"
-_SLOWER = "read more often, lower the sample rate, or close what else keeps this computer busy"
-_BUSY = "another program, or a task that was never closed, holds the device"
+_LOST = "samples were overwritten before they were read, so samples are missing and the recording ends here"
+_SLOWER = "read more often, lower the sample rate, or close other programs that load this computer"
+_BUSY = "the device is in use by another program, or by a task that was never closed"
 _RELEASE = "close that program (or restart the device server, or reset the device), then open the bench again"
 _GONE = "the device cannot be reached"
 _RECONNECT = "check its cable and power, then open the bench again"
-_UNDERFLOW = "the output ran out of samples and stopped, holding its last value on some devices"
+_UNDERFLOW = "the output ran out of samples and stopped; some devices then hold the last value"
 _FEED = "write further ahead, or lower the output's sample rate"
-_CONFIGURE = "correct daq in the hardware configuration; `vibench bench list` shows what is there"
+_CONFIGURE = "correct daq in the hardware configuration; `vibench bench list` shows the connected devices"
 
 MEANINGS: dict[Code, Meaning] = {
     Code.SAMPLES_NO_LONGER_AVAILABLE: Meaning(DataLost, _LOST, _SLOWER),
@@ -63,7 +63,7 @@ MEANINGS: dict[Code, Meaning] = {
         ConfigurationError, "the device does not support a rate, range, coupling or current", _CONFIGURE
     ),
     Code.INVALID_DEVICE_ID: Meaning(
-        ConfigurationError, "the driver knows no device of that name", _CONFIGURE
+        ConfigurationError, "the driver knows no device with this name", _CONFIGURE
     ),
     Code.PHYSICAL_CHAN_DOES_NOT_EXIST: Meaning(
         ConfigurationError, "the device has no such channel", _CONFIGURE
@@ -85,8 +85,8 @@ MEANINGS: dict[Code, Meaning] = {
     Code.OUTPUT_FIFO_UNDERFLOW: Meaning(DataLost, _UNDERFLOW, _FEED),
     Code.SAMPLES_CAN_NOT_YET_BE_WRITTEN: Meaning(
         InstrumentError,
-        "the output took no more samples in time",
-        "check that the sample clock runs: the input that triggers the output must have been started",
+        "the output did not accept the next samples in time",
+        "check that the sample clock runs: the input that triggers the output must be started first",
     ),
     Code.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE: Meaning(
         InstrumentError, "the output had not finished in time", "check that the sample clock runs"
@@ -94,11 +94,11 @@ MEANINGS: dict[Code, Meaning] = {
     Code.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING: Meaning(
         InstrumentError,
         "a property was read before the device was reserved",
-        "report this: the driver is at fault",
+        "report this error: it is a fault of the driver",
     ),
     Code.INVALID_TASK: Meaning(
         InstrumentLost,
-        "the driver no longer knows the task: it, or its server, was restarted",
+        "the driver no longer knows the task: the driver or its server was restarted",
         "open the bench again",
     ),
     Code.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING: Meaning(
@@ -132,7 +132,7 @@ def daqmx_call(doing: str) -> Iterator[None]:
         # The client assumes that a reply has the requested size, known values, and an error code if it fails.
         raise InstrumentError(
             f"{doing} failed: the driver's reply cannot be used ({type(error).__name__}: {error}). Use "
-            "versions of client, driver and device server that belong together, then open the bench again"
+            "matching versions of client, driver and device server, then open the bench again"
         ) from error
 
 

@@ -97,7 +97,7 @@ class DaqmxOutput:
     def arm(self) -> None:
         """Let the output start with the inputs; call this before the digitizer's ``start``."""
         if self._task is None or self._written == 0:
-            raise InstrumentError(f"{self._physical} has nothing to play; write the first stretch, then arm")
+            raise InstrumentError(f"{self._physical} has nothing to play; write the first samples, then arm")
         with daqmx_call(f"arming {self._physical}"):
             self._task.start()
 
@@ -119,8 +119,8 @@ class DaqmxOutput:
                     task.stop()
         except InstrumentLost as error:
             raise InstrumentLost(
-                f"{error}. {self._physical} MAY STILL BE PLAYING what was written ahead, at most "
-                f"{self._config.ahead_s:g} s, and some devices then hold their last value: switch the "
+                f"{error}. {self._physical} MAY STILL BE PLAYING the samples that were written ahead, at "
+                f"most {self._config.ahead_s:g} s; some devices then hold the last value: switch the "
                 "amplifier off"
             ) from error
 
@@ -144,9 +144,9 @@ class DaqmxOutput:
             rate_hz = float(task.timing.samp_clk_rate)
             if not abs(rate_hz - config.sample_rate_hz) <= _SAME_RATE * config.sample_rate_hz:
                 raise SettingRefused(
-                    f"{physical} was set to {config.sample_rate_hz:g} samples a second and takes "
-                    f"{rate_hz:g}: every frequency would be off. It was released; set "
-                    "daq.output.sample_rate_hz to a rate that it has"
+                    f"{physical} was set to {config.sample_rate_hz:g} samples a second, but uses "
+                    f"{rate_hz:g}: every frequency would be wrong. The output was released; set "
+                    "daq.output.sample_rate_hz to a rate that it supports"
                 )
             task.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
             task.out_stream.output_buf_size = self.ahead_samples

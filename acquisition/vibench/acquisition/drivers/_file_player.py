@@ -40,7 +40,7 @@ class FilePlayer:
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
-                'a bench with daq.driver = "file" plays a recording back, and none is named; give '
+                'daq.driver = "file" plays back a recording, but the configuration names none; give '
                 'daq.options.recording = "PATH.h5"'
             )
         recording = open_recording(Path(path))
@@ -48,8 +48,8 @@ class FilePlayer:
         if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
             recording.close()
             raise ConfigurationError(
-                f"{path} is damaged ({seal.sentence}), and the new file would have an intact seal. Nothing "
-                "was played back; restore it from a copy"
+                f"{path} is damaged ({seal.sentence}), but a new file made from it would have an intact "
+                "seal. Nothing was played back; restore the recording from a copy"
             )
         channels = channels_of(rig)
         missing = [each.role.value for each in channels if each.role.value not in recording.roles]
@@ -59,17 +59,17 @@ class FilePlayer:
             recording.close()
             raise ConfigurationError(
                 f"{path} has {', '.join(recording.roles)} at {rate_hz:.12g} samples a second; the "
-                f"configuration asks for {', '.join(each.role.value for each in channels)} at "
-                f"{requested_hz:.12g}. Make them agree"
+                f"configuration has {', '.join(each.role.value for each in channels)} at "
+                f"{requested_hz:.12g}. Make channels and rate agree"
             )
         for role, units_per_volt in scales.items():
             made_with = recording.channel(role).physical_per_volt
             if abs(made_with - units_per_volt) > _SAME_SCALE * abs(made_with):
                 recording.close()
                 raise ConfigurationError(
-                    f"{path} was recorded with {made_with:.6g} units of {role} per volt, and sensor and "
-                    f"attenuation of the configuration give {units_per_volt:.6g}; copy the file of the bench "
-                    "that it was made on"
+                    f"{path} was recorded with {made_with:.6g} units of {role} per volt, but sensor and "
+                    f"attenuation of the configuration give {units_per_volt:.6g}; copy both from the bench "
+                    "on which it was recorded"
                 )
         return cls(recording, channels)
 
@@ -90,7 +90,7 @@ class FilePlayer:
         """Start playing, from the recording's first sample."""
         if not self._is_open or self._is_running:
             raise InstrumentError(
-                "the recording is closed, or playing already; open the bench again, or stop it"
+                "the recording is closed, or already playing; open the bench again, or stop playing"
             )
         self._is_running, self._next_sample = True, 0
 
@@ -107,15 +107,15 @@ class FilePlayer:
         if last > self._recording.samples:
             self._is_running = False
             raise InstrumentLost(
-                f"{self._recording.path.name} ends after {self._recording.samples} samples, and sample "
-                f"{last} was requested; play it back under the plan that it was made with"
+                f"{self._recording.path.name} ends after {self._recording.samples} samples, but sample "
+                f"{last} was requested; play it back with the plan that it was made with"
             )
         volts = np.stack([self._volts(role, first, last) for role in self.roles])
         if np.isnan(volts).any():
             self._is_running = False
             raise DataLost(
                 f"{self._recording.path.name} has lost samples between {first} and {last}; a recording with "
-                "a hole cannot be played back"
+                "missing samples cannot be played back"
             )
         self._next_sample = last
         overloads = tuple(

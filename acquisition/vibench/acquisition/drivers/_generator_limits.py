@@ -94,10 +94,10 @@ class GeneratorModel:
         self.check_frequency(Shape.SINE, sweep.start_hz)
         self.check_frequency(Shape.SINE, sweep.stop_hz)
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
-            most = f"up to {self.longest_sweep_s:g} s" if self.longest_sweep_s else "not at all"
+            most = f"sweeps at most {self.longest_sweep_s:g} s" if self.longest_sweep_s else "has no sweep"
             raise LimitExceeded(
-                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} sweeps by "
-                f"itself {most}. Nothing was sent; use sine_sweep, which steps the frequency"
+                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} {most} "
+                "by itself. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
     def codes(self, waveform: Samples) -> ArbitraryCodes:
@@ -127,8 +127,8 @@ class GeneratorModel:
         factor = float(np.max(np.abs(swing)))
         if factor <= np.finfo(np.float64).eps:
             raise LimitExceeded(
-                "the waveform is constant: without its mean nothing is left to play. Nothing was sent; "
-                "give one period that moves"
+                "the waveform is constant, and its mean value is not played. Nothing was sent; "
+                "give one period that varies"
             )
         middle = self.top_code / 2
         codes = np.clip(np.rint(middle + swing / factor * middle), 0, self.top_code).astype(np.uint16)
@@ -223,7 +223,7 @@ class NoGenerator:
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Refuse: the description of the generator has no internal sweep."""
-        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp was asked of {self.name}; nothing plays")
+        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp needs a generator; here is {self.name}")
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Accept the command, or refuse it."""
@@ -261,8 +261,8 @@ class NoGenerator:
     def _take(self, what: str) -> None:
         if not self.silently:
             raise ConfigurationError(
-                f"{what} was requested from a bench without function generator. Nothing was played; let its "
-                'analogue output play it (daq.output.plays = "tones_and_streams"), or name a generator.driver'
+                f"{what} was requested from a bench without function generator. Nothing was played; use its "
+                'analogue output (daq.output.plays = "tones_and_streams"), or set generator.driver'
             )
 
 

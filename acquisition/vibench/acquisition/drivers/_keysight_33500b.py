@@ -110,7 +110,7 @@ class Keysight33500B(AFG1022X):
         sent_mean = float(signed.mean()) / _MIDDLE
         if round(points) != signed.size or abs(mean - sent_mean) > _SAME_MEAN:
             raise SettingRefused(
-                f"{self.name}: {signed.size} points with a mean of {sent_mean:.4f} were put in its "
-                f"memory, and it tells {points:g} with {mean:.4f}. Upload again; if it fails again, check "
-                "the USB cable"
+                f"{self.name}: {signed.size} points with a mean of {sent_mean:.4f} were written to its "
+                f"memory, but it reports {points:g} points with a mean of {mean:.4f}. Upload the waveform "
+                "again; if that fails again, check the USB cable"
             )

@@ -46,8 +46,8 @@ def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: 
     peak_v = float(np.max(np.abs(volts), initial=0.0))
     if not peak_v <= limit_v:  # so that a NaN does not pass
         raise LimitExceeded(
-            f"{physical} was to play a peak of {peak_v:g} V; {limit_v:g} V are allowed here. Nothing was "
-            "written; lower the amplitude"
+            f"a peak of {peak_v:g} V was requested from {physical}; {limit_v:g} V are allowed here. Nothing "
+            "was written; lower the amplitude"
         )
     if not is_open:
         raise InstrumentError(f"{physical} is closed; open the bench again")

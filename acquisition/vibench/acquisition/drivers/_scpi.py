@@ -75,8 +75,8 @@ class ScpiInstrument:
         """Send a command; raises InstrumentError when the instrument's error queue then has an entry."""
         if complaints := self.send(message, codes):
             raise InstrumentError(
-                f"{self.name} refused {message!r}: {'; '.join(complaints)}. The setting is not in force; "
-                "correct the value, or check that this firmware knows the command"
+                f"{self.name} refused {message!r}: {'; '.join(complaints)}. The setting has no effect; "
+                "correct the value, or check that this firmware supports the command"
             )
 
     def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ class ScpiInstrument:
         found = _LEADING_NUMBER.match(reply)
         if found is None or not isfinite(number := float(found.group(1))):
             raise InstrumentError(
-                f"{self.name}: {message} was answered {reply!r}, which is not a number; try again"
+                f"{self.name}: {message} was answered with {reply!r}, which is not a number; try again"
             )
         return number
 
@@ -125,8 +125,8 @@ class ScpiInstrument:
         payload = reply[first : first + length]
         if len(payload) != length or length % 2:
             raise InstrumentError(
-                f"{self.name}: {message} announced {length} bytes and sent {len(payload)}; "
-                "an even number, complete, is needed. Upload again"
+                f"{self.name}: {message} announced {length} bytes and sent {len(payload)}; both must be "
+                "the same even number. Upload the waveform again"
             )
         return np.frombuffer(payload, dtype=">u2").astype(np.uint16)
 
@@ -145,7 +145,7 @@ class ScpiInstrument:
                 return tuple(found)
             found.append(f"{entry[2]} ({int(entry[1])})")
         raise InstrumentError(
-            f"{self.name} reports errors without end ({_LONGEST_QUEUE} read); "
+            f"{self.name} still reports errors after {_LONGEST_QUEUE} were read; "
             "switch it off and on, and open the bench again"
         )
 
@@ -193,7 +193,7 @@ class ScpiInstrument:
                 reply += self._link.read_bytes(longest + 1 - len(reply), break_on_termchar=True)
             if len(reply) > longest:
                 raise InstrumentError(
-                    f"{self.name}: {message} was answered by more than {longest} bytes; check its address, "
+                    f"{self.name}: {message} was answered with more than {longest} bytes; check its address, "
                     "switch it off and on, and open the bench again"
                 )
             self._reply_due = False
@@ -228,11 +228,11 @@ class ScpiInstrument:
             if isinstance(error, pyvisa.VisaIOError) and error.error_code == _LATE:
                 raise InstrumentError(
                     f"{self.name} did not answer {doing!r} within {self._link.timeout / 1000:g} s; "
-                    "what it does now is unknown. Check that it is not busy or on a menu, and try again"
+                    "its state is unknown. Check that it is not busy and shows no menu, and try again"
                 ) from error
             raise InstrumentLost(
-                f"{self.name} is gone: {doing!r} failed ({error}). Its output state is unknown; "
-                "check its cable and power, then open the bench again"
+                f"the connection to {self.name} is lost: {doing!r} failed ({error}). The state of its output "
+                "is unknown; check its cable and power, then open the bench again"
             ) from error
 
 
@@ -300,8 +300,8 @@ class Word:
 
 def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> SettingRefused:
     return SettingRefused(
-        f"{owner.name}: {header} was set to {sent} and reads back {got!r}: the instrument took another value "
-        "without an error. Stop, check the setting on its panel, and check that its limits allow it"
+        f"{owner.name}: {header} was set to {sent} and reads back {got!r}: the instrument uses another value "
+        "but reports no error. Stop, check the setting on its panel, and check that its limits allow it"
     )
 
 

@@ -144,18 +144,18 @@ class SoundCardDigitizer:
             card = _Card(rig, inputs, output)
         except ValueError as error:
             raise InstrumentLost(
-                f"no sound card {rig.daq.device!r} is there ({error}); name one of the system's in daq.device"
+                f"there is no sound card {rig.daq.device!r} ({error}); set daq.device to an existing one"
             ) from error
         except _sounddevice().PortAudioError as error:
             raise InstrumentError(
                 f"the sound card {rig.daq.device!r} cannot be opened at {rig.daq.sample_rate_hz:g} samples "
-                f"a second ({error}); give a rate and channels that it has, and close what else uses it"
+                f"a second ({error}); give a supported rate and channels, and close programs that use it"
             ) from error
         if not abs(card.stream.samplerate - card.rate_hz) <= _SAME_RATE * card.rate_hz:
             card.stream.close()
             raise InstrumentError(
-                f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second "
-                f"where {card.rate_hz:g} were requested; give daq.sample_rate_hz a rate that it has"
+                f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second, "
+                f"but {card.rate_hz:g} were requested; set daq.sample_rate_hz to a rate that it supports"
             )
         return cls(card, rig, channels)
 
@@ -169,7 +169,7 @@ class SoundCardDigitizer:
     def start(self) -> None:
         """Start sampling, and start playing if the output is armed."""
         if not self._is_open or self._is_running:
-            raise InstrumentError(f"{self._device} is closed, or samples already; open it, or stop it first")
+            raise InstrumentError(f"{self._device} is closed, or already sampling; open it, or stop it first")
         self._next_sample = 0
         with _portaudio(f"starting {self._device}"):
             self.card.begin()
@@ -190,9 +190,7 @@ class SoundCardDigitizer:
                     f"{self._device}: {card.failure}. Stop, and read more often or raise daq.buffer_s"
                 )
             if not came:
-                raise InstrumentLost(
-                    f"{self._device} gives no samples any more; see whether it is plugged in"
-                )
+                raise InstrumentLost(f"{self._device} delivers no more samples; check that it is plugged in")
             joined = np.concatenate(list(card.blocks), axis=1)
             card.blocks.clear()
             card.blocks.append(joined[:, samples:])
@@ -246,7 +244,7 @@ class SoundCardOutput:
         output = cls(physical, config, digitizer)
         if config.sample_rate_hz != digitizer.sample_rate_hz or config.limit_v > output._full_scale_v:
             raise ConfigurationError(
-                f"daq.output asks for {config.limit_v:g} V at {config.sample_rate_hz:g} samples a second; "
+                f"daq.output is set to {config.limit_v:g} V at {config.sample_rate_hz:g} samples a second; "
                 f"the card gives {output._full_scale_v:g} V at {digitizer.sample_rate_hz:g}, the rate of its "
                 "inputs. Lower limit_v, or give the same rate"
             )
@@ -268,7 +266,7 @@ class SoundCardOutput:
             )
             if card.ran_dry or not there_is_room:
                 raise DataLost(
-                    f"{self._physical} ran empty or stopped, and its signal has ended; begin again"
+                    f"{self._physical} ran out of samples or stopped, so its signal ended; start again"
                 )
             card.queued.append(np.asarray(volts, dtype=np.float64) / self._full_scale_v)
             card.unplayed += needed
@@ -278,7 +276,7 @@ class SoundCardOutput:
         with self._card.changed:
             if not self._card.unplayed:
                 raise InstrumentError(
-                    f"{self._physical} has nothing to play; write the first stretch, then arm"
+                    f"{self._physical} has nothing to play; write the first samples, then arm"
                 )
             self._card.is_armed = True
 
@@ -297,16 +295,16 @@ def _portaudio(doing: str) -> Iterator[None]:
     try:
         yield
     except _sounddevice().PortAudioError as error:
-        raise InstrumentLost(f"{doing} failed ({error}); see whether the card is plugged in") from error
+        raise InstrumentLost(f"{doing} failed ({error}); check that the card is plugged in") from error
 
 
 def _require_calibration(rig: Rig) -> None:
     needed = (*_NEEDED, "output_full_scale_v") if rig.daq.output is not None else _NEEDED
     if missing := [key for key in needed if key not in rig.daq.options]:
         raise ConfigurationError(
-            f"a sound card does not report volts and passes no DC: daq.options lacks {', '.join(missing)}. "
-            "Nothing was opened; play a known sine into it, measure what its output gives at full scale, and "
-            "enter them (docs/instruments.md)"
+            f"a sound card must be calibrated, but daq.options lacks {', '.join(missing)}. Nothing was "
+            "opened; record a known sine with it, measure its output voltage at full scale, and enter these "
+            "values (docs/instruments.md)"
         )
     for key in needed[1:]:
         value = rig.daq.options[key]
@@ -326,10 +324,10 @@ def _input(channel: Channel, rig: Rig) -> int:
         or channel.range_v > full_scale_v * (1 + _SAME_RATE)
     ):
         raise ConfigurationError(
-            f"{channel.role.value}: a sound card's input is coupled to AC, feeds no sensor, and reaches "
+            f"{channel.role.value}: a sound card's input is AC-coupled, gives no sensor current, and reaches "
             f"{full_scale_v:g} V here; {channel.coupling}, {1e3 * channel.iepe_current_a:g} mA and "
-            f'{channel.range_v:g} V were requested. Give coupling = "AC", a range within it, and an IEPE '
-            "supply in front"
+            f'{channel.range_v:g} V were requested. Set coupling = "AC" and a range_v within that, and use a '
+            "separate IEPE supply"
         )
     return _number(name, "in")
 

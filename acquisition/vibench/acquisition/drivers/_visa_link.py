@@ -37,7 +37,7 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
     except pyvisa.VisaIOError as error:
         if error.error_code == pyvisa.constants.StatusCode.error_resource_busy:
             raise InstrumentBusy(
-                f"{resource} is held by another program; close that program and open the bench again"
+                f"{resource} is in use by another program; close that program and open the bench again"
             ) from error
         raise _absent(resource, error) from error
     except (ValueError, OSError) as error:  # pyvisa-py reports an absent or unresponsive USB device this way
@@ -78,13 +78,13 @@ def _absent(resource: str, error: Exception) -> InstrumentLost:
     # A list of other devices would help, but a network search takes seconds, too long in an emergency.
     if _is_locked_out(resource):
         return InstrumentLost(
-            f"{resource} is on the USB bus, and this account may not use it ({error}). Copy "
+            f"{resource} is on the USB bus, but this user account may not use it ({error}). Copy "
             f"{shipped(UDEV_RULES)} to /etc/udev/rules.d, run 'udevadm control --reload' as root, and plug "
             "it in again"
         )
     return InstrumentLost(
         f"no instrument answers at {resource} ({error}). Check its power and cable, and generator.resource "
-        "in the hardware configuration; `vibench bench list` shows what can be seen"
+        "in the hardware configuration; `vibench bench list` lists the instruments found"
     )
 
 
