@@ -39,8 +39,8 @@ class Points(Labelled):
         points, noise = np.shape(self.value), np.shape(self.noise)
         if len(points) != _TABLE or noise != points[1:]:
             raise InvalidRequest(
-                f"points of shape {points} with noise of shape {noise} were given; points are of shape "
-                "(periods, 2), their noise of shape (2,)"
+                f"points of shape {points} with noise of shape {noise} were given; points must have the "
+                "shape (periods, 2), and their noise the shape (2,)"
             )
         if not np.all((np.asarray(self.noise) >= 0.0) & np.isfinite(self.noise)):
             raise InvalidRequest(
@@ -48,7 +48,7 @@ class Points(Labelled):
             )
         if not np.all(np.isfinite(self.value)):
             raise UnusableData(
-                "points contain values that are not finite; give a stretch without lost samples"
+                "points contain values that are not finite; choose a part without lost samples"
             )
 
     @property

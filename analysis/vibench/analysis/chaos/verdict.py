@@ -231,7 +231,7 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     count = len(points.value)
     if count < FEWEST:
         return _too_few(
-            f"{count} drive periods were recorded clear of the ends, and {FEWEST} are needed; dwell longer",
+            f"{count} drive periods remain without the disturbed ends, but {FEWEST} are needed; dwell longer",
             points,
             drive_hz,
         )
@@ -247,7 +247,7 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     # a transient: a decay into noise rotates about a point.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
         return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
-    return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
+    return replace(found, why=f"{found.why}; this holds for the last {len(rest.value)} drive periods only")
 
 
 def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
@@ -259,13 +259,13 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
         )
     if last.noise_level > LARGEST_NOISE:
         return _undecided(
-            f"noise is {100 * last.noise_level:.0f} % of the orbit, which is too much to see whether the "
-            "motion repeats; raise the level or use a finer range",
+            f"noise is {100 * last.noise_level:.0f} % of the orbit, too much to show that the motion "
+            "repeats; raise the level or use a finer vibrometer range",
             evidence,
         )
     period = shortest_period(last)
     if (period or math.inf) > _LOW_PERIOD and scatter_drifts(last):
-        return _undecided("the scatter about the mean point still changes; settle for longer", evidence)
+        return _undecided("the scatter of the points still changes; let the motion settle longer", evidence)
     if period is None:
         return _aperiodic(Points(last.value[-MOST_POINTS:], last.noise), evidence, seed)
     if period > 1:
@@ -312,15 +312,15 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     turns = found.turns_per_period * len(points.value)
     if slow_share(points) > SLOW or (is_curve and turns < _FEWEST_TURNS):
         return _undecided(
-            f"the motion changes slowly, by {100 * evidence.spread:.2g} % of the orbit, and less than "
-            f"{_FEWEST_TURNS:g} times in the record; record longer",
+            f"the motion varies slowly, by {100 * evidence.spread:.2g} % of the orbit, with fewer than "
+            f"{_FEWEST_TURNS:g} cycles in the record; record longer",
             evidence,
         )
     if is_curve:
         hum_hz = mains_hz(found, so_far.drive_hz, len(points.value))
         if hum_hz is not None:
             return _humming(evidence, hum_hz, None)
-        why = f"the points lie on a closed curve, {found.turns_per_period:.4f} turns a drive period"
+        why = f"the points move along a closed curve, by {found.turns_per_period:.4f} turns per drive period"
         return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
     if evidence.spread < ABOVE_NOISE * evidence.noise:
         if evidence.spread <= SMALL:
@@ -330,8 +330,8 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
             )
             return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
         return _undecided(
-            f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and the "
-            f"tests of shape need {ABOVE_NOISE:g} times; raise the level or use a finer vibrometer range",
+            f"the scatter of the points is {evidence.spread / evidence.noise:.1f} times their noise, but "
+            f"{ABOVE_NOISE:g} times are needed; raise the level or use a finer vibrometer range",
             evidence,
         )
     line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
@@ -364,8 +364,8 @@ def _verdict(
 ) -> MotionVerdict:
     if not noise_test.is_valid:
         return _undecided(
-            f"surrogates missed the spectrum by {100 * noise_test.spectrum_error:.0f} %, so linear noise "
-            "cannot be excluded; record longer",
+            f"the spectra of surrogate signals are {100 * noise_test.spectrum_error:.0f} % off, so linear "
+            "noise cannot be excluded; record longer",
             evidence,
         )
     if not noise_test.rejects_linear_noise:
@@ -382,11 +382,11 @@ def _verdict(
             evidence,
         )
     if test.k < CHAOTIC_K:
-        return _undecided(f"the 0-1 test says {test.k:.2f}, neither regular nor chaotic", evidence)
+        return _undecided(f"the 0-1 test gives {test.k:.2f}, neither regular nor chaotic", evidence)
     above = "" if evidence.noise == 0.0 else f"{evidence.spread / evidence.noise:.0f} times above the noise, "
     why = (
-        f"settled, {above}on no closed curve, 0-1 test {test.k:.3f}, and more than linear noise "
-        f"(p = {noise_test.p:.3f})"
+        f"settled points, {above}not on a closed curve; the 0-1 test gives {test.k:.3f}, and linear noise "
+        f"is excluded (p = {noise_test.p:.3f})"
     )
     return MotionVerdict(MotionKind.CHAOTIC, why, evidence)
 
@@ -396,7 +396,7 @@ def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
     if evidence.spread > SMALL:
         return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (
-        f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
-        f"(p = {noise_test.p:.2f}), although by more than the vibrometer noise"
+        f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit, like linear "
+        f"noise (p = {noise_test.p:.2f}), but more than the vibrometer noise"
     )
     return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)

@@ -154,7 +154,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     if found is None or found.point.size < FEWEST_PAIRS:
         have = 0 if found is None else found.point.size
         raise NotEnoughData(
-            f"of {count} points {have} have a neighbour that can be followed for {steps} steps, and "
+            f"{have} of {count} points have a neighbour that can be followed for {steps} steps, but "
             f"{FEWEST_PAIRS} are needed; measure longer"
         )
     logarithms = np.empty((steps + 1, found.point.size))
