@@ -72,7 +72,7 @@ def test_alternating_cells_repeat_and_changed_values_apply_to_every_cell():
     ("options", "said"),
     [
         ({"start_hz": 300.0, "stop_hz": 200.0}, "does not ascend"),
-        ({"drive": "swept"}, "goes nowhere"),
+        ({"drive": "swept"}, "has no range"),
         ({"drive": "recorded"}, "no recording was given"),
         ({"model": "rigid:0.8"}, "rigid stops"),
         ({"lengths": ()}, "at least 1 item"),
@@ -107,9 +107,9 @@ def test_stated_errors_of_lines_hold_in_95_percent():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"accuracy": "quick"}, "accuracy was given with an error or a time"),
-        ({"duration_s": 3.0}, "duration_s was given with an error or a time"),
-        ({"drive": "swept", "stop_hz": 300.0}, "needs a steady drive, not swept"),
+        ({"accuracy": "quick"}, "accuracy was given, but the error or time"),
+        ({"duration_s": 3.0}, "duration_s was given, but the error or time"),
+        ({"drive": "swept", "stop_hz": 300.0}, "is for a steady drive, not swept"),
     ],
 )
 def test_options_fixed_by_an_error_target_of_a_chain_are_refused(given, said):

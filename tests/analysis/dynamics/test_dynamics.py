@@ -52,7 +52,7 @@ def line(frequency_hz, size, multiplier, events=(), periods=1):
     ("method", "said"),
     [
         (BranchMethod.SHOOTING, "No periodic motion was found; 1.0 s."),
-        (BranchMethod.BALANCE, "No harmonic balance of at most 64 harmonics was found"),
+        (BranchMethod.BALANCE, "Harmonic balance with at most 64 harmonics found no motion"),
     ],
 )
 def test_an_empty_branch_diagram_is_explained_by_its_method(method, said):
@@ -172,7 +172,7 @@ def test_a_recorded_level_is_the_median_per_bin_in_ascending_frequency():
     assert pairs[:, 1] == pytest.approx(1e-6 * (1.0 + 100.0 / pairs[:, 0]), rel=0.03)
     few = recorded_level(np.array([100.0, 90.0, 110.0]), np.array([1e-6, 2e-6, 3e-6]))
     assert few == ((90.0, 2e-6), (100.0, 1e-6), (110.0, 3e-6))
-    with pytest.raises(NotEnoughData, match="no drive over a range"):
+    with pytest.raises(NotEnoughData, match="covers no range of frequencies"):
         recorded_level(np.full(5, 260.0), np.full(5, 1e-6))
 
 
@@ -199,7 +199,7 @@ def test_holdable_motions_are_reported_in_figure_text_table_and_json():
     loop_s = 0.1 * math.sqrt(growth_s[3] * growth_s[4])
     diagram = BranchDiagram(BranchRequest(start=100.0, stop=120.0, loop_time_s=loop_s), (FOLDED,), 1.0)
     assert diagram.holdable[0].tolist() == [True, True, True, True, False]
-    assert "1 of 2 unstable motions; the quickest takes 0.023 s" in diagram.holding_sentence
+    assert "1 of 2 unstable motions; the fastest growth takes 0.023 s" in diagram.holding_sentence
     drawn = branches_figure(diagram)
     third = drawn.figure.axes[2]
     labelled = {each.get_label(): each for each in third.get_lines()}

@@ -47,7 +47,7 @@ def test_the_recorded_level_matches_every_frequency_step(level, stepped_file):
 
 
 def test_a_dwell_has_no_level_over_frequency(dwell_file):
-    with pytest.raises(NotEnoughData, match="take a stepped sine or a sweep"):
+    with pytest.raises(NotEnoughData, match="choose a stepped sine or a sweep"):
         level_of_drive(compared(dwell_file()))
 
 

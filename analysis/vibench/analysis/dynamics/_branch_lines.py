@@ -190,7 +190,7 @@ class BranchDiagram(Labelled):
     @property
     def cost_sentence(self) -> str:
         """Return a sentence on number, error and cost of the branches."""
-        over = "" if self.is_complete else " The time was over: there may be more branches and motions."
+        over = "" if self.is_complete else " The time limit was reached: more branches may exist."
         if not self.lines:
             return f"{self._none_found}; {self.elapsed_s:.1f} s.{over}"
         isolated = sum(line.is_isolated for line in self.lines)
@@ -198,11 +198,11 @@ class BranchDiagram(Labelled):
         wanted, reached = self.request.error, ""
         if wanted is not None:
             met = sum(int(np.sum(line.error_estimate <= wanted)) for line in self.lines)
-            reached = f" {met} of {self.points} motions reached {100.0 * wanted:g} %."
+            reached = f" {met} of {self.points} motions reached an error of {100.0 * wanted:g} %."
         return (
             f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
-            f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the "
-            f"middle of the worst branch, {worst:.1g} at the worst point.{reached}{over}"
+            f"{self.elapsed_s:.1f} s; error relative to the fundamental of p: {self.largest_error:.1g} "
+            f"(median of the worst branch), {worst:.1g} (worst point).{reached}{over}"
         )
 
     @property
@@ -211,8 +211,8 @@ class BranchDiagram(Labelled):
             return "No periodic motion was found"
         harmonics = self.request.balance_options.most
         return (
-            f"No harmonic balance of at most {harmonics} harmonics was found: there is no motion of the "
-            "drive's period here, or it has more harmonics, as with impacts; use the method shooting"
+            f"Harmonic balance with at most {harmonics} harmonics found no motion: no motion has the period "
+            "of the drive, or it needs more harmonics, as with impacts; use the method shooting"
         )
 
     @property
@@ -232,10 +232,10 @@ class BranchDiagram(Labelled):
         held = sum(int((a & b).sum()) for a, b in zip(is_unstable, holdable, strict=True))
         quickest = min(float(line.growth_time_s.min()) for line in self.lines)
         text = (
-            f"A loop of {self.request.loop_time_s:.3g} s can hold motions whose deviations take "
-            f"{self.least_growth_time_s:.3g} s or more to grow by e: {held} of {count} unstable motions"
+            f"A control loop with {self.request.loop_time_s:.3g} s delay can hold motions whose deviations "
+            f"take {self.least_growth_time_s:.3g} s or more to grow by e: {held} of {count} unstable motions"
         )
-        return text + (f"; the quickest takes {quickest:.2g} s." if count else ".")
+        return text + (f"; the fastest growth takes {quickest:.2g} s." if count else ".")
 
     @property
     def least_growth_time_s(self) -> float | None:

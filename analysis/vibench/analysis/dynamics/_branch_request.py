@@ -84,7 +84,7 @@ class BranchRequest(SpecimenChoice):
     def _is_possible(self) -> Self:
         if not self.start < self.stop:
             raise ValueError(
-                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
+                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower value first"
             )
         law = self.shaken.contact
         if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
@@ -99,14 +99,14 @@ class BranchRequest(SpecimenChoice):
             )
         if self.error is not None and self.method is BranchMethod.FIRST_ORDER:
             raise ValueError(
-                f"an error of {self.error:g} was given, and one harmonic cannot be made more exact; take "
+                f"an error of {self.error:g} was given, but the error of one harmonic cannot be chosen; use "
                 "the method balance or shooting, or leave out the error"
             )
         self._refuse_other_resonances()
         pairs = self.recorded_level
         if pairs and self.along is Parameter.AMPLITUDE:
             raise ValueError(
-                "a recorded level is for branches along frequency; along amplitude give one frequency"
+                "a recorded level is for branches along frequency only; along amplitude, give one frequency"
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
@@ -117,13 +117,13 @@ class BranchRequest(SpecimenChoice):
             return
         low_hz, high_hz = self.resonance_band_hz
         if not low_hz < high_hz:
-            raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; give the lower first")
+            raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; swap the two ends")
         lower, upper = self.shaken.gaps_m
         followed = self.along, self.method, self.time_s
         if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
             raise ValueError(
-                "a phase resonance is followed along amplitude, by shooting, between two equal stops, to its "
-                "end; give a range of amplitudes, a specimen with one gap, and no time"
+                "a phase resonance is followed along amplitude, by shooting, with two equal stops and no "
+                "time limit; give a range of amplitudes and a specimen with one gap, and leave out the time"
             )
 
     @property
@@ -198,7 +198,7 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     place, level = frequency_hz[known], drive_amplitude_m[known]
     if place.size < 2 or np.ptp(place) < 1e-3 * float(place.max()):
         raise NotEnoughData(
-            "this recording holds no drive over a range of frequencies; take a stepped sine or a sweep"
+            "the drive of this recording covers no range of frequencies; choose a stepped sine or a sweep"
         )
     bins = min(MOST_BINS, place.size)
     edges = np.linspace(place.min(), place.max(), bins + 1)

@@ -182,11 +182,11 @@ class ChainAnswer(Labelled):
             return text
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
         lost = sum(run.outcome != REACHED for run in self.runs)
-        complaint = f"; {lost} did not reach their end" if lost else ""
-        exactly = f"; contacts to {self.request.accuracy.promise:g} of 100 µm and 0.1 m/s"
+        complaint = f"; {lost} runs ended early" if lost else ""
+        exactly = f"; contact errors below {self.request.accuracy.promise:g} times 100 µm and 0.1 m/s"
         if self.request.error is not None:
             met = sum(bool(np.all(run.transmission_error <= self.request.error)) for run in self.runs)
-            exactly = f"; {met} reached an error of {100.0 * self.request.error:g} %"
+            exactly = f"; {met} runs reached an error of {100.0 * self.request.error:g} %"
         return (
             f"{text} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts "
             f"observed{exactly}{complaint}."
@@ -414,7 +414,7 @@ def _bounded_rate(rate_hz: float, chain: Chain, duration_s: float) -> float:
     wanted = rate_hz * duration_s * chain.size * 2.0 * VX
     if wanted > MOST_NUMBERS:
         raise ValueError(
-            f"{chain.size} cells for {duration_s:g} s make {wanted:.2g} numbers, more than the "
-            f"{MOST_NUMBERS:.0g} that fit into memory; take fewer cells or a shorter run"
+            f"{chain.size} cells for {duration_s:g} s need {wanted:.2g} numbers, more than the "
+            f"{MOST_NUMBERS:.0g} that fit into memory; choose fewer cells or a shorter run"
         )
     return rate_hz

@@ -70,15 +70,15 @@ class ChainRequest(SpecimenChoice):
         self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(
-                f"the range {self.start_hz:g} to {self.stop_hz:g} Hz does not ascend; give the lower first, "
-                "or take a swept drive"
+                f"the range {self.start_hz:g} to {self.stop_hz:g} Hz does not ascend; give the lower "
+                "frequency first, or choose a swept drive"
             )
         if self.drive is ChainDrive.STEADY and len(self.frequencies_hz) * len(self.lengths) > MOST_RUNS:
             raise ValueError(f"more than {MOST_RUNS} runs were requested; take a larger step")
         if self.drive is ChainDrive.SWEPT and self.start_hz == self.stop_hz:
             raise ValueError(
-                f"a sweep from {self.start_hz:g} to {self.stop_hz:g} Hz goes nowhere; give two different "
-                "frequencies, or take a steady drive"
+                f"a sweep from {self.start_hz:g} to {self.stop_hz:g} Hz has no range; give two different "
+                "frequencies, or choose a steady drive"
             )
         if self.drive is ChainDrive.RECORDED and not self.recording:
             raise ValueError("no recording was given to drive the chain; give its path")
@@ -94,10 +94,10 @@ class ChainRequest(SpecimenChoice):
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:
-            raise ValueError(f"an error or a time needs a steady drive, not {self.drive}; leave it out")
+            raise ValueError(f"an error or a time is for a steady drive, not {self.drive}; leave it out")
         for name in ("accuracy", "duration_s", "settle_s"):
             if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")
+                raise ValueError(f"{name} was given, but the error or time determines it; leave {name} out")
 
     @cached_property
     def unit(self) -> Chain:
@@ -135,7 +135,7 @@ class ChainRequest(SpecimenChoice):
         names = ", ".join([self.specimen_text, *(each.name for each in self.others)])
         times = {
             ChainDrive.NONE: "",
-            ChainDrive.STEADY: f", {self.duration_s:g} s after {self.settle_s:g} s"
+            ChainDrive.STEADY: f", {self.duration_s:g} s after {self.settle_s:g} s of settling"
             if not self.has_target
             else "",
             ChainDrive.SWEPT: f", {self.duration_s:g} s long",

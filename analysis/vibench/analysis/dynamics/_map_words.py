@@ -82,10 +82,9 @@ def map_caption(results: MapResults) -> str:
     if audit is not None and audit.audited:
         share = audit.wrong_share
         sentences.append(
-            f"The others lie between neighbours that agree; {audit.audited} such cells were drawn at "
-            f"random and computed, and {audit.wrong} had another motion ({share.low:.1%} to "
-            f"{share.high:.1%} of the "
-            "filled)."
+            "The other points were filled in, because their neighbours agree. To check this, "
+            f"{audit.audited} of them were drawn at random and computed: {audit.wrong} had another motion "
+            f"({share.low:.1%} to {share.high:.1%} of the filled points)."
         )
     return " ".join(sentences)
 

@@ -50,7 +50,7 @@ class SpectrumRequest(SpecimenChoice):
     def _is_possible(self) -> Self:
         if self.start > self.stop:
             raise ValueError(
-                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
+                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower value first"
             )
         if self.points > MOST_POINTS:
             raise ValueError(
@@ -182,10 +182,10 @@ class ExponentSpectrum(Labelled):
         """Return a sentence on the points, the check of their sums, and the cost."""
         chaotic = sum(each.verdict == "chaotic" for each in self.points)
         if not self.request.is_elastic:
-            check = "the contact dissipates energy, so the sum is not known from the dampers"
+            check = "the contact dissipates energy, so the dampers alone do not set the sum of exponents"
         elif not math.isfinite(self.largest_sum_difference):
-            check = "there is no damping to compare the sums to"
+            check = "without damping, sums of exponents cannot be checked"
         else:
-            check = f"sums differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
-            check += f"{self.largest_sum_difference:.1g} at most"
+            check = f"sums of exponents differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
+            check += f"at most {self.largest_sum_difference:.1g} of this value"
         return f"{len(self.points)} points in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."

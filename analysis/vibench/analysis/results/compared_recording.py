@@ -90,7 +90,7 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
     found = drive_level(result)
     if not found:
         raise NotEnoughData(
-            f"{compared.name} has no level over a range of frequencies; take a stepped sine or a sweep"
+            f"{compared.name} has no level over a range of frequencies; choose a stepped sine or a sweep"
         )
     return found
 

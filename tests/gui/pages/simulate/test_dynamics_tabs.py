@@ -62,7 +62,7 @@ def test_branches_are_drawn_with_error_and_cost(page, wait_for):
     wait_for(lambda: not view.simulator.is_busy, 100.0)
     page.refresh()
     assert view.summary.startswith("Complete. 1 branches")
-    assert "of the fundamental of p" in view.summary
+    assert "relative to the fundamental of p" in view.summary
     first, _ = view.picture.plots(Parameter.FREQUENCY)
     (drawn,) = lines(first)
     assert drawn.getOriginalDataset()[0][0] == pytest.approx(60.0)
@@ -116,7 +116,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
     upper, lower = view.picture.plots(Parameter.FREQUENCY)
     assert len(lines(upper)) == 12  # six exponents, each with the band of its interval
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
-    assert "2 chaotic; sums differ from the dampers'" in view.summary
+    assert "2 chaotic; sums of exponents differ from the dampers'" in view.summary
     assert not view._compare.isEnabled()
 
 
