@@ -84,9 +84,9 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folde
     ("arguments", "said"),
     [
         (("export", "run.h5", "--to", "csv", "--channels", "x"), "has no channel 'x'; it has m0_velocity"),
-        (("export", "run.h5", "--to", "mat", "--results"), "no analysis has saved a result"),
-        (("export", "run.h5", "--to", "csv", "--from", "3"), "goes from 0 to 2 s"),
-        (("export", "run.h5", "--to", "csv", "--from", "nan"), "nan s to the end was requested; run.h5 goes"),
+        (("export", "run.h5", "--to", "mat", "--results"), "contains no saved results"),
+        (("export", "run.h5", "--to", "csv", "--from", "3"), "has 0 to 2 s"),
+        (("export", "run.h5", "--to", "csv", "--from", "nan"), "nan s to the end was requested; run.h5 has"),
         (("export", "run.h5", "--to", "csv", "--from", "-inf"), "-inf s to the end was requested"),
         (("export", "run.h5", "--to", "csv", "--until", "nan"), "the beginning to nan s was requested"),
         (("export", "run.h5", "--to", "uff", "--spectra", "--until", "inf"), "to inf s was requested"),

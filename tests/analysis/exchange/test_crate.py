@@ -54,7 +54,7 @@ def test_links_out_of_the_folder_are_not_published(folder, tmp_path):
     """In a folder that was received, it may be a private key of whoever packs it."""
     (tmp_path / "private").write_text("a key")
     (folder / "notes.txt").symlink_to(tmp_path / "private")
-    with pytest.raises(InvalidRequest, match="leads out of the folder"):
+    with pytest.raises(InvalidRequest, match="outside of the folder"):
         pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE), {})
     assert not (tmp_path / "crate.zip").exists()
 
@@ -67,7 +67,7 @@ def test_a_crate_is_never_overwritten(folder, crate):
 def test_an_invalid_deposit_is_refused(folder, tmp_path):
     with pytest.raises(InvalidRequest, match="is not the address of a licence"):
         pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"), {})
-    with pytest.raises(InvalidRequest, match="without a name"):
+    with pytest.raises(InvalidRequest, match="without the name"):
         pack_folder(
             folder, tmp_path / "x.zip", CrateFacts(LICENCE, organisation_url="https://example.org"), {}
         )

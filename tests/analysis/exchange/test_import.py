@@ -217,7 +217,7 @@ def test_more_bits_than_a_wav_file_states_are_refused(tmp_path):
         (tmp_path / f"{name}.wav").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
     _, values = imported(tmp_path / "left.wav", meaning)
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
-    with pytest.raises(UnusableData, match="states 24 bits, and its samples have more"):
+    with pytest.raises(UnusableData, match="states 24 bits per sample, but its samples have more"):
         imported(tmp_path / "right.wav", meaning)
 
 
@@ -412,9 +412,9 @@ def test_an_imported_recording_names_its_source(tmp_path):
         ("started_utc = 2026-03-01T12:00:00Z", "", "started_utc is missing"),
         ("2026-03-01T12:00:00Z", "2026-03-01T12:00:00", "started_utc.*time zone"),
         ("frequency_hz = 260", "frequency = 260", "frequency is not a known key"),
-        ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert it by scale"),
-        ('role = "m0_velocity"', 'role = "other"', "needs a quantity and a unit"),
-        ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = 0', "leaves nothing"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert the numbers by scale"),
+        ('role = "m0_velocity"', 'role = "other"', "needs quantity and unit"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = 0', "all values would be 0"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = "100 mV/g"', "such as '250 mm/s/V'"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = "4 V/m/s"', "two ways"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = true', "number"),
@@ -435,7 +435,7 @@ def test_an_unsuitable_mapping_is_refused_without_leftovers(tmp_path):
     refusals = [
         ([("w", "m0_velocity", "")], DWELL, r"no channel 'w'; it has '/short' \(short\), '/x/v' \(v\)"),
         ([("v", "m0_velocity", "")], DWELL, "several channels 'v'"),
-        ([("/x/v", *one[1:]), ("/short", "drive_voltage", "")], DWELL, "differ in their numbers of samples"),
+        ([("/x/v", *one[1:]), ("/short", "drive_voltage", "")], DWELL, "have different numbers of samples"),
         ([("/x/v", *one[1:])], DWELL.replace("sample_rate_hz = 8000.0\n", ""), "give sample_rate_hz"),
         ([("/x/v", *one[1:])], "begins_s = 7.0\n" + DWELL, "no part of the plan begins within the 7.5 s"),
     ]
@@ -447,7 +447,7 @@ def test_an_unsuitable_mapping_is_refused_without_leftovers(tmp_path):
 
 def test_a_sampling_rate_far_from_the_rate_in_the_file_is_refused(tmp_path):
     wavfile.write(tmp_path / "a.wav", 44_100, signals()[0].astype(np.float32))
-    with pytest.raises(InvalidRequest, match="says 44100 samples/s, and the mapping 8000"):
+    with pytest.raises(InvalidRequest, match="states 44100 samples/s, but the mapping 8000"):
         import_recording(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")), tmp_path / "b.h5")
 
 
@@ -469,7 +469,7 @@ def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading,
     if rate_hz == RATE_HZ:
         assert imported(tmp_path / "a.csv", meaning)[0].sample_rate_hz == RATE_HZ
         return
-    with pytest.raises(InvalidRequest, match=r"a\.csv says .* samples/s, and the mapping 8000; correct"):
+    with pytest.raises(InvalidRequest, match=r"a\.csv states .* samples/s, but the mapping 8000; correct"):
         imported(tmp_path / "a.csv", meaning)
     assert not (tmp_path / "made.h5").exists()
 
@@ -480,10 +480,10 @@ def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading,
         (
             "  1.95313E-05",
             "s",
-            "says about 51200 samples/s, and the mapping 8000; correct the mapping, or export",
+            "states about 51200 samples/s, but the mapping 8000; correct the mapping, or export",
         ),
         ("  1.25000D-04", "s", None),
-        ("  2.00000E-01", "ms", "says about 5000 samples/s"),
+        ("  2.00000E-01", "ms", "states about 5000 samples/s"),
         ("  2.00000E-01", "r", "has an axis in 'r' with steps of 0.2"),
         ("  0.00000E+00", "s", None),
         ("             ", "s", None),
@@ -512,7 +512,7 @@ def test_a_rate_that_contradicts_a_vibench_export_is_refused(known, tmp_path, to
     source = "m0_velocity.values" if to is Format.MAT else "m0_velocity"
     for each in (path, known.path):
         meaning = mapping(tmp_path, (source if each is path else "/m0_velocity", "m0_velocity", ""))
-        with pytest.raises(InvalidRequest, match="says 51200 samples/s, and the mapping 8000"):
+        with pytest.raises(InvalidRequest, match=r"states .* samples/s, but the mapping 8000"):
             imported(each, meaning, tmp_path / "made.h5")
 
 
@@ -545,31 +545,31 @@ def hdf5_bytes(kept):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.wav", wav_bytes(2, 245), "announces 400 bytes of samples, and 201 follow"),
-        ("a.wav", wav_bytes(2, 248), "announces 400 bytes of samples, and 204 follow"),
-        ("a.wav", wav_bytes(3, 245), "announces 600 bytes of samples, and 201 follow"),
-        ("a.wav", wav_bytes(2, 44), "announces 400 bytes of samples, and 0 follow"),
-        ("a.wav", wav_bytes(2, 30), "announces 16 bytes about its samples, and 10 follow"),
+        ("a.wav", wav_bytes(2, 245), "states 400 bytes of samples, but contains 201"),
+        ("a.wav", wav_bytes(2, 248), "states 400 bytes of samples, but contains 204"),
+        ("a.wav", wav_bytes(3, 245), "states 600 bytes of samples, but contains 201"),
+        ("a.wav", wav_bytes(2, 44), "states 400 bytes of samples, but contains 0"),
+        ("a.wav", wav_bytes(2, 30), "states 16 bytes about its samples, but contains 10"),
         ("a.wav", wav_bytes(2, 36), "it ends before its samples"),
         ("a.uff", {"kept": 1000}, "it ends inside a dataset"),
         (
             "a.uff",
             {"old": b"58b     1     2", "new": b"58b     x     2"},
-            "'x' stands where a whole number belongs",
+            "a dataset 58 has 'x'",
         ),
         ("a.uff", {"old": b"58b     1", "new": b"58b     7"}, "its byte order is 7"),
         (
             "a.uff",
             {"old": b"         4       512", "new": b"         4          "},
-            "'' stands where a whole number",
+            "a dataset 58 has ''",
         ),
-        ("a.h5", hdf5_bytes(9000), r"announces \d+ bytes, and 9000 are there"),
-        ("a.csv", b"a,b\n1,2\n3,x\n", "line 3 holds 'x' where a number belongs"),
-        ("a.csv", b"a,b\n1,2\n\n3,\n", "line 4 holds '' where a number belongs"),
+        ("a.h5", hdf5_bytes(9000), r"has 9000 of \d+ bytes"),
+        ("a.csv", b"a,b\n1,2\n3,x\n", "line 3 contains 'x' instead of a number"),
+        ("a.csv", b"a,b\n1,2\n\n3,\n", "line 4 contains '' instead of a number"),
         (
             "a.csv",
             b"a;b\n1,5;2\n3;4\n3\n",
-            "line 4 has another number of columns than line 2: 1 instead",
+            "line 4 and line 2 have different numbers of columns: 1 instead",
         ),
     ],
 )
@@ -597,7 +597,7 @@ def test_an_unknown_unit_in_a_heading_is_not_taken_as_si(tmp_path, heading):
     text = "".join(f"{number / 8000:.6f};{number % 7}\n" for number in range(40_000))
     (tmp_path / "a.csv").write_text(f"time / s;{heading}\n{text}")
     with pytest.raises(
-        InvalidRequest, match=r"m0_velocity is in '.*' in the file, and the recording needs 'm s-1'"
+        InvalidRequest, match=r"m0_velocity is in '.*' in the file, but the recording needs 'm s-1'"
     ):
         imported(tmp_path / "a.csv", mapping(tmp_path, ("2", "m0_velocity", "")))
 
@@ -607,7 +607,7 @@ def test_zero_bytes_in_a_table_are_explained(tmp_path, encoding):
     text = "Zeit [s];v [m/s]\n" + "".join(f"{0.001 * number:.3f};1\n" for number in range(20))
     (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0\0\0")
     with (
-        pytest.raises(UnusableData, match=r"zero bytes|no line of numbers"),
+        pytest.raises(UnusableData, match=r"zero bytes|lines contains numbers only"),
         opened_source(tmp_path / "a.csv"),
     ):
         pass
@@ -632,12 +632,12 @@ def test_a_csv_heading_may_be_in_any_common_encoding(tmp_path, encoding):
     [
         ("a.pkl", b"\x80\x04", "cannot be imported"),
         ("a.npy", b"\x93NUMPY", "cannot be imported"),
-        ("a.h5", b"text", "is no HDF5 file"),
+        ("a.h5", b"text", "is not an HDF5 file"),
         ("a.mat", b"MATLAB 5.0 MAT-file", "is damaged, or not what its suffix says"),
-        ("a.csv", b"a,b\nc,d\n", "no line of numbers"),
+        ("a.csv", b"a,b\nc,d\n", "lines contains numbers only"),
         ("a.wav", b"RIFF\x00\x00", "is damaged, or not what its suffix says"),
         ("a.uff", b"    -1\n    58b     1     2\n", "is damaged, or not what its suffix says"),
-        ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
+        ("a.unv", b"    -1\n   164\n    -1\n", "contains no real samples over time"),
     ],
 )
 def test_a_file_with_a_wrong_suffix_gives_a_one_sentence_error(tmp_path, name, content, said):
@@ -649,7 +649,7 @@ def test_a_file_with_a_wrong_suffix_gives_a_one_sentence_error(tmp_path, name, c
 def test_an_invalid_tdms_file_gives_a_one_sentence_error(tmp_path):
     pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
     (tmp_path / "a.tdms").write_bytes(b"nothing of the kind")
-    with pytest.raises(UnusableData, match="is no TDMS file"), opened_source(tmp_path / "a.tdms"):
+    with pytest.raises(UnusableData, match="is not a TDMS file"), opened_source(tmp_path / "a.tdms"):
         pass
 
 
@@ -819,7 +819,7 @@ def test_a_universal_file_keeps_the_mark_of_simulated_samples(known, tmp_path, s
 def test_a_mapping_cannot_declare_simulated_samples_real(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head = 'origin = "real"\n' + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("= 1,", "= 0,")
-    with pytest.raises(InvalidRequest, match=r"says origin = 'real', and a\.uff that it is simulated"):
+    with pytest.raises(InvalidRequest, match=r"has origin = 'real', but a\.uff states simulated"):
         import_recording(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head), tmp_path / "b.h5")
 
 
@@ -831,7 +831,7 @@ def test_a_text_with_fewer_numbers_than_declared_is_refused(known, tmp_path):
     lines[place + 7] = lines[place + 7][:10] + b"   2508876" + lines[place + 7][20:]
     numbers = b"\n".join(b"%20.11E" % each for each in range(42))
     path.write_bytes(b"\n".join(lines[: place + 12]) + b"\n" + numbers + b"\n    -1\n")
-    refused = pytest.raises(UnusableData, match=r"announces 2508876 numbers, and has room for \d+")
+    refused = pytest.raises(UnusableData, match=r"states 2508876 numbers, but contains at most \d+")
     with refused, opened_source(path):
         pass
 

@@ -69,7 +69,7 @@ def test_parts_after_the_end_of_the_file_are_left_out():
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ([(1, 2), (3, 4), (5, 6), (7, 8)], "4 parts are given, and the plan of m has 3"),
+        ([(1, 2), (3, 4), (5, 6), (7, 8)], "4 parts are given, but the plan of m has 3"),
         ([(1, 3), (2, 4)], "in the order of time"),
         ([(11, 12)], "no part of the plan begins within the 10 s"),
         ([(1e307, 1e308)], "no part of the plan begins within the 10 s"),

@@ -79,7 +79,7 @@ def test_dates_and_times_in_any_format_determine_sample_positions(tmp_path, form
 
 def test_a_record_continued_on_the_next_day_is_refused(tmp_path):
     clock = [f"0{1 + k // 2000}.03.2026 12:00:{TIMES[k]:09.6f}" for k in range(TIMES.size)]
-    with pytest.raises(InvalidRequest, match="intervals and"):
+    with pytest.raises(InvalidRequest, match="sample intervals, but only"):
         imported(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";"))
 
 
@@ -87,7 +87,7 @@ def test_a_record_continued_on_the_next_day_is_refused(tmp_path):
 def test_thousands_separators_in_numbers_are_refused(tmp_path, sign):
     volts, base, velocity = signal(TIMES)
     grouped = [f"{round(1e3 * each):,d}".replace(",", sign) for each in base]
-    with pytest.raises(UnusableData, match="seems to be one of thousands"):
+    with pytest.raises(UnusableData, match="seems to group thousands"):
         imported(text(tmp_path / "a.csv", "t;u;a;v", (TIMES, volts, grouped, velocity), ";"))
 
 
@@ -125,7 +125,7 @@ def test_comments_and_fortran_numbers_are_read_and_a_stated_rate_is_compared(tmp
     cells = [[f"{each:.9E}".replace("E", "D") for each in row] for row in (TIMES, *signal(TIMES))]
     cells[0][2000] = f"# marker\n{cells[0][2000]}"
     is_right(imported(text(tmp_path / "a.txt", "t u a v", cells, " ")))
-    with pytest.raises(InvalidRequest, match="says 4096 samples/s"):
+    with pytest.raises(InvalidRequest, match="states 4096 samples/s"):
         imported(text(tmp_path / "b.txt", "Data recorded at 4096 Hz\nu a v", cells[1:], " "))
 
 
@@ -152,7 +152,7 @@ def test_units_and_rates_stored_beside_matlab_matrices_are_used(tmp_path):
     names = ("data#1", "data#2", "data#3")
     is_right(imported(tmp_path / "a.mat", names))
     savemat(tmp_path / "b.mat", {**content, "Ts": 1 / 4096})
-    with pytest.raises(InvalidRequest, match="says 4096 samples/s"):
+    with pytest.raises(InvalidRequest, match="states 4096 samples/s"):
         imported(tmp_path / "b.mat", names)
 
 
@@ -167,7 +167,7 @@ def hdf5(path, columns, **facts):
 def test_ambiguous_scales_and_times_in_hdf5_are_refused(tmp_path):
     columns = dict(zip("uav", signal(TIMES), strict=True))
     names = ("/u", "/a", "/v")
-    with pytest.raises(InvalidRequest, match=r"says gain = 0\.01 for /u"):
+    with pytest.raises(InvalidRequest, match=r"states gain = 0\.01 for /u"):
         imported(hdf5(tmp_path / "a.h5", columns, gain=0.01), names)
     times = {f"x{k}": TIMES + k * LATE / RATE_HZ for k in range(2)}
     with pytest.raises(InvalidRequest, match="has different times in /x0, /x1"):
@@ -274,7 +274,7 @@ def test_a_time_increment_is_read_in_its_stated_unit(tmp_path, suffix, name):
 def test_channel_start_times_that_cannot_be_compared_are_refused(tmp_path, suffix, facts):
     imported_with = with_facts(tmp_path, suffix, signal(TIMES), facts)
     with pytest.raises(
-        InvalidRequest, match=r"(give delay_s|states when some channels start).*time = \"even\""
+        InvalidRequest, match=r"(give delay_s|states the start of some channels).*time = \"even\""
     ):
         imported_with()
     if "t0" not in facts[2]:
@@ -313,7 +313,7 @@ def test_units_at_the_end_of_a_universal_file_apply_to_its_functions(tmp_path):
 @pytest.mark.parametrize("suffix", [".h5", ".mat"])
 @pytest.mark.parametrize(
     ("fact", "numbers", "said"),
-    [("t0", (0, 0, 0.0025), "several values of t0"), ("gain", (1.0, 0.1, 10.0), "gain = 1, 0.1, 10")],
+    [("t0", (0, 0, 0.0025), "several different values"), ("gain", (1.0, 0.1, 10.0), "gain = 1, 0.1, 10")],
 )
 def test_several_starts_or_gains_of_one_table_are_refused(tmp_path, suffix, fact, numbers, said):
     facts = {fact: np.array(numbers, dtype=float)}

@@ -271,7 +271,7 @@ def test_a_mapping_may_override_file_times_and_the_recording_notes_it(tmp_path):
         import_recording(path, validated(content, ImportMapping, "t"), tmp_path / "a.h5")
     ) as made:
         (remark,) = made.bench["imported"]["time"]
-    assert remark.startswith("the mapping's 5120 samples/s replace what the file says")
+    assert remark.startswith("the mapping's 5120 samples/s replace the times of the file")
 
 
 def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more=""):
@@ -375,7 +375,7 @@ def test_rounded_times_are_not_counted_as_lost_samples(tmp_path, rate_hz, digits
         f"{first + t:.{digits}f};{x:.9g};{2 * x:.9g}\n" for t, x in zip(times, motion(times), strict=True)
     )
     (tmp_path / "a.csv").write_text("time [s];a;b\n" + "".join(rows))
-    with pytest.raises(InvalidRequest, match="does not say its sample rate exactly"):
+    with pytest.raises(InvalidRequest, match="does not state its sample rate exactly"):
         import_recording(tmp_path / "a.csv", mapped("csv", None), tmp_path / "made.h5")
     with open_recording(
         import_recording(tmp_path / "a.csv", mapped("csv", rate_hz), tmp_path / "made.h5")
@@ -425,7 +425,7 @@ def test_samples_between_segments_of_a_tdms_file_count_as_lost(tmp_path, fact, a
 )
 def test_tdms_segments_without_a_consistent_time_axis_are_refused(tmp_path, more):
     restarted_tdms(tmp_path / "a.tdms", more, 7001)
-    with pytest.raises(InvalidRequest, match=r"samples/s|starts again|go back|intervals and"):
+    with pytest.raises(InvalidRequest, match=r"samples/s|has a new start|go back|intervals, but only"):
         import_recording(tmp_path / "a.tdms", mapped("tdms", RATE_HZ), tmp_path / "made.h5")
 
 
@@ -442,7 +442,7 @@ def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
                 savemat(file, {"t": times / RATE_HZ, "a": motion(times), "b": motion(times)}, format=form)
         meaning = mapped("h5", RATE_HZ).model_dump()
         meaning["channels"][0]["source"], meaning["channels"][1]["source"] = "a", "b"
-        with pytest.raises(UnusableData, match="several variables of one name"):
+        with pytest.raises(UnusableData, match="several variables of the same name"):
             import_recording(path, validated(meaning, ImportMapping, "test"), tmp_path / "made.h5")
 
 

@@ -97,11 +97,11 @@ def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     axis = next((unit for name, unit in units.items() if _AXIS_UNIT.fullmatch(name)), "")
     rates_hz = list(_rates_hz(facts, units, axis))
     other = next((each for each in rates_hz if not agrees(each, (rates_hz[0], rates_hz[0]))), None)
-    trouble = "" if other is None else f"says {rates_hz[0]:.9g} and {other:.9g} samples/s"
+    trouble = "" if other is None else f"states both {rates_hz[0]:.9g} and {other:.9g} samples/s"
     for name, value in facts:
         is_of_times = any(form.fullmatch(name.strip()) for form in (_RATE, _INTERVAL, _START))
         if is_of_times and _are_several(value) and len({*np.ravel(value)}) > 1:
-            trouble = f"states several values of {name}"
+            trouble = f"states several different values of {name}"
     if axis.casefold() not in SECONDS:
         trouble = f"has an axis in {axis!r} instead of times"
     return {
@@ -255,7 +255,7 @@ class TimeAxis:
             unit, bounds = next(((a, b) for a, b in units.items() if b and agrees(rate, b)), (unit, bounds))
         second = SECONDS[unit.casefold()]
         if rate is not None and bounds is not None and not agrees(rate, bounds):
-            trouble = f"says {rate:.9g} samples/s, and its times say {sum(bounds) / 2:.9g}"
+            trouble = f"states {rate:.9g} samples/s, but its times give {sum(bounds) / 2:.9g}"
         is_exact = bounds is not None and self.uncertainty == 0
         return replace(
             channel,
@@ -367,8 +367,8 @@ class _Scan:
         trouble = self._trouble or _impossible(self._runs, self._samples, span)
         if not trouble and spread > allowed:
             trouble = (
-                f"has times up to {spread / interval:.3g} sample intervals off an even axis, and no "
-                "whole number of lost samples explains that"
+                f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis, which "
+                "lost samples do not explain"
             )
         is_exact = spread < EVEN * interval
         if is_exact:
@@ -382,9 +382,9 @@ class _Scan:
 
 def _impossible(runs: list[tuple[int, int]], samples: int, span: float) -> str:
     if len(runs) > MOST_RUNS:
-        return f"has times that jump more than {MOST_RUNS} times"
+        return f"has more than {MOST_RUNS} jumps in its times"
     if span > _LONGEST_PAUSE * samples:
-        return f"has times for {span:.3g} intervals and {samples} samples"
+        return f"has times that span {span:.3g} sample intervals, but only {samples} samples"
     return ""
 
 
@@ -417,7 +417,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
         if back > _MOST_REPEATED:
             raise InvalidRequest(
                 f"the times of {channel.name} go back by {back} samples at its sample {first}, as if two "
-                'records were joined; export each by itself, or give time = "even" to ignore the times'
+                'records were joined; export each record alone, or give time = "even" to ignore the times'
             )
         while back and kept and kept[-1].end > place:
             last = kept.pop()
@@ -440,7 +440,7 @@ def restarts(
         if start_s == before_s or abs(place - sample - runs[-1][1] + runs[-1][0]) < _PLACED:
             continue
         if not abs(place - np.rint(place)) <= _PLACED:
-            return (), f"starts again at sample {sample}, {place:.3f} sample intervals after its first start"
+            return (), f"has a new start at sample {sample}, {place:.3f} sample intervals after its first one"
         runs.append((sample, round(place)))
     return tuple(runs), _impossible(runs, samples, runs[-1][1] + samples - runs[-1][0])
 
@@ -489,12 +489,12 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
     if len(lengths) > 1 and not any(offsets) and not any(len(each.runs) > 1 for each in placed):
         counts = ", ".join(f"{each.name} {each.samples}" for each in placed)
         raise InvalidRequest(
-            f"the channels of {path.name} differ in their numbers of samples ({counts}), and those of a "
-            "recording share one clock; choose channels of one length"
+            f"the channels of {path.name} have different numbers of samples ({counts}), but a recording "
+            "needs one clock; choose channels of the same length"
         )
     places = min(each[-1].end for each in cut)
     if places <= max(each[0].place for each in cut):
-        raise InvalidRequest(f"the channels of {path.name} were recorded one after the other; choose others")
+        raise InvalidRequest(f"the channels of {path.name} do not overlap in time; choose channels that do")
     for each, offset, own in zip(placed, offsets, cut, strict=True):
         if offset:
             remarks[f"{each.name} starts {offset / rate_hz:.6g} s after the first channel"] = None
@@ -518,10 +518,10 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
             start = f", starts at {each.start_s:.9g} s" if each.start_s else ""
             trouble = f", {each.time_trouble}" if each.time_trouble else ""
             text = f"{rate_text}{start}{runs}{trouble}"
-            yield f"the mapping's {given:.9g} samples/s replace what the file says ({text})"
+            yield f"the mapping's {given:.9g} samples/s replace the times of the file ({text})"
         elif each.time_unit is not None and mapping.time_unit not in {None, each.time_unit}:
             text = each.time_unit or "no unit"
-            yield f"times are in {mapping.time_unit} according to the mapping; the file says {text}"
+            yield f"times are in {mapping.time_unit} according to the mapping; the file states {text}"
         elif each.time_unit == "" and given is not None:
             unit = _with_unit(each, mapping).time_unit
             if unit:
@@ -562,7 +562,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
     longest = max(each.samples for each in channels)
     given = mapping.sample_rate_hz
     if given is None and (not rates_hz or not _same(rates_hz, longest)):
-        why = "does not say its sample rate exactly" if not rates_hz else "says several sample rates"
+        why = "does not state its sample rate exactly" if not rates_hz else "states several sample rates"
         raise InvalidRequest(f"{path.name} {why}; give sample_rate_hz in the mapping")
     rate = given if given is not None else rates_hz[0]
     for each in channels:
@@ -571,7 +571,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
             rate_text = f"about {(low + high) / 2:.5g}" if each.sample_rate_hz is None else f"{low:.9g}"
             way = "export the file again" if each.sample_rate_hz is None else "leave its sample_rate_hz out"
             raise InvalidRequest(
-                f"{path.name} says {rate_text} samples/s, and the mapping {rate:.9g}; correct the mapping, "
+                f"{path.name} states {rate_text} samples/s, but the mapping {rate:.9g}; correct the mapping, "
                 f"or {way}; or {_IGNORE}"
             )
         highest_hz = mapping.measurement.excitation.band_hz[1]
@@ -582,8 +582,8 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
             )
     if not _same(rates_hz, longest):
         raise InvalidRequest(
-            f"{path.name} says {rates_hz[0]:.9g} and {rates_hz[-1]:.9g} samples/s for channels that belong "
-            f"together: they drift apart; export them on one clock, or {_IGNORE}"
+            f"{path.name} states {rates_hz[0]:.9g} and {rates_hz[-1]:.9g} samples/s for different channels, "
+            f"which drift apart; export them with one clock, or {_IGNORE}"
         )
     return rate
 
@@ -604,7 +604,7 @@ def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping
             said = ", ".join(f"{name} = {shortened(value)}" for name, value in differing)
             raise InvalidRequest(
                 f"{path.name} states {said} for {first.name} and {each.name}, which may shift their times; "
-                f"give delay_s of both in the mapping, or {_IGNORE}"
+                f"give delay_s of both channels in the mapping, or {_IGNORE}"
             )
 
 
@@ -618,12 +618,12 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
         return [0.0 for _ in channels]
     if unknown:
         raise InvalidRequest(
-            f"{path.name} states when some channels start, but not {', '.join(unknown)}; choose "
-            f"channels of one kind, or {_IGNORE}"
+            f"{path.name} states the start of some channels, but not of {', '.join(unknown)}; choose "
+            f"channels that all state it or all do not, or {_IGNORE}"
         )
     if max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels)) * rate_hz > _APART:
         raise InvalidRequest(
-            f"the channels of {path.name} start at different times, with too few digits to align them; "
-            f"export them with one start, or {_IGNORE}"
+            f"the channels of {path.name} start at different times, stated with too few digits to align "
+            f"them; export them with the same start, or {_IGNORE}"
         )
     return [(each.start_s - min(known)) * rate_hz for each in channels if each.start_s is not None]

@@ -85,8 +85,8 @@ def pack_folder(
     outside = [each for each in paths if not each.resolve().is_relative_to(folder.resolve())]
     if outside:
         raise InvalidRequest(
-            f"{outside[0]} leads out of the folder, to {outside[0].resolve()}, which would be published "
-            "with it; nothing was packed. Replace it by a copy if it belongs here, or remove it"
+            f"{outside[0]} is a link to {outside[0].resolve()}, outside of the folder, which would also be "
+            "published; nothing was packed. Replace the link by a copy of the file, or remove it"
         )
     entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):
@@ -108,18 +108,18 @@ def pack_folder(
 def _require_addresses(facts: CrateFacts) -> None:
     if not facts.licence.startswith(_SCHEMES):
         raise InvalidRequest(
-            f"{facts.licence!r} is not the address of a licence; nothing was packed, give one like "
+            f"{facts.licence!r} is not the address of a licence; nothing was packed. Give an address such as "
             "https://creativecommons.org/licenses/by/4.0/"
         )
     if facts.organisation_url and not facts.organisation:
         raise InvalidRequest(
-            f"{facts.organisation_url} is the page of an organisation without a name; nothing was packed, "
-            "give its name too"
+            f"{facts.organisation_url} was given without the name of the organisation; nothing was packed. "
+            "Give its name too"
         )
     if facts.organisation_url and not facts.organisation_url.startswith(_SCHEMES):
         raise InvalidRequest(
-            f"{facts.organisation_url!r} is not the address of an organisation; nothing was packed, give one "
-            "like https://ror.org/03yrm5c26"
+            f"{facts.organisation_url!r} is not the address of an organisation; nothing was packed. Give an "
+            "address such as https://ror.org/03yrm5c26"
         )
 
 

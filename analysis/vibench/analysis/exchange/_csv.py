@@ -228,8 +228,8 @@ def _require_decimals(place: int, cells: Sequence[str]) -> None:
     whole = next((each for each in cells if each.lstrip("+-0").isdigit()), "")
     if whole and all(GROUPED.fullmatch(each) for each in marked):
         raise ValueError(
-            f"column {place + 1} holds {whole!r} and {marked[0]!r}, whose separator seems to be one of "
-            "thousands; write numbers without these"
+            f"column {place + 1} contains {whole!r} and {marked[0]!r}, whose separator seems to group "
+            "thousands; write numbers without thousands separators"
         )
 
 
@@ -247,7 +247,7 @@ def _encoding(path: Path) -> str:
         return "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"
     if max(zeros) > 0.0:
         raise ValueError(
-            "it has zero bytes, so it is no text in UTF-8, UTF-16 or Latin-1; export it as UTF-8"
+            "it contains zero bytes, so it is not text in UTF-8, UTF-16 or Latin-1; export it as UTF-8"
         )
     try:
         head.decode("utf-8")
@@ -264,12 +264,12 @@ def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
         cells = layout.cells(line)
         if len(cells) != layout.columns:
             return (
-                f"line {number} has another number of columns than line {first + 1}: "
+                f"line {number} and line {first + 1} have different numbers of columns: "
                 f"{len(cells)} instead of {layout.columns}"
             )
         for cell in cells:
             if not _are_numbers([cell]):
-                return f"line {number} holds {cell.strip()!r} where a number belongs"
+                return f"line {number} contains {cell.strip()!r} instead of a number"
     return ""
 
 
@@ -289,7 +289,7 @@ def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
                 found = head.copy(), number, layout
             head.append(line)
     if found is None:
-        raise ValueError(f"no line of numbers among its first {LONGEST_HEAD}")
+        raise ValueError(f"none of its first {LONGEST_HEAD} lines contains numbers only")
     return found
 
 
@@ -337,7 +337,7 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
         if 1 < len(cells) < layout.columns and all(cells) and _are_units(cells):
             raise ValueError(
                 f"its line {line.strip()!r} has {len(cells)} units for {layout.columns} columns; give each "
-                "column a unit, such as - where there is none"
+                "column a unit, or - for a column without a unit"
             )
     rows = [row for line in head if any(row := _row(line, layout))]
     named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]

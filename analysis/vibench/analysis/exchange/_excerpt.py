@@ -88,10 +88,10 @@ def excerpt(
     """
     wanted = tuple(roles) or recording.roles
     if len(set(wanted)) != len(wanted):
-        raise InvalidRequest(f"the channels {', '.join(wanted)} were requested; name each channel once")
+        raise InvalidRequest(f"channels {', '.join(wanted)} were requested; name each channel only once")
     if recording.samples == 0:
         raise NotEnoughData(
-            f"{recording.path.name} holds no samples ({recording.state.value}): none to export"
+            f"{recording.path.name} contains no samples ({recording.state.value}), so none can be exported"
         )
     rate = recording.sample_rate_hz
     start = 0 if from_s is None else _sample(from_s * rate)
@@ -99,7 +99,7 @@ def excerpt(
     if not 0 <= start < stop <= recording.samples:
         raise InvalidRequest(
             f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was requested; "
-            f"{recording.path.name} goes from 0 to {recording.duration_s:.9g} s; give a start and a later end"
+            f"{recording.path.name} has 0 to {recording.duration_s:.9g} s; give a start and a later end"
         )
     return Excerpt(recording, tuple(recording.channel(role) for role in wanted), start, stop)
 

@@ -35,7 +35,7 @@ def require_unused(path: Path) -> None:
         raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
     if not path.parent.is_dir():
         raise InvalidRequest(
-            f"{path.parent} is not a folder; make it, or choose another place for {path.name}"
+            f"{path.parent} is not a folder; create it, or choose another folder for {path.name}"
         )
 
 
@@ -54,9 +54,9 @@ def new_file(path: Path) -> Iterator[Path]:
         require_unused(path)  # another program may have created it meanwhile
         rename(unfinished, path)
     except OSError as error:
-        mend = "choose another folder" if error.errno in _REFUSED else "make room and try again"
+        mend = "choose another folder" if error.errno in _REFUSED else "free disk space and try again"
         raise InvalidRequest(
-            f"{path} could not be written: {error}; nothing was kept of it, so {mend}"
+            f"{path} could not be written: {error}; the incomplete file was deleted; {mend}"
         ) from error
     finally:
         with suppress(OSError):
@@ -68,8 +68,8 @@ def require_results(recording: Recording) -> Mapping[str, SavedResult]:
     found = recording.results
     if not found:
         raise NotEnoughData(
-            f"no analysis has saved a result in {recording.path.name} (Recording.save_results does); "
-            "leave --results out, or take the tables that vibench analyse writes"
+            f"{recording.path.name} contains no saved results (Recording.save_results writes them); "
+            "leave --results out, or use the tables that vibench analyse writes"
         )
     return found
 
@@ -228,7 +228,7 @@ def export_functions(
     if write is None:
         able = " and ".join(each.value for each, row in EXPORTERS.items() if row.write_functions is not None)
         raise InvalidRequest(
-            f"spectra were requested as {to.value}, which is written for samples; ask for {able}, or take "
+            f"spectra were requested as {to.value}, which can only store samples; choose {able}, or use "
             "the tables that vibench analyse writes"
         )
     facts = facts_path(path)

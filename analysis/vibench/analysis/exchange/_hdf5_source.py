@@ -83,11 +83,11 @@ def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
     except OSError as error:
         if cut := TRUNCATED.search(str(error)):
             raise UnusableData(
-                f"{path.name} announces {cut[2]} bytes, and {cut[1]} are there; copy or export it again"
+                f"{path.name} is cut off: it has {cut[1]} of {cut[2]} bytes; copy or export it again"
             ) from error
         if reason := system_error(error):
             raise UnusableData(f"{path.name} could not be read ({reason}); check the disk") from error
-        raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
+        raise UnusableData(f"{path.name} is not an HDF5 file ({error}); copy or export it again") from error
     with file:
         yield Hdf5Source(file, dict(_places(file)))
 
@@ -184,5 +184,5 @@ def _number(dataset: h5py.Dataset, name: str, otherwise: float, place: int) -> f
     """Return an attribute as a number; for one number per row or column, the number at ``place``."""
     numbers = np.ravel(dataset.attrs.get(name, otherwise))
     if numbers.size not in {1, min(dataset.shape)}:
-        raise UnusableData(f"{dataset.name} has {numbers.size} numbers in {name}; export the file again")
+        raise UnusableData(f"{dataset.name}: {name} has {numbers.size} numbers; export the file again")
     return float(numbers[place if numbers.size > 1 else 0])

@@ -70,7 +70,7 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
     if not parts:
         raise InvalidRequest(
             f"no part of the plan begins within the {samples / sample_rate_hz:.3g} s of the file; "
-            "correct begins_s or parts"
+            "correct begins_s or parts in the mapping"
         )
     return tuple(parts)
 
@@ -101,14 +101,14 @@ def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterat
     parts = mapping.parts
     if len(parts) > len(planned):
         raise InvalidRequest(
-            f"{len(parts)} parts are given, and the plan of {mapping.measurement.name} has {len(planned)}; "
-            "give one for each part that was recorded"
+            f"{len(parts)} parts are given, but the plan of {mapping.measurement.name} has {len(planned)}; "
+            "give one entry for each part that was recorded"
         )
     for before, after in pairwise(parts):
         if after.start_s < before.stop_s:
             raise InvalidRequest(
-                f"a part begins at {after.start_s:g} s, before the one in front of it has ended at "
-                f"{before.stop_s:g} s; give them in the order of time"
+                f"a part begins at {after.start_s:g} s, before the previous part ends at "
+                f"{before.stop_s:g} s; give parts in the order of time, without overlap"
             )
     return ((each.start_s, each.stop_s) for each in parts)
 
@@ -199,7 +199,7 @@ def import_recording(
 
 def _require_samples(writer: RecordingWriter, path: Path) -> None:
     if not writer.samples:
-        raise UnusableData(f"{path.name} has no sample with numbers in all channels; choose others")
+        raise UnusableData(f"{path.name} has no sample with numbers in all channels; choose other channels")
 
 
 def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
@@ -207,7 +207,7 @@ def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> 
     origins = {each.source.origin for each in wanted if each.source.origin is not None}
     if mapping.origin is not None and origins - {mapping.origin}:
         raise InvalidRequest(
-            f"the mapping says origin = {mapping.origin.value!r}, and {path.name} that it is "
+            f"the mapping has origin = {mapping.origin.value!r}, but {path.name} states "
             f"{' and '.join(sorted(origins))}; leave origin out of the mapping, or import another file"
         )
     return Origin.SIMULATED if Origin.SIMULATED in {*origins, mapping.origin} else Origin.REAL
@@ -222,13 +222,13 @@ def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:
         raise InvalidRequest(f"{name}: {error}") from error
     if found.stated_scale and mapped.scale is None:
         raise InvalidRequest(
-            f"{name} says {found.stated_scale} for {found.name}, and not whether this was applied to its "
-            "numbers; give scale in the mapping"
+            f"{name} states {found.stated_scale} for {found.name}, but not whether its numbers are already "
+            "scaled; give scale in the mapping"
         )
     if found.quantity not in {"", quantity} and mapped.role != DRIVE and not mapped.file_unit:
         raise InvalidRequest(
-            f"{name} says that {found.name} is a {found.quantity}, and {mapped.role} is not; choose another "
-            "channel or role, or give file_unit if the file is wrong"
+            f"{name} states that {found.name} is of quantity {found.quantity}, unlike {mapped.role}; choose "
+            "another channel or role, or give file_unit if the file is wrong"
         )
     if found.are_counts and not (found.unit or mapped.file_unit) and mapped.scale is None:
         what, one = ("counts", "count") if found.full_scale is None else ("fractions of full scale", "1")
@@ -273,7 +273,7 @@ def _power_of_two_above(peak: float, name: str) -> float:
         if peak == 0:
             return 1.0
         raise UnusableData(
-            f"{name} has a channel whose largest number is {peak:g}, and a recording keeps those from "
+            f"{name} has a channel whose largest number is {peak:g}, but a recording stores only peaks from "
             f"{LEAST_PEAK:g} to {MOST_PEAK:g}; convert it to another unit, or repair the file"
         )
     mantissa, exponent = frexp(peak)

@@ -86,13 +86,13 @@ class ChannelMapping(FrozenModel):
         if self.role not in KNOWN_ROLES:
             if not (self.quantity and self.unit):
                 raise ValueError(
-                    f"{self.role} needs a quantity and a unit; they are known of {', '.join(KNOWN_ROLES)}"
+                    f"{self.role} needs quantity and unit; only {', '.join(KNOWN_ROLES)} have default ones"
                 )
             return self
         for given, needed in zip((self.quantity, self.unit), KNOWN_ROLES[self.role], strict=True):
             if given not in {"", needed}:
                 raise ValueError(
-                    f"{self.role} is in {needed!r}, and {given!r} was given; convert it by scale"
+                    f"{self.role} needs {needed!r}, but {given!r} was given; convert the numbers by scale"
                 )
         return self
 
@@ -100,7 +100,7 @@ class ChannelMapping(FrozenModel):
     def _has_a_scale(self) -> Self:
         if self.scale == 0:
             raise ValueError(
-                f"the scale of {self.role} is 0, which leaves nothing of it; give unit per number"
+                f"the scale of {self.role} is 0, so all values would be 0; give the unit per number"
             )
         if isinstance(self.scale, str):
             self.factor("V")
@@ -131,7 +131,7 @@ class ChannelMapping(FrozenModel):
             )
         if is_known and size is None and (scale is None or _is_another_quantity(file_unit)):
             raise ValueError(
-                f"{text}, and the recording needs {unit!r}; give scale as a number of {unit!r} per "
+                f"{text}, but the recording needs {unit!r}; give scale as a number of {unit!r} per "
                 f"{file_unit!r}, choose another channel, or give file_unit if the file is wrong"
                 if volts is None
                 else f"{text}; give the sensitivity of its sensor as scale, such as '50 mV/({unit})'"
@@ -154,7 +154,7 @@ class Part(FrozenModel):
     def _rises(self) -> Self:
         if self.stop_s <= self.start_s:
             raise ValueError(
-                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}; count both from the start"
+                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}; both are since file start"
             )
         return self
 

@@ -67,7 +67,7 @@ def _look(content: memoryview, order: str, depth: int) -> None:
             continue
         data = content[TAG_BYTES : TAG_BYTES + size]
         if len(data) < size:
-            raise ValueError(f"an element of {size} bytes, and {len(data)} are left")
+            raise ValueError(f"an element should have {size} bytes, but only {len(data)} are left")
         match kind:
             case _ if kind == MATRIX:
                 _look(data, order, depth + 1)
@@ -106,9 +106,9 @@ def require_small(excerpt: Excerpt) -> None:
     if size >= LARGEST_BYTES:
         longest_s = LARGEST_BYTES // (columns * VALUE_BYTES) / excerpt.recording.sample_rate_hz
         raise InvalidRequest(
-            f"{excerpt.samples} samples of {len(excerpt.channels)} channels make {size / 2**30:.1f} GiB, and "
-            f"a MATLAB 5 file ends at 2 GiB; export at most {longest_s:.0f} s of them, fewer channels, or "
-            f"let MATLAB read {excerpt.recording.path.name} itself with ncread"
+            f"{excerpt.samples} samples of {len(excerpt.channels)} channels need {size / 2**30:.1f} GiB, but "
+            f"a MATLAB 5 file has at most 2 GiB; export {longest_s:.0f} s or less, export fewer channels, or "
+            f"read {excerpt.recording.path.name} in MATLAB with ncread"
         )
 
 
@@ -200,7 +200,7 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     try:
         names = [name for name, *_ in whosmat(path)]
         if len(set(names)) < len(names):
-            raise ValueError("it has several variables of one name")
+            raise ValueError("it has several variables of the same name")
         content = loadmat(path, simplify_cells=True)
     except (MatReadError, zlib.error) as error:  # neither is a subclass of ValueError
         raise ValueError(str(error)) from error

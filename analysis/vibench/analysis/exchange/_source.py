@@ -88,19 +88,19 @@ def opened_source(path: Path) -> Iterator[Source]:
     if reader is None:
         raise InvalidRequest(
             f"{path.name} cannot be imported: {path.suffix or 'a name without suffix'} is none of "
-            f"{', '.join(_READERS)}; export it as one of these, and import that"
+            f"{', '.join(_READERS)}; export it in one of these formats, and import that file"
         )
     with ExitStack() as stack:
         with _readable(path):
             source = stack.enter_context(reader(path))
             if not source.channels:
                 raise UnusableData(
-                    f"{path.name} holds no time samples of real numbers; spectra and pictures cannot be read"
+                    f"{path.name} contains no real samples over time; spectra and pictures cannot be imported"
                 )
             if len(source.channels) > MOST_CHANNELS:
                 raise UnusableData(
-                    f"{path.name} holds {len(source.channels)} rows or columns of numbers, and a measurement "
-                    f"has at most {MOST_CHANNELS} channels; export fewer of them"
+                    f"{path.name} has {len(source.channels)} rows or columns of numbers, but a measurement "
+                    f"has at most {MOST_CHANNELS} channels; export fewer channels"
                 )
         plain = _CheckedSource(path, source, {each: each for each in source.channels})
         yield replace(plain, found=dict(zip(_channels_with_times(plain), source.channels, strict=True)))
@@ -160,8 +160,8 @@ class _CheckedSource:
             values = self.source.read(self.found[channel], start, stop)
         if values.shape != (stop - start,):
             raise UnusableData(
-                f"{self.path.name} gives {values.size} of the {stop - start} numbers of {channel.name} from "
-                f"sample {start} on; copy or export it again"
+                f"{self.path.name} contains only {values.size} of the {stop - start} numbers of "
+                f"{channel.name} from sample {start} on; copy or export it again"
             )
         return values
 

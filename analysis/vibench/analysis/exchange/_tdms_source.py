@@ -57,12 +57,12 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         from nptdms.reader import TdmsReader  # noqa: PLC0415 - as above
     except ImportError as error:
         raise InvalidRequest(
-            f"{path.name} needs npTDMS to be read, which is not installed: pip install 'vibench[exchange]'"
+            f"reading {path.name} needs npTDMS, which is not installed: pip install 'vibench[exchange]'"
         ) from error
     # Open the file here, because npTDMS does not close damaged files.
     with path.open("rb") as raw:
         if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, without an error
-            raise UnusableData(f"{path.name} is no TDMS file; copy it again, with its .tdms suffix")
+            raise UnusableData(f"{path.name} is not a TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
         # Suppress the warnings of npTDMS on standard error; errors are still raised.
         nptdms.log.log_manager.set_level(logging.CRITICAL)

@@ -231,16 +231,16 @@ def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     if is_binary:
         order, numbers, length = (_whole(kind[a:b]) for a, b in ((7, 13), (13, 19), (31, 43)))
         if order not in BYTE_ORDERS:
-            raise ValueError(f"its byte order is {order}, and only 1 (little-endian) and 2 are known")
+            raise ValueError(f"its byte order is {order}; only 1 (little-endian) and 2 (big) can be read")
         if numbers != IEEE:
-            raise ValueError(f"its binary numbers are of kind {numbers}, and only {IEEE} (IEEE) is known")
+            raise ValueError(f"its binary numbers are of kind {numbers}; only {IEEE} (IEEE) can be read")
         file.seek(offset + (count * SIZES[ordinate] if ordinate in SIZES else length))
         _skip_text(file)
     else:
         order = 0
         _skip_text(file)
         if (most := (file.tell() - offset) // LEAST_TEXT) < count:
-            raise ValueError(f"it announces {count} numbers, and has room for {most}")
+            raise ValueError(f"it states {count} numbers, but contains at most {most}")
     is_time = _whole(header[5][:5]) in TIME_FUNCTIONS and _whole(header[7][:10]) in {0, TIME_AXIS}
     if not is_time or ordinate not in SIZES or spacing != EVENLY_SPACED or count < 2:
         return None
@@ -251,7 +251,7 @@ def _whole(text: str) -> int:
     try:
         return int(text)
     except ValueError as error:
-        raise ValueError(f"{text.strip()!r} stands where a whole number belongs, in a dataset 58") from error
+        raise ValueError(f"a dataset 58 has {text.strip()!r} in place of a whole number") from error
 
 
 def _line(file: BinaryIO) -> str:
@@ -278,7 +278,7 @@ def _channel(number: int, header: list[str], length: str) -> SourceChannel:
     if bounds is None and increment:
         trouble = f"has an axis in {unit!r} with steps of {increment:g}"
     elif bounds is not None and rates and not agrees(rates[0], bounds):
-        trouble = f"says {rates[0]:.9g} samples/s, and its increment says {sum(bounds) / 2:.9g}"
+        trouble = f"states {rates[0]:.9g} samples/s, but its increment gives {sum(bounds) / 2:.9g}"
     # Without a unit label, motion is in the units of dataset 164.
     motion = MOTIONS.get(kind, "") if length else ""
     own = header[8][46:66].strip().removesuffix("NONE") or motion.replace("m", length, 1)
@@ -321,8 +321,8 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
         cells = np.array(text.split())
     if cells.size != body.count:
         raise UnusableData(
-            f"dataset {name} of {path.name} announces {body.count} numbers, and {cells.size} follow; "
-            "export it again"
+            f"dataset {name} of {path.name} states {body.count} numbers, but contains {cells.size}; "
+            "export the file again"
         )
     return cells.astype(np.float64)
 

@@ -32,14 +32,14 @@ def require_sound(excerpt: Excerpt) -> None:
     rate = excerpt.recording.sample_rate_hz
     if rate != round(rate):
         raise InvalidRequest(
-            f"{excerpt.recording.path.name} has {rate!r} samples/s, and a WAV file can only say whole "
-            "numbers; export it as uff, csv or mat"
+            f"{excerpt.recording.path.name} has {rate!r} samples/s, but the rate of a WAV file is a whole "
+            "number; export it as uff, csv or mat"
         )
     size = excerpt.values * BYTES
     if size >= LARGEST_BYTES:
         raise InvalidRequest(
-            f"{excerpt.samples} samples of {len(excerpt.channels)} channels make {size / 2**30:.1f} GiB, and "
-            "a WAV file ends at 4 GiB; export fewer seconds, or fewer channels"
+            f"{excerpt.samples} samples of {len(excerpt.channels)} channels need {size / 2**30:.1f} GiB, but "
+            "a WAV file has at most 4 GiB; export fewer seconds, or fewer channels"
         )
 
 
@@ -95,7 +95,7 @@ def open_wav(path: Path) -> Iterator[WavSource]:
     is_integer = table.dtype.kind in "iu"
     unused = 2 ** max(8 * table.itemsize - bits, 0) - 1
     if table.dtype.kind == "i" and np.bitwise_or.reduce(table, axis=None) & unused:
-        raise ValueError(f"it states {bits} bits, and its samples have more")
+        raise ValueError(f"it states {bits} bits per sample, but its samples have more")
     yield WavSource(
         table,
         tuple(
@@ -128,7 +128,7 @@ def _valid_bits(path: Path) -> int:
             left = path.stat().st_size - file.tell()
             if left < size != UNKNOWN_SIZE and not chunks:
                 what = "of samples" if name == b"data" else "about its samples"
-                raise ValueError(f"it announces {size} bytes {what}, and {left} follow")
+                raise ValueError(f"it states {size} bytes {what}, but contains {left}")
             chunks += name == b"data"
             if chunks > 1:
                 raise ValueError("it has samples in several chunks; only one can be read")
