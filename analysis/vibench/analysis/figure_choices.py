@@ -19,7 +19,7 @@ SHOWN = {
     "impact_rate": "impacts a second",
     "contact_energy": "largest energy in a stop [J]",
     "lyapunov": "largest Lyapunov exponent [1/s]",
-    "duration": "followed for [s]",
-    "motions": "motions that the starts came to",
+    "duration": "simulated time [s]",
+    "motions": "number of motions reached from the starts",
 }
 """Quantities that a map can show in addition to the kinds of motion."""

@@ -117,7 +117,7 @@ def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drif
     assert ("gain" in remark) == (named == "gain"), "a mode that moves is not a drift of a gain"
     caption = distortion_caption(analysis.response.periodic)
     assert "drift" in caption
-    assert ("distortion at most" in caption) == (named != "gain")
+    assert ("; at most" in caption) == (named != "gain")
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analyse
     share = 100 * distortion(noisy).noise_share
     assert share > 1000
     caption = distortion_caption(noisy)
-    assert f"standard deviation of {share:.0f} % of the transmission" in caption
+    assert f"relative to the transmission (median): {share:.0f} % by noise" in caption
     assert "noise of the channels or chaos of the specimen" in caption, "chaos is not called noise"
 
 

@@ -104,7 +104,7 @@ def test_a_tracked_resonance_is_analysed_and_stated(analysed):
     assert list(said) == [f"run: {sentence}"], "it is not a stepped sine"
     drawn = stepped_sine_figure(analysis, None, TRACKED_RESONANCE)
     assert drawn.title == "Tracked resonance, around 266.2 Hz"
-    assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"
+    assert drawn.caption == f"Resonance tracked, number of base levels: 1. {sentence}"
     (figure,) = result_figures(CampaignResults("run", (Result(analysis, None),), ()))
     assert figure.name == "backbone_run", "what is stepped is the level"
     numbers = dict(figure.tables[0].columns)

@@ -79,7 +79,7 @@ def test_figure_and_summary_show_both_jumps(analysis):
     _, fall = level_jumps(analysis.response)
     assert "between 0.6 and 0.7 Vpp" in figure.caption
     assert f"between 0.3 and {fall.after_vpp:g} Vpp" in figure.caption
-    assert f"0.3 to {0.7 - fall.after_vpp:g} V above the fall back" in figure.caption
+    assert f"0.3 to {0.7 - fall.after_vpp:g} V above the jump down" in figure.caption
     assert figure.figure.axes[-1].get_xlabel() == "level at the generator [Vpp]"
     measured = result_summary(Result(analysis, None))["measured"]
     assert [each["direction"] for each in measured["jumps"]] == ["up", "down"]
@@ -90,7 +90,7 @@ def test_the_report_summarises_levels_and_jumps(analysis):
     assert said.startswith("level: Level stepped at 195 Hz, 16 steps from 0.1 to 0.8 Vpp.")
     _, fall = level_jumps(analysis.response)
     assert "between 0.6 and 0.7 Vpp" in said
-    assert f"0.3 to {0.7 - fall.after_vpp:g} V above the fall back" in said
+    assert f"0.3 to {0.7 - fall.after_vpp:g} V above the jump down" in said
 
 
 @pytest.mark.parametrize(

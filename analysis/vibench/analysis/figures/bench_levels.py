@@ -43,7 +43,7 @@ def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
 def bench_levels_caption(facts: RecordingFacts) -> str:
     """Return the caption with the peak of each channel, also relative to the input range."""
     parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
-    return f"Extremes of every channel, ramps and waits included. Peaks: {', '.join(parts)}."
+    return f"Extremes of every channel, including ramps and waits. Peaks: {', '.join(parts)}."
 
 
 def _peak(level: ChannelLevel) -> str:

@@ -68,10 +68,10 @@ def branches_figure(
         name="branches",
         title=f"Branches: {diagram.request.title}",
         caption=(
-            "Periodic motions; solid: stable, dashed: unstable. Motions of more than one drive period are "
-            f"in other colours. {diagram.cost_sentence} {diagram.request.sentence}"
+            "Periodic motions; solid: stable, dashed: unstable. Motions with a period of several drive "
+            f"periods have other colours. {diagram.cost_sentence} {diagram.request.sentence}"
             f"{diagram.holding_sentence and ' '}{diagram.holding_sentence} Chaotic and "
-            "quasi-periodic motions are not branches: where no solid line is, look for them."
+            "quasi-periodic motions are not shown; expect them where there is no solid line."
         ),
         figure=figure,
         tables=branch_tables(diagram),

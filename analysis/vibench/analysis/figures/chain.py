@@ -49,14 +49,14 @@ def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
 
 def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
     caption = (
-        "Above: phase and decay from unit to unit in the endless chain without contact; grey: gaps. Below: "
-        "transmission from the base to m0 of cells, without contact and as driven."
+        "Above: phase and decay per unit of the infinite chain without contact; grey: band gaps. Below: "
+        "transmission from the base to m0 of each cell, without contact and as driven."
     )
     if last is not None:
         what = "x of m0" if found.request.drive is ChainDrive.STEADY else "root mean square of x of m0"
         caption += (
-            f" Map: {what} over place and time in the last run, dots: impacts. Bottom: mean energy, with its "
-            "standard error, and impacts of every cell."
+            f" Map: {what} over place and time in the last run; dots: impacts. Bottom: mean energy with "
+            "standard error, and number of impacts, of each cell."
         )
     return f"{caption} {found.cost_sentence} {found.request.sentence}"
 

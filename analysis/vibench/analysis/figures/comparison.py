@@ -48,7 +48,7 @@ def comparison_figure(
         A curve and its reference; their difference is drawn below the curves.
     """
     if not curves:
-        raise InvalidRequest("a figure of no curves was requested; choose one or more")
+        raise InvalidRequest("a figure without curves was requested; choose one or more curves")
     difference = None if pair is None else curve_difference(*pair)
     with style.styled():
         rows = 1 if difference is None else 2
@@ -122,7 +122,7 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
     if pair is not None:
         difference = curve_difference(*pair)
         sentences.append(
-            f"Difference of {pair[0].name} over {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
+            f"Difference of {pair[0].name} from {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
             f"root mean square {difference.rms_db:.2g} dB."
         )
     return " ".join(sentences)

@@ -64,7 +64,7 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
             f"Simulated under the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
             f"median difference {overlay.difference.median_abs_db:.2g} dB, "
             f"{100 * overlay.difference.share_within_two:.0f} % of the values within two standard errors. "
-            "The simulated impacts do not move the recorded base, so that in chaos the two differ."
+            "Simulated impacts do not move the recorded base, so chaotic motions differ from measured ones."
         )
     parts = [
         (

@@ -31,9 +31,9 @@ def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
         name=f"hidden_motion_{motion.name}",
         title=f"Hidden motion of {motion.name}",
         caption=(
-            "Relative displacement p = y - z of m1, told from base acceleration and m0's velocity. Above: "
-            "its extremes; where it was not followed nothing is drawn, and the ground is grey. Below: "
-            f"{1e3 * _ZOOM_S:g} ms amid the impacts, tracked with bounds of 95 %, and without a model. "
+            "Relative displacement p = y - z of m1, estimated from base acceleration and m0's velocity. "
+            "Above: its extremes; grey where it was not tracked. Below: "
+            f"{1e3 * _ZOOM_S:g} ms with impacts, tracked with 95 % bounds, and without a contact model. "
             + " ".join(motion.sentences)
         ),
         figure=figure,
@@ -134,7 +134,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     at_1um, exponent = found.get(Hidden.FORCE), found.get(Hidden.EXPONENT)
     is_determined = at_1um is not None and exponent is not None and at_1um.is_determined
     if not is_determined or at_1um is None or exponent is None:
-        axes.set_title("as described: not told by this motion", fontsize="small")
+        axes.set_title("as described (not determined by this motion)", fontsize="small")
         return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
     low, high = _band(depth, at_1um, exponent)
     axes.fill_between(_MICRO * depth, low, high, color=style.BOUNDS, alpha=0.5)

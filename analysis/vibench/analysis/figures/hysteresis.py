@@ -41,7 +41,7 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
     content = columns(found, "frequency_hz response_ii_up=up response_ii_down=down")
     return style.DrawnFigure(
         name=name,
-        title=f"Up against down, {up.excitation.amplitude_vpp:g} Vpp",
+        title=f"Sweeps up and down, {up.excitation.amplitude_vpp:g} Vpp",
         caption=_caption(up, down, found),
         figure=figure,
         tables=(table(name, **content, differs=found.differs.astype(np.int64)),),
@@ -67,5 +67,5 @@ def _caption(up: SweepAnalysis, down: SweepAnalysis, found: Hysteresis) -> str:
     return (
         f"Response II of sweeps up and down at {up.excitation.amplitude_vpp:g} Vpp. "
         f"Up: {jumps_text(up.jumps)}. Down: {jumps_text(down.jumps)}. {widths + '. ' if widths else ''}"
-        f"Grey: more than 1.5 dB apart, {100 * share:.0f} % of the band."
+        f"Grey: the sweeps differ by more than 1.5 dB ({100 * share:.0f} % of the band)."
     )

@@ -98,9 +98,9 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     found = distortion(periodic)
     parts = [
         (
-            f"From {periodic.realisations} realisations: noise of the channels or chaos of the specimen, "
-            "which do not repeat from period to period, give one realisation a standard deviation of "
-            f"{_percent(found.noise_share)} of the transmission (median)"
+            f"From {periodic.realisations} realisations: standard deviation of one realisation, relative to "
+            f"the transmission (median): {_percent(found.noise_share)} by noise of the channels or chaos of "
+            "the specimen, which do not repeat each period"
         )
     ]
     if found.distortion_share is None:
@@ -108,7 +108,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     else:
         # Near a narrow mode with a drifting frequency, some of the drift remains and counts as distortion.
         most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
-        parts.append(f", distortion {most}{_percent(found.distortion_share)}.")
+        parts.append(f"; {most}{_percent(found.distortion_share)} by distortion.")
     if periodic.drift is not None:
         parts.append(f" The {periodic.drift.text}; this is not distortion.")
     return "".join(parts) + _quiet_text(found)
@@ -125,9 +125,9 @@ def _quiet_text(found: Distortion) -> str:
     if not shown or found.detection_noise_m_per_s is None:
         return ""
     return (
-        f" Lines that were not driven hold {' and '.join(shown)} (rms, what does not repeat, "
-        f"{1e6 * found.detection_noise_m_per_s:.2g} µm/s taken off): even and odd distortion of all from "
-        "the drive voltage to the mass."
+        f" Level of the lines that were not driven: {' and '.join(shown)} (rms, without the non-repeating "
+        f"{1e6 * found.detection_noise_m_per_s:.2g} µm/s). This is the even and odd distortion of the whole "
+        "path from the drive voltage to the mass."
     )
 
 
@@ -191,7 +191,7 @@ def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
     return (
         f"Measured {rising[0].view.symbol} of {rising[0].facts.response} at {len(rising)} noise levels. "
         f"{'; '.join(levels)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
-        "m2, where strong collisions move the motion to."
+        "m2, which strong collisions approach."
     )
 
 
@@ -235,7 +235,7 @@ def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
         title="Excitation as planned",
         caption=(
             f"{excitation.kind.replace('_', ' ')} at {excitation.amplitude_vpp:g} Vpp: {seen.rms_v:.3g} V "
-            f"rms, crest factor {seen.crest_factor:.3g}, {seen.duration_s:.4g} s with its waits."
+            f"rms, crest factor {seen.crest_factor:.3g}, {seen.duration_s:.4g} s including waits."
         ),
         figure=figure,
         tables=(

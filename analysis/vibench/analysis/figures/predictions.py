@@ -66,7 +66,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
         title=f"Speed against accuracy: {'; '.join(curves)}",
         caption=(
             f"Largest relative error of the four responses over processor time: {'; '.join(curves)}. "
-            "Filled: stated by the method; crosses: difference from the best answer. Ring: the requested one."
+            "Filled: stated error; crosses: difference from the best result; ring: requested result."
         ),
         figure=figure,
         tables=(
@@ -103,10 +103,10 @@ def exponent_spectrum_figure(found: ExponentSpectrum) -> style.DrawnFigure:
         name="spectrum",
         title=f"All exponents: {request.title}",
         caption=(
-            f"Lyapunov exponents of the motion that a run from rest ends in; bars: {request.confidence:.0%} "
-            f"intervals. Below: Kaplan and Yorke's dimension. {found.cost_sentence} "
-            f"{request.specimen_text}, "
-            f"{request.accuracy.value} accuracy, {request.duration_s:g} s after {request.settle_s:g} s."
+            f"Lyapunov exponents of the motion reached from rest; bars: {request.confidence:.0%} "
+            f"intervals. Below: Kaplan-Yorke dimension. {found.cost_sentence} "
+            f"{request.specimen_text}, {request.accuracy.value} accuracy, "
+            f"{request.duration_s:g} s after {request.settle_s:g} s of settling."
         ),
         figure=figure,
         tables=(_numbers(found),),
@@ -179,9 +179,9 @@ def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigur
         name="contact_forces",
         title="Forces of the contact laws",
         caption=(
-            "Force that pushes m1 back from its stop (grey) over p = y - z; at the other stop it has the "
-            f"other sign. A law with a loss is shown at {_SPEED_M_PER_S:g} m/s, pressed in (solid) and let "
-            "go (dashed)."
+            "Force that pushes m1 back from a stop (grey) over p = y - z; at the opposite stop, its sign is "
+            f"reversed. A law with losses is shown at {_SPEED_M_PER_S:g} m/s, while loading (solid) and "
+            "unloading (dashed)."
         ),
         figure=figure,
         tables=tuple(tables),

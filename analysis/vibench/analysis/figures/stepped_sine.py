@@ -142,19 +142,19 @@ def stepped_level_caption(found: SteppedResponse) -> str:
     )
     jumps = level_jumps(found)
     texts = [
-        f"Going {each.direction}, Response II changes by a factor of {each.factor:.3g} between "
+        f"On the way {each.direction}, Response II changes by a factor of {each.factor:.3g} between "
         f"{each.before_vpp:.4g} and {each.after_vpp:.4g} Vpp."
         for each in jumps
     ]
     apart = hysteresis_vpp(jumps)
     if apart is not None:
-        texts.append(f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back.")
+        texts.append(f"The jump up is {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the jump down.")
     return " ".join([text, *(texts or ["No jump by more than a factor of two."])])
 
 
 def tracked_caption(found: SteppedResponse) -> str:
     """Return the caption with the number of levels."""
-    return f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
+    return f"Resonance tracked, number of base levels: {found.frequency_hz.size}."
 
 
 STEPPED_FREQUENCIES: SteppedLook[SteppedSine | SettledSine] = SteppedLook(

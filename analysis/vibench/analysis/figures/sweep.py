@@ -125,15 +125,15 @@ def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
         outside = ~analysis.collisions.is_colliding
         apart = overlay.difference.where(outside)
         smooth = (
-            f" Outside of the measured collisions {apart.median_abs_db:.2g} dB median difference, "
+            f" Outside of the measured collisions: median difference {apart.median_abs_db:.2g} dB, "
             f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors."
             if outside.any()
             else ""
         )
         sentences += [
             run_text(overlay),
-            f"In the first of these runs {regions_text(overlay.collisions)}.{smooth}",
-            "Blue dots: steady sines from rest, which know nothing of the sweep's history.",
+            f"In the first of these runs, {regions_text(overlay.collisions)}.{smooth}",
+            "Blue dots: steady sines started from rest, without the history of the sweep.",
         ]
     return " ".join(sentences)
 
@@ -141,7 +141,7 @@ def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
 def regions_text(found: Collisions) -> str:
     """Return the frequency ranges with collisions in a sweep as text."""
     unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
-    unclear = f"; {unclear} the sweep was too fast to distinguish ringing from collisions" if unclear else ""
+    unclear = f"; {unclear}, the sweep was too fast to distinguish ringing from collisions" if unclear else ""
     if not found.regions:
         return f"no collisions were found{unclear}" if unclear else "the masses did not collide"
     parts = []
@@ -240,8 +240,8 @@ def _caption(analysis: SweepAnalysis) -> str:
     return (
         f"Above: amplitude in the recorded velocity, {found.resolution_hz:.2g} Hz wide at half power. Below: "
         f"displacement of {analysis.facts.mass} at orders of the recorded drive, grey where the "
-        f"masses collide; with collisions each holds what chaos puts near it. Strongest beside order 1 is "
-        f"{loudest[1]}, {20 * np.log10(loudest[0]):.0f} dB below it (median)."
+        f"masses collide; there, orders also contain chaotic motion near their frequency. Strongest after "
+        f"order 1: {loudest[1]}, {20 * np.log10(loudest[0]):.0f} dB re order 1 (median)."
     )
 
 

@@ -166,20 +166,20 @@ def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) 
             f"Noise at {analysis.excitation.amplitude_vpp:g} Vpp, base acceleration "
             f"{response.base_level.rms_acceleration:.3g} m/s² rms between {response.base_level.low_hz:g} and "
             f"{response.base_level.high_hz:g} Hz; {response.frequency_response.n_eff:.3g} independent "
-            f"averages of {response.used_s:.0f} s in all."
+            f"averages from {response.used_s:.0f} s in total."
         ),
         estimate_sentence(response),
         f"Resonances found: {found}." if found else "No resonance stands above its uncertainty.",
         (
-            f"Median coherence {response.median_coherence:.4f}; the dash-dotted line is what independent "
-            "noises would show."
+            f"Median coherence {response.median_coherence:.4f}; dash-dotted: coherence that independent "
+            "noise would show."
         ),
     ]
     if overlay is not None:
         sentences.append(
             f"{run_text(overlay)} Median difference {overlay.difference.median_abs_db:.2g} dB. "
             f"The blue curve is Response I under sines, {overlay.amplitude_basis}; "
-            f"it is a different excitation and no fit."
+            f"it has another excitation and is not a fit."
         )
     return " ".join(sentences)
 
@@ -191,8 +191,8 @@ def estimate_sentence(response: NoiseResponse) -> str:
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"
     if response.hits is not None:
         fineness = (
-            f"hits of {how.segment_s:.3g} s under a window exp(-{how.decay_per_s:.3g} t), whose damping "
-            "widens the lines, but not the resonances"
+            f"hits of {how.segment_s:.3g} s with a window exp(-{how.decay_per_s:.3g} t), which "
+            "widens the lines; the stated resonances are corrected for it"
         )
     elif response.periodic is None:
         fineness = (
@@ -206,8 +206,8 @@ def estimate_sentence(response: NoiseResponse) -> str:
         return text
     parts = "realisations" if response.periodic else "hits" if response.hits else "segments"
     return (
-        f"{text} Left out: {response.left_out} {parts}, for {response.lost_samples} lost and "
-        f"{response.overloaded_samples} overloaded samples, or because they were cut short."
+        f"{text} Left out: {response.left_out} {parts}, because of {response.lost_samples} lost and "
+        f"{response.overloaded_samples} overloaded samples, or because they are incomplete."
     )
 
 
