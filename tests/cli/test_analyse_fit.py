@@ -44,7 +44,7 @@ def test_json_contains_fit_intervals_and_undetermined_parameters(vibench_here, f
     assert damping["low"] < damping["value"] < damping["high"] < 2 * damping["bench"]
     assert damping["bench"] == pytest.approx(2e-5)
     assert "gap_m" not in fit["values"]
-    assert any("gap stays as the bench says" in each for each in fit["not_told"])
+    assert any("gap stays as described" in each for each in fit["not_told"])
 
 
 @pytest.mark.thorough
@@ -54,7 +54,7 @@ def test_a_fit_is_printed_in_words_and_saved_as_a_specimen_file(vibench_here, fo
     )
     assert result.returncode == 0, result.stderr
     assert "Fitted c / k = 3" in result.stdout
-    assert "the bench says 20.0" in result.stdout
+    assert "described: 20.0" in result.stdout
     written = tmp_path / "report" / "specimen.toml"
     # A terminal of this width may break the path anywhere.
     assert str(written) in result.stdout.replace("\n", "")

@@ -137,5 +137,5 @@ def test_comparisons_and_fits_use_only_scan_points_on_m0(folder, results):
         results, results=tuple(each for each in results.results if each.analysis.facts.mass != "m0")
     )
     assert len(others.results) == 2
-    with pytest.raises(NotEnoughData, match="has no result to which a specimen could be fitted"):
+    with pytest.raises(NotEnoughData, match="has no result for m0, to which a specimen could be fitted"):
         update_model(others)

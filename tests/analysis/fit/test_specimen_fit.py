@@ -259,7 +259,7 @@ def test_parameters_that_a_transmission_cannot_determine_are_refused(true):
     clean = measured(true, np.random.default_rng(4))
     with pytest.raises(InvalidRequest, match="determines any of"):
         fit_specimen(clean, NOMINAL, (Parameter.GAP,))
-    with pytest.raises(InvalidRequest, match="nothing was to be fitted"):
+    with pytest.raises(InvalidRequest, match="a fit of no parameter was requested"):
         fit_specimen(clean, NOMINAL, ())
     with pytest.raises(InvalidRequest, match="one mass at a time"):
         fit_specimen(clean, NOMINAL, (*LINEAR, Parameter.M0, Parameter.M1))

@@ -78,7 +78,7 @@ def test_a_rig_with_a_wrong_base_response_is_refused_early(buried, tmp_path):
         bench["shaker"]["force_constant_n_per_a"] = 30.0
         del file["configuration/bench_json"]
         file["configuration/bench_json"] = np.bytes_(json.dumps(bench))
-    with open_recording(other) as recording, pytest.raises(AnalysisError, match="describe amplifier and"):
+    with open_recording(other) as recording, pytest.raises(AnalysisError, match="amplifier and shaker"):
         statistical_numbers(recording, gong2025(), STRETCH_S, 260.0)
 
 
@@ -86,7 +86,7 @@ def test_a_rig_with_a_wrong_base_response_is_refused_early(buried, tmp_path):
 @pytest.mark.parametrize(
     ("specimen", "stretch_s", "why"),
     [
-        (gong2025(), (0.5, 0.7), "0.2 s of it at 51200 samples a second are too little"),
+        (gong2025(), (0.5, 0.7), "0.2 s of this motion at 51200 samples/s are too little"),
         (gong2025(), (1.4, 1.7), "too little for statistics"),
         (gong2025(contact="rigid:0.8"), STRETCH_S, "cannot be tracked"),
         (gong2025(contact="linear"), STRETCH_S, "without stops"),
@@ -123,7 +123,7 @@ def test_statistics_determine_the_gap_of_an_untrackable_motion(buried):
     assert holds(gap, 51e-6)
     assert updated.specimen.gaps_m == pytest.approx((gap.value, gap.value))
     assert any(each.startswith("From statistics, mean gap: (") for each in updated.sentences)
-    assert any(each.startswith("No motion could be tracked: ") for each in updated.not_determined)
+    assert any(each.startswith("No motion with collisions could be") for each in updated.not_determined)
     assert updated.to_dict()["statistics_from"] == updated.collisions.recording
 
 

@@ -89,7 +89,7 @@ def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(upda
         assert each.low - slack <= truth <= each.high + slack, each
         assert not each.low <= each.nominal <= each.high, each
     assert len(updated.not_determined) == 1
-    assert "Each side's gap, m1, c1 and the contact law are not determined" in updated.not_determined[0]
+    assert "Both gaps, m1, c1 and the contact law are not determined" in updated.not_determined[0]
     assert updated.fits
     assert 0.3 < updated.reduced_chi_square < 3
 
@@ -100,7 +100,7 @@ def test_the_report_shows_fitted_and_described_values(measured, updated):
     assert [
         each
         for each in said
-        if each.startswith("Fitted gap of the nearer side = 5") and "the bench says 45" in each
+        if each.startswith("Fitted gap of the nearer side = 5") and "described: 45" in each
     ]
 
 
@@ -139,7 +139,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
     assert [(each.parameter, each.low, each.high) for each in found.values] == [
         (Parameter.GAP, bracket.low_m, bracket.high_m)
     ]
-    with pytest.raises(NotEnoughData, match="one below and one above"):
+    with pytest.raises(NotEnoughData, match="one dwell below and one above"):
         bracketed_gap(dwells[:1], gong2025())
 
 
@@ -163,7 +163,7 @@ def test_without_a_sweep_the_gap_is_not_fitted_and_a_reason_is_given(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m
-    assert [each for each in found.not_determined if "gap stays as the bench says" in each]
+    assert [each for each in found.not_determined if "gap stays as described" in each]
     only_sweep = update_model(CampaignResults("sweep", measured.sweeps, ()))
     assert [each.parameter for each in only_sweep.values] == [Parameter.GAP]
     assert math.isnan(only_sweep.reduced_chi_square)
@@ -172,5 +172,5 @@ def test_without_a_sweep_the_gap_is_not_fitted_and_a_reason_is_given(measured):
 def test_missing_data_for_a_fit_give_a_one_sentence_error(measured):
     with pytest.raises(NotEnoughData, match="no result"):
         update_model(CampaignResults("empty", (), ()))
-    with pytest.raises(NotEnoughData, match="no sweep enters"):
+    with pytest.raises(NotEnoughData, match="no sweep goes from"):
         fit_gap([], gong2025())

@@ -149,7 +149,7 @@ def numbers_from_statistics(
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
-        stage(observer, f"{each.name}: comparing its statistics with those of specimens drawn at random")
+        stage(observer, f"{each.name}: comparing its statistics with those of randomly varied specimens")
         try:
             with open_recording(each.path) as recording:
                 shaker = _fit_shaker(recording, results, specimen)
@@ -162,7 +162,7 @@ def numbers_from_statistics(
         numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
         if numbers.determined:
             return numbers, ""
-        why.setdefault("its statistics determine nothing better than the description", []).append(each.name)
+        why.setdefault("statistics narrow no value beyond its description", []).append(each.name)
     return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
 
 

@@ -76,8 +76,8 @@ def fit_gap(
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit)]
     if not found:
         raise NotEnoughData(
-            "no sweep enters a region in which the masses collide, so the gap is undetermined; sweep with "
-            "more drive, or start outside the region"
+            "no sweep goes from motion without collisions to collisions, so the gap is not determined; "
+            "sweep with more drive, or start at a frequency without collisions"
         )
     return _narrowest(found, linear)
 
@@ -124,8 +124,8 @@ def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
     first = max(0, last - round(_APPROACH_S / measured.interval_s))
     if last - first < _LEAST_INTERVALS:
         raise NotEnoughData(
-            f"the sweep begins {max(last, 0)} intervals before it collides, and A0 there needs "
-            f"{_LEAST_INTERVALS}; begin the sweep further away"
+            f"the sweep begins {max(last, 0)} intervals before the collisions, but A0 there needs "
+            f"{_LEAST_INTERVALS} intervals; begin the sweep further away"
         )
     before = slice(first, last)
     slope, offset = np.polyfit(measured.frequency_hz[before], measured.drive_amplitude_m[before], 1)
@@ -178,8 +178,8 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
     found = list(brackets(dwells, linear))
     if not found:
         raise NotEnoughData(
-            "no frequency has both a dwell that does not collide and one that does, so dwells do not "
-            "determine the gap; add one below and one above the onset"
+            "no frequency has dwells both without and with collisions, so dwells do not determine the gap; "
+            "add one dwell below and one above the level at which collisions start"
         )
     return _narrowest(found, linear)
 

@@ -188,8 +188,8 @@ def lines_of(
     count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)
     if count < needed:
         raise NotEnoughData(
-            f"{count} lines of the transmission are {_LEAST_CLEAR:.2g} times as large as the scatter around "
-            f"them or more, and {len(free)} parameters need {needed}; measure longer or with more drive"
+            f"only {count} lines of the transmission are at least {_LEAST_CLEAR:.2g} times as large as the "
+            f"scatter, but {len(free)} parameters need {needed}; measure longer or with more drive"
         )
     spreads = np.concatenate(
         [frequency_response.relative_sd_magnitude[used], frequency_response.sd_phase_rad[used]]

@@ -69,7 +69,7 @@ class SpecimenFit(Labelled):
             if each.parameter is parameter:
                 return each
         names = ", ".join(each.parameter for each in self.values) or "none"
-        raise InvalidRequest(f"{parameter.value} was not fitted; there are {names}")
+        raise InvalidRequest(f"{parameter.value} was not fitted; fitted parameters: {names}")
 
 
 def fit_specimen(
@@ -109,8 +109,8 @@ def fit_specimen(
     allowed = (*LINEAR, *ALSO_FREE)
     if not free or not set(free) <= set(allowed) or len(set(free) & set(MASSES)) > 1:
         raise InvalidRequest(
-            f"{', '.join(free) or 'nothing'} was to be fitted to a transmission; it determines any of "
-            f"{', '.join(allowed)}, one mass at a time"
+            f"a fit of {', '.join(free) or 'no parameter'} was requested; a transmission determines any of "
+            f"{', '.join(allowed)}, but one mass at a time"
         )
     lines = lines_of(frequency_response, nominal, free, scale_sd)
     found = fit_lines(lines)

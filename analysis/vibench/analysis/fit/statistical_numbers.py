@@ -310,16 +310,16 @@ def statistical_numbers(
     rate_hz = recording.sample_rate_hz
     start, stop = (round(each * rate_hz) for each in stretch_s)
     if not np.isfinite(specimen.gaps_m).all():
-        raise InvalidRequest("the specimen is described with a stop on one side only; statistics need two")
+        raise InvalidRequest("the specimen has a stop on one side only; a fit to statistics needs two stops")
     draws = stretch_draws(recording, specimen, start, stop, fitted)
     measured = draws.measured
     if measured.shape[1] < _LEAST_S * rate_hz or rate_hz < _LEAST_RATE_HZ:
         raise NotEnoughData(
-            f"{measured.shape[1] / rate_hz:.3g} s of it at {rate_hz:g} samples a second are too little for "
-            f"statistics; record {_LEAST_S:g} s or more, at {_LEAST_RATE_HZ:g} or more"
+            f"{measured.shape[1] / rate_hz:.3g} s of this motion at {rate_hz:g} samples/s are too little for "
+            f"statistics; record at least {_LEAST_S:g} s at {_LEAST_RATE_HZ:g} samples/s or more"
         )
     if np.isnan(measured).any():
-        raise UnusableData("samples were lost, and the statistics of the remaining ones are not comparable")
+        raise UnusableData("samples were lost, so statistics cannot be compared with a simulation")
     observed = chaos_statistics(measured, rate_hz, drive_hz)
     made = _Runs(draws, specimen, linear, drive_hz, above_sensor_noise(observed, draws.noise_rms, rate_hz))
     _require_likely(made, measured)
@@ -327,8 +327,8 @@ def statistical_numbers(
     found = posterior(made, observed[made.heard], np.stack([-reach, reach], axis=1), _SEED, rounds)
     if not found.fits:
         raise UnusableData(
-            f"its statistics are {found.distance:.2g} times as far from those of any simulated specimen as "
-            "these are from each other: something else of rig or specimen is not as described"
+            f"no simulated specimen has similar statistics (distance {found.distance:.2g} times the scatter "
+            "of repeated simulations): other values of rig or specimen are not as described"
         )
     return tuple(_determined_parameters(found, specimen)), found.distance
 
@@ -391,8 +391,8 @@ def _require_likely(made: _Runs, measured: Reals) -> None:
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:
         raise UnusableData(
-            f"the recorded voltage gives {drawn:.3g} m/s2 rms on the described rig, but {seen:.3g} were "
-            "recorded, so no simulation is possible; describe amplifier and shaker as they are"
+            f"the recorded voltage should give {drawn:.3g} m/s2 rms on the described rig, but {seen:.3g} "
+            "m/s2 were recorded, so it cannot be simulated; correct the description of amplifier and shaker"
         )
 
 
@@ -407,9 +407,9 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         flat = high - low > _WIDEST * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
-        why = "the statistics of the motion do not determine it better than the description" if flat else ""
+        why = "statistics of the motion give no narrower bounds than the description" if flat else ""
         # The value is the centre of the bounds, because results are written with a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
-    nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"
+    nan, why = float("nan"), "not varied: all compared simulations have the described exponent and loss"
     for untold in (Hidden.EXPONENT, Hidden.LOSS):
         yield FoundParameter(untold, nan, nan, nan, value_of(described, untold), why)

@@ -165,7 +165,7 @@ def _rubs(nominal: Specimen, damper: Parameter) -> _Told:
 
     def describe(specimen: Specimen, _: Reals) -> str:
         more = parameter_value(specimen, damper) - was
-        return f"friction in link {link}, which at this level damps by {more:.3g} N s/m" if more > 0 else ""
+        return f"friction in link {link}, which adds {more:.3g} N s/m at this level" if more > 0 else ""
 
     return describe
 
@@ -176,8 +176,8 @@ def _response(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Comple
 
 def _off(_: Specimen, further: Reals) -> str:
     return (
-        f"the sensitivity of the vibrometer over that of the accelerometer "
-        f"{100 * np.expm1(further[0]):+.3g} % off (no transmission shows which of the two)"
+        f"a ratio of vibrometer and accelerometer sensitivity that is {100 * np.expm1(further[0]):+.3g} % "
+        "off (a transmission does not show which of the two is wrong)"
     )
 
 

@@ -56,7 +56,7 @@ class TableFit:
         sentence = (
             f"a moving table of {1e3 * self.mass_kg:.4g} g instead of {1e3 * self.described_kg:.4g} "
             f"({100 * (ratio - 1):+.3g} %), or all three masses of the specimen "
-            f"{100 * (1 / ratio - 1):+.3g} % at once (motion tells ratios of masses only)"
+            f"{100 * (1 / ratio - 1):+.3g} % at once (motion determines ratios of masses only)"
         )
         return (Suspect(Assumption.TABLE_MASS, sentence, self.reduced_chi_square, mends=True, behind=0.0),)
 
@@ -64,9 +64,7 @@ class TableFit:
     def sentence(self) -> str:
         """Fitted mass with two standard deviations, and the described mass, in words."""
         mass = plus_minus(1e3 * self.mass_kg, 2e3 * self.sd_kg)
-        return (
-            f"Fitted mass of the moving table = ({mass}) g; the bench says {1e3 * self.described_kg:.4g} g."
-        )
+        return f"Fitted mass of the moving table = ({mass}) g; described: {1e3 * self.described_kg:.4g} g."
 
 
 def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
@@ -200,8 +198,8 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
     if linear is not None and not linear.fits:
         yield (
             f"The model does not fit {updated.linear_from}: chi² is {linear.reduced_chi_square:.3g} per "
-            f"degree of freedom, and one right model in a thousand exceeds {linear.limit:.3g}. No value "
-            f"of it is given; {culprits_text(linear.suspects)}."
+            f"degree of freedom; a correct model exceeds {linear.limit:.3g} in 1 of 1000 cases. No fitted "
+            f"value is given; {culprits_text(linear.suspects)}."
         )
     if table is not None:
         yield table.sentence
@@ -220,10 +218,10 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
     named = ", or ".join(alike)
     if not best.mends:
         return (
-            "no single changed assumption makes it fit; the nearest, which leaves chi² at "
+            "no single changed assumption makes it fit; the best one, with chi² = "
             f"{best.reduced_chi_square:.3g}, is {named}"
         )
-    choice = "it fits with either of these, and the data do not distinguish them: " if len(alike) > 1 else ""
+    choice = "it fits with any of these, which the data do not distinguish: " if len(alike) > 1 else ""
     return f"{choice}{named}" if choice else f"it fits with {named}"
 
 
@@ -242,7 +240,7 @@ def _in_words(found: FittedValue) -> str:
     value, low, high, nominal = (
         f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
     )
-    return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); the bench says {nominal} {unit}."
+    return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); described: {nominal} {unit}."
 
 
 def update_model(
@@ -270,7 +268,7 @@ def update_model(
     of_m0 = tuple(each for each in results.results if each.analysis.facts.mass == "m0")
     results = replace(results, results=of_m0)  # scan points may be on the other masses
     if not of_m0:
-        raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")
+        raise NotEnoughData(f"{results.name!r} has no result for m0, to which a specimen could be fitted")
     described = described_specimen(results.facts[0].bench)
     nominal = described.specimen()
     reasons: list[str] = []
@@ -288,7 +286,7 @@ def update_model(
         nominal=described,
     )
     if linear is not None and not linear.fits:
-        reasons.append("Gaps and contacts stay as the bench says: the linear model does not fit.")
+        reasons.append("Gaps and contacts stay as described: the linear model does not fit.")
     else:
         updated = _with_gaps(updated, results, reasons, observer)
         if not updated.fitted:
@@ -300,7 +298,7 @@ def _linear(
     results: CampaignResults, nominal: Specimen, free: Sequence[Parameter], reasons: list[str]
 ) -> SpecimenFit | None:
     if not results.noise:
-        reasons.append("Damping and frequencies stay as the bench says: no noise was recorded.")
+        reasons.append("Damping and frequencies stay as described: no noise was recorded.")
         return None
     facts, weakest = results.noise[0].analysis.facts, results.noise[0].analysis.response
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
@@ -313,7 +311,7 @@ def _linear(
             is_nonlinear=is_nonlinear,
         )
     except NotEnoughData as error:
-        reasons.append(f"Damping and frequencies stay as the bench says: {error}.")
+        reasons.append(f"Damping and frequencies stay as described: {error}.")
         return None
 
 
@@ -321,7 +319,7 @@ def _table(weakest: NoiseResult, linear: SpecimenFit, reasons: list[str]) -> Tab
     try:
         return fitted_table(weakest.analysis, linear.specimen)
     except AnalysisError as error:
-        reasons.append(f"The table's mass stays as the bench says: {error}.")
+        reasons.append(f"The mass of the table stays as described: {error}.")
         return None
 
 
@@ -334,9 +332,9 @@ def _with_gaps(
         found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
         both = f"{why}; by statistics: {why_not}" if why_not else why
         reasons.append(
-            f"Each side's gap, m1, c1 and the contact law are not determined: {both}."
+            f"Both gaps, m1, c1 and the contact law are not determined: {both}."
             if found is None
-            else f"No motion could be tracked: {why}."
+            else f"No motion with collisions could be tracked: {why}."
         )
     if found is not None:
         updated = replace(updated, collisions=found, specimen=found.on(updated.specimen))
@@ -369,6 +367,6 @@ def _onset_gap(
         except NotEnoughData as error:
             why.append(str(error))
     if not found:
-        reasons.append(f"The gap stays as the bench says: {'; '.join(why)}.")
+        reasons.append(f"The gap stays as described: {'; '.join(why)}.")
         return None
     return min(found, key=lambda each: each.high / each.low)
