@@ -32,7 +32,7 @@ PACKAGES = {
 }
 """Debian packages needed for a window on X11, by the name of the missing library."""
 ON_X11 = " ".join(sorted(PACKAGES.values()))
-ELSEWHERE = "or run it without a window: QT_QPA_PLATFORM=offscreen"
+ELSEWHERE = "or run without a window: QT_QPA_PLATFORM=offscreen"
 
 
 def display_trouble() -> str:
@@ -49,8 +49,8 @@ def display_trouble() -> str:
         return ""
     if not os.environ.get("DISPLAY"):
         return (
-            "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); start it on a desktop, with "
-            f"'ssh -X' or under xvfb-run, {ELSEWHERE}"
+            "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); start the window on a "
+            f"desktop, with 'ssh -X' or under xvfb-run, {ELSEWHERE}"
         )
     return _plugin_trouble() or _server_trouble()
 
@@ -136,10 +136,10 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
         "--bench", type=Path, metavar="BENCH.toml", help="hardware configuration to begin with"
     )
     parser.add_argument(
-        "--settings", type=Path, metavar="FILE.ini", help="settings file; the user's if absent"
+        "--settings", type=Path, metavar="FILE.ini", help="settings file; by default the user's own"
     )
     parser.add_argument(
-        "--screenshots", type=Path, metavar="DIR", help="save a picture of every page there, and exit"
+        "--screenshots", type=Path, metavar="DIR", help="save a picture of every page in DIR, and exit"
     )
     return parser.parse_args(arguments)
 

@@ -320,9 +320,7 @@ class Bridge(QObject):
     ) -> None:
         if self._line is None:
             self.noticed.emit(
-                Notice(
-                    NoticeKind.WARNING, "No bench is open.", next_step="Open one on the Rig page (Ctrl+1)."
-                )
+                Notice(NoticeKind.WARNING, "No bench is open.", next_step="Open it on the Rig page (Ctrl+1).")
             )
             return
         self._orders += 1

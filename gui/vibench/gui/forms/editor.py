@@ -223,7 +223,7 @@ class ListEditor:
     def __init__(self, unit: str, changed: Callable[..., None]) -> None:
         self._unit = unit if unit in CHOICES else ""
         self._line = LineField()
-        self._line.setPlaceholderText("none; or for example 95, 266, 500")
+        self._line.setPlaceholderText("none, or a list such as 95, 266, 500")
         self._line.editingFinished.connect(changed)
         self._complaint = ""
         self._shown: tuple[str, list[Any]] = ("", [])
@@ -251,7 +251,7 @@ class ListEditor:
                 ]
             return json.loads(f"[{text}]")
         except json.JSONDecodeError as error:
-            self._complaint = f"{text!r} is not a list ({error.msg}); write for example 95, 266, 500"
+            self._complaint = f"{text!r} is not a list ({error.msg}); write a list such as 95, 266, 500"
         except ConfigurationError as error:
             self._complaint = str(error)
         return []
@@ -289,4 +289,4 @@ def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None
         return ListEditor(facts.unit, changed)
     if plain is str:
         return SuggestionEditor(facts.examples, changed) if facts.examples else TextEditor(changed)
-    raise TypeError(f"{facts.name} is a {annotation}, and no form can edit that; add an editor for it")
+    raise TypeError(f"{facts.name} has the type {annotation}, for which there is no editor; add one")

@@ -178,7 +178,7 @@ class GroupEditor:
         if len(kinds) > 1:
             self._kind = ChoiceEditor(tuple(_kind_of(kind) for kind in kinds), self._turn)
             self._kind.widget.setAccessibleName(f"Kind of {facts.label.lower()}")
-            self._kind.widget.setToolTip(f"What kind of {facts.label.lower()} it is")
+            self._kind.widget.setToolTip(f"Choose the kind of {facts.label.lower()}")
             self._layout.addWidget(self._kind.widget)
         self.form = self._new_form(kinds[0])
 
@@ -321,7 +321,7 @@ def _sentence(text: str, facts: FieldFacts) -> str:
     """Reword a complaint of the model for the form."""
     unit = f" in {facts.shown_unit}" if facts.unit else ""
     if text == "Field required":
-        return f"nothing is given; type a value{unit}"
+        return f"the field is empty; type a value{unit}"
     allowed = f"; allowed is {facts.limits}" if facts.limits else unit and f"; give it{unit}"
     return text.replace("Input should be", "must be") + (allowed if text.startswith("Input should") else "")
 

@@ -225,12 +225,10 @@ class QuantityEdit(QAbstractSpinBox):
         example = "" if self._value is None else quantity_text(self._value, self._unit)
         value = parse_quantity(text, self._unit, self._shown_unit, example)
         if not isfinite(value):
-            raise ConfigurationError(
-                f"{_short(text)} is too large a number; write for example {example or 12}"
-            )
+            raise ConfigurationError(f"{_short(text)} is too large; write a number such as {example or 12}")
         if self._kind is int:
             if value != int(value) or abs(value) > MOST_WHOLE:
-                raise ConfigurationError(f"{_short(text)} is not a whole number below 2^53; give one")
+                raise ConfigurationError(f"{_short(text)} is not allowed; give a whole number below 2^53")
             return int(value)
         # Compare the texts, so that rounding of the displayed number does not change the value.
         return (

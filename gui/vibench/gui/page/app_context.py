@@ -53,7 +53,7 @@ class Settings:
             return ""
         return (
             f"{self._store.fileName()} could not be written: the last test, campaign and layout are not "
-            "kept. Make room, or name another file with --settings"
+            "saved. Free disk space, or give another file with --settings"
         )
 
     def text(self, key: SettingKey, otherwise: str = "") -> str:

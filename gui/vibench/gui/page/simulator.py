@@ -34,7 +34,7 @@ class Simulator(QObject):
         self._context = context
         self._grown, self._ended, self._said = grown, ended, said
         self._job: Job | None = None
-        self.cancel_button = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
+        self.cancel_button = push_button("&Cancel", "Stop at once; keep the results so far", self.cancel)
         self.cancel_button.setEnabled(False)
         self.background = Background(1, self)
         page.destroyed.connect(self.background.close)
@@ -49,7 +49,7 @@ class Simulator(QObject):
         self._drop()
         self._job = self.background.stream(answer, self._grown, self._end, self._die, request)
         self.cancel_button.setEnabled(True)
-        self._said("Computing; the program is being loaded for the first result…")
+        self._said("Computing; the first result appears once the program is loaded…")
 
     def cancel(self) -> None:
         """Cancel the request; the results so far stay."""

@@ -35,7 +35,7 @@ class UserActions(QObject):
         """Return the test of the Test page; without a complete one, give a message and None."""
         measurement = self._context.selection.measurement
         if measurement is None:
-            next_step = "Correct what is marked on the Test page (Ctrl+2)."
+            next_step = "Correct the marked fields on the Test page (Ctrl+2)."
             self._context.warn("The test is not complete.", next_step=next_step)
         return measurement
 
@@ -56,7 +56,7 @@ class UserActions(QObject):
         """Arm the campaign of the Queue page, in a folder with its name."""
         campaign = self._context.selection.campaign
         if campaign is None:
-            self._context.warn("There is no campaign.", next_step="Open or create one on the Queue page.")
+            self._context.warn("There is no campaign.", next_step="Open a campaign on the Queue page.")
             return
         folder = self._context.folder / campaign.name
         self._arm(campaign, folder, existing=existing, attendance=attendance)
@@ -80,8 +80,8 @@ class UserActions(QObject):
             self._context.bridge.order(EngineClient.start)
         else:
             self._context.warn(
-                "Cannot start: the description of the test has not been shown to its end.",
-                next_step="Read it on the Run page (Ctrl+3); PgDn scrolls.",
+                "Cannot start: the description of the test was not scrolled to its end.",
+                next_step="Read it to the end on the Run page (Ctrl+3); PgDn scrolls.",
             )
             self._context.page_requested.emit(RUN)
 
@@ -106,7 +106,7 @@ class UserActions(QObject):
         bridge = self._context.bridge
         if bridge.is_ordering:
             self._context.warn(
-                f"Cannot {verb} yet: {_BUSY}.", next_step="Try again when the state above has changed."
+                f"Cannot {verb} yet: {_BUSY}.", next_step="Wait until it has ended, then try again."
             )
         elif bridge.state not in states:
             self._context.warn(f"Cannot {verb}: {_STANDS[bridge.state]}.", next_step=_NEXT[bridge.state])
@@ -123,18 +123,18 @@ _STANDS = {
     EngineState.CHECKING: "the bench is being checked",
     EngineState.ARMED: "a plan is armed",
     EngineState.RUNNING: "a measurement is running",
-    EngineState.HELD: "a measurement is held, its drive is on",
+    EngineState.HELD: "a measurement is held with the drive on",
     EngineState.RAMPING_DOWN: "the drive is ramping down",
     EngineState.FAULT: "the bench has a fault and is closed",
 }
 _NEXT = {
-    EngineState.CLOSED: "Open one on the Rig page (Ctrl+1).",
+    EngineState.CLOSED: "Open a bench on the Rig page (Ctrl+1).",
     EngineState.OPENING: "Wait for READY.",
     EngineState.READY: "Arm the test first (Ctrl+Return).",
     EngineState.CHECKING: "Wait for READY.",
-    EngineState.ARMED: "Start it (F5), or disarm it (Cancel on the Run page).",
-    EngineState.RUNNING: "Wait for its end, or stop it (STOP, Esc).",
-    EngineState.HELD: "Go on (Run page), or stop it (STOP, Esc).",
+    EngineState.ARMED: "Start the plan (F5), or disarm it (Cancel on the Run page).",
+    EngineState.RUNNING: "Wait until it has ended, or stop it (STOP, Esc).",
+    EngineState.HELD: "Press Go on (Run page), or stop it (STOP, Esc).",
     EngineState.RAMPING_DOWN: "Wait for READY.",
     EngineState.FAULT: "See Details for the cause, then open the bench again on the Rig page (Ctrl+1).",
 }

@@ -75,7 +75,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
             painter.end()
         case ending:
             if not plot.grab().save(memory, ending.removeprefix(".")):
-                raise OSError(0, "give an ending: .png, .svg or .csv")
+                raise OSError(0, "the name must end in .png, .svg or .csv")
     with replace_file(path) as coming:
         coming.write_bytes(memory.data().data())
 

@@ -97,7 +97,7 @@ class StateIndicator:
 
 
 STOP_TEXT, AT_ONCE_TEXT = "■ STOP: ramp down   (Esc: abort)", "■ STOP: at once   (Esc: abort)"
-CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page")
+CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open a bench on the Rig page")
 
 
 class Banner(QFrame):
@@ -183,11 +183,11 @@ NEXT_STEPS = {
     EngineState.OPENING: "The bench is being opened.",
     EngineState.READY: "Next: Ctrl+Return arms the test of the Test page (Ctrl+2). F6 checks the bench.",
     EngineState.CHECKING: "The bench is being checked.",
-    EngineState.ARMED: "Next: F5 starts what the Run page says. Cancel there disarms.",
-    EngineState.RUNNING: "STOP ramps down as planned; Esc aborts, from anywhere.",
-    EngineState.HELD: "The drive may be on. Go on from the Run page; STOP ramps down, Esc aborts.",
+    EngineState.ARMED: "Next: F5 starts the plan shown on the Run page; Cancel there disarms it.",
+    EngineState.RUNNING: "STOP ramps down as planned; Esc aborts from every page.",
+    EngineState.HELD: "The drive may be on. Press Go on (Run page); STOP ramps down, Esc aborts.",
     EngineState.RAMPING_DOWN: "Ramping down; Esc aborts.",
-    EngineState.FAULT: "Details say what happened. Open the bench again on the Rig page (Ctrl+1).",
+    EngineState.FAULT: "See Details for the cause. Open the bench again on the Rig page (Ctrl+1).",
 }
 _BYTES_PER_SAMPLE = 4
 _LITTLE_ROOM_S = 3600.0
@@ -212,7 +212,7 @@ def _detail(status: EngineStatus) -> str:
                 f"{status.bench.rig_name}, simulated" if status.bench.is_simulated else status.bench.rig_name
             )
         case EngineState.ARMED if status.armed is not None:
-            return f"F5 starts the drive; disarms itself in {status.armed.expires_in_s:.0f} s"
+            return f"F5 starts the drive; the plan disarms itself in {status.armed.expires_in_s:.0f} s"
         case EngineState.HELD:
             return f"The drive stays on   ·   {run_text(status.run)}"
         case EngineState.RUNNING | EngineState.RAMPING_DOWN:

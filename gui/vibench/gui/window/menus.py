@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def whole_path(folder: str) -> str:
     """Return an absolute path; raises ValueError for a path relative to the working directory."""
     if not Path(folder).expanduser().is_absolute():
-        raise ValueError(f"{folder!r} is not a whole path; give one such as {Path.home() / 'vibench'}")
+        raise ValueError(f"{folder!r} is not an absolute path; give {Path.home() / 'vibench'}, for example")
     return folder
 
 
@@ -236,12 +236,12 @@ class MenuAction:
 
 
 OTHER_KEYS: tuple[tuple[str, str], ...] = (
-    ("Esc, Pause", "abort with the fastest ramp of the shaker, from anywhere"),
+    ("Esc, Pause", "abort from any page, with the fastest ramp of the shaker"),
     ("Space", "freeze the picture (Run page); the recording goes on"),
     ("PgDn, PgUp", "scroll the description of the test (Run page)"),
     ("M", "mark an event in the recording (Run page)"),
     ("A, L", "in a plot: show everything, logarithmic axis"),
-    ("G, D", "in a plot: read values, mark a place to read differences"),
+    ("G, D", "in a plot: read values; mark a point to read differences"),
     ("Ctrl+C", "copy the picture of a plot, or the chosen cells of a table"),
     ("Menu key", "context menu of the focused plot or table"),
     ("F4, Alt+Down", "open the list of a choice"),
@@ -270,7 +270,7 @@ def menu_actions(window: "Window") -> tuple[MenuAction, ...]:
             "&File", "&Settings…", lambda: SettingsDialog(context, window).open(), "Ctrl+,", "settings"
         ),
         MenuAction("&File", "&Quit", window.close, "Ctrl+Q"),
-        MenuAction("Edit", "&Undo", window.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
+        MenuAction("Edit", "&Undo", window.undo, "Ctrl+Z", "undo an edit of the test or campaign"),
         MenuAction("Edit", "&Redo", window.redo, "Ctrl+Shift+Z", "make it again"),
         MenuAction("&Test", "&Check the bench", actions.check, "F6"),
         MenuAction("&Test", "Check as a new &reference", partial(actions.check, new_reference=True)),

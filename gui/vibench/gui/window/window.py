@@ -247,7 +247,7 @@ class Window(QMainWindow):
         if self.context.bridge.may_leave:
             leave = box.addButton("Continue it and close", QMessageBox.ButtonRole.DestructiveRole)
             box.setInformativeText(
-                "It was armed to run unattended: the next window shows it, as 'vibench watch' does; "
+                "It was armed to run unattended: 'vibench watch' or a new window shows it; "
                 "'vibench stop' ends it."
             )
         box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))

@@ -137,7 +137,7 @@ def test_a_chain_is_simulated_and_drawn_over_frequency_cells_and_time(page, wait
         np.testing.assert_allclose(np.round(trace), place)
     assert lines(energies)[0].getOriginalDataset()[0].tolist() == [1.0, 2.0, 3.0]
     ((_, _, said),) = energies._legend_entries
-    assert said == f"3 cells at 220 Hz, {run.impacts.sum() / run.observed_s:.4g} impacts a second in all"
+    assert said == f"3 cells at 220 Hz, {run.impacts.sum() / run.observed_s:.4g} impacts per second in total"
     assert not view._compare.isEnabled()
 
 

@@ -91,7 +91,7 @@ class ComparePage(Page):
         self.plots = CurvePlots(context.theme)
         self.panel = AnalysisPanel()
         self.pair_box = PairBox()
-        self.peaks = NumberTable("Peaks of the curves", "Peaks of the ticked curves: place, height, damping.")
+        self.peaks = NumberTable("Peaks of the curves", "Frequency, height and damping of each ticked curve.")
         self.readings = NumberTable(
             "Curves at the markers", "Show the markers (Alt+M) to read the ticked curves at two frequencies."
         )
@@ -180,7 +180,7 @@ class ComparePage(Page):
         self._recordings[found.path] = found
         self.curves.replace_source(found.name, found.curves)
         for sentence in found.failures:
-            self.context.warn(sentence, "The measured curves are shown without it.")
+            self.context.warn(sentence, "Only the measured curves are shown.")
         self._end_job()
 
     def _failed(self, error: BaseException) -> None:
@@ -246,7 +246,7 @@ class ComparePage(Page):
     def _side(self) -> QWidget:
         add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)
         branches = push_button(
-            "&Branches…", "Choose files that vibench branches wrote", self._choose_branches
+            "&Branches…", "Choose files written by vibench branches", self._choose_branches
         )
         remove = push_button("&Remove", "Remove the selected curves", self._remove)
         self.curves.setMinimumHeight(6 * self.fontMetrics().height())
@@ -259,17 +259,17 @@ class ComparePage(Page):
         tabs.addTab(self.readings, "At the mar&kers")
         vertical = splitter("Picture and numbers", self.plots, tabs, (560, 170))
         vertical.setStretchFactor(0, 1)
-        self._markers = push_button("&Markers", "Show two markers to read the curves at", lambda: None)
+        self._markers = push_button("&Markers", "Read the curves at two markers", lambda: None)
         self._markers.setCheckable(True)
         self._markers.toggled.connect(self.plots.markers.show)
         self._markers.toggled.connect(lambda is_on: tabs.setCurrentIndex(int(is_on)))
         show_all = push_button(
-            "Sho&w all", "Let the axes follow the curves", self.plots.magnitudes.show_everything
+            "Sho&w all", "Scale the axes to all curves", self.plots.magnitudes.show_everything
         )
         self._export = push_button("E&xport…", "Write picture, numbers or report", self._choose_export)
         self._report = push_button(
             "Report…",
-            "Write one page with curves, peaks and recordings",
+            "Write an HTML page with curves, peaks and recordings",
             partial(self._choose_export, REPORT),
         )
         self._export.setEnabled(False)

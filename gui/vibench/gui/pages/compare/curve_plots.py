@@ -53,7 +53,7 @@ class CurvePlots(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.magnitudes = Plot("Curves over frequency", LOG_FREQUENCY, MAGNITUDE, theme).with_hint(
-            "Add recordings or a prediction of the Simulate page: the curves appear here, their peaks below."
+            "Add recordings, or a prediction from the Simulate page. Their peaks are listed below the curves."
         )
         self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme).with_hint(
             "Select a curve and its reference on the left."
@@ -296,9 +296,7 @@ def _caution(curve: Curve, reference: Curve) -> str:
     if levels[0] == levels[1]:
         return ""
     texts = ["as driven" if each is None else f"{1e6 * each:.4g} µm" for each in levels]
-    return (
-        f". ⚠ Levels of the base: {texts[0]} and {texts[1]}; with contact, the response depends on the level"
-    )
+    return f". ⚠ Base levels: {texts[0]} and {texts[1]}; with contact, the response depends on the level"
 
 
 _NOBODY = "– nothing –"

@@ -223,7 +223,7 @@ class FilesPage(Page):
         if self._opened is None:
             return
         low_s, high_s = self.time_histories.view_s
-        text = f"In sight: {low_s:.6g} to {high_s:.6g} s"
+        text = f"Shown: {low_s:.6g} to {high_s:.6g} s"
         if markers_s := self.time_histories.markers.values:
             early_s, late_s = markers_s
             between_s = late_s - early_s
@@ -265,7 +265,7 @@ class FilesPage(Page):
         self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
 
     def _write_note(self) -> None:
-        text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is stored in the recording.")
+        text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "The recording stores the note.")
         if is_given and text.strip():
             self.context.background.ask(
                 add_note, self._choose, self.context.fail, self.table.chosen_paths()[0], text.strip()
@@ -296,9 +296,9 @@ class FilesPage(Page):
         self._goes_to = ElidedLabel(rank="second")
         self._count = ElidedLabel(rank="second")
         self._compare = push_button(
-            "Co&mpare", "Overlay the selected recordings on others", self._hand_to_compare
+            "Co&mpare", "Overlay the selected recordings on the Compare page", self._hand_to_compare
         )
-        self._export = push_button("E&xport…", "Export it for other programs", self._choose_export)
+        self._export = push_button("E&xport…", "Export the recording for other programs", self._choose_export)
         self._note = push_button("Add a &note…", "Store a note in the recording", self._write_note)
         for button in (self._compare, self._export, self._note):
             button.setEnabled(False)
@@ -320,9 +320,9 @@ class FilesPage(Page):
 
     def _viewer(self) -> QWidget:
         self._title = ElidedLabel("No recording is open", rank="title")
-        self._facts = SentenceLabel("Choose one in the list above.", rank="second")
+        self._facts = SentenceLabel("Choose a recording in the list above.", rank="second")
         self._view = ElidedLabel()
-        self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
+        self._markers = push_button("Mar&kers", "Measure between two markers", lambda: None)
         self._markers.setCheckable(True)
         self._markers.toggled.connect(self.time_histories.markers.show)
         bar = row(

@@ -243,7 +243,7 @@ class CampaignChoice(Choice):
 
     def __init__(self) -> None:
         super().__init__("Campaign")
-        self.setToolTip("List the recordings of one campaign")
+        self.setToolTip("Show only recordings of one campaign")
         self.setMinimumContentsLength(22)
         self._campaigns: tuple[ListedCampaign, ...] = ()
         self.currentIndexChanged.connect(lambda _index: self._choose())
@@ -415,7 +415,7 @@ class RecordingTable(QTableView):
         super().paintEvent(event)
         if self._sorted.rowCount() == 0:
             words = (
-                "No recording fits the search and the campaign that are chosen."
+                "No recording matches the search and the selected campaign."
                 if self.recordings.entries
                 else "The folder is being read."
                 if self.is_listing

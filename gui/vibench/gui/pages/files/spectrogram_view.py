@@ -161,7 +161,7 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
 
     def _request_for(self, recording: Recording, low_s: float, high_s: float) -> HiddenViewRequest | str:
         if high_s - low_s > LONGEST_VIEW_S:
-            return f"Zoom in to {LONGEST_VIEW_S:g} s or less: p swings a thousand times a second."
+            return f"Zoom in to {LONGEST_VIEW_S:g} s or less: p oscillates at about 1 kHz."
         numbers = Numbers.FOUND if self.find_numbers.isChecked() else Numbers.AS_DESCRIBED
         return HiddenViewRequest(Path(recording.path), low_s, high_s, self.specimen.currentData(), numbers)
 
@@ -284,7 +284,7 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         self._images[found.request.spacing].show_picture(found)
         self.caption.setText(
             f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "
-            f"every sample used"
+            f"all samples used"
         )
 
     def _erase(self, hint: str) -> None:

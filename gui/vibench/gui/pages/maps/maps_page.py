@@ -41,9 +41,7 @@ from ...widgets.units import SentenceLabel
 AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
 """Style of marks on a map, whose colours are the same in every theme."""
-HINT = (
-    "Kinds of motion over frequency and amplitude, drawn while computed. A click shows the motion at a point."
-)
+HINT = "Kinds of motion over frequency and amplitude, drawn while computed. Click a point to see its motion."
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
 """The colour scale ends at this quantile, and begins at one minus this quantile."""
@@ -338,10 +336,8 @@ class MapsPage(Page):
             self.context.page_requested.emit(SIMULATE)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button(
-            "&Map", "Compute the request of the form in another process", self.begin, "first"
-        )
-        self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
+        self._begin = push_button("&Map", "Start the computation in a separate process", self.begin, "first")
+        self._finer = push_button("Fi&ner", "Compute only the range of the axes", self.begin_in_sight)
         return row((self._begin, 1), (self._finer, 1), (self.simulator.cancel_button, 1))
 
     def _answer(self) -> QWidget:
@@ -349,7 +345,7 @@ class MapsPage(Page):
         self.quantity.currentIndexChanged.connect(self._recolour)
         self._open = push_button(
             "&Open in Simulate",
-            "Simulate a frequency range around this point, with errors",
+            "Simulate a frequency range around this point, with error estimates",
             self._open_in_simulate,
         )
         self._open.setEnabled(False)

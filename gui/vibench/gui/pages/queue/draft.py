@@ -86,8 +86,8 @@ def _require_playable(campaign: Campaign, rig: Rig) -> None:
     allowed = rig.generator.amplitude_limit_vpp
     if needed_v > allowed:
         raise ConfigurationError(
-            f"The sweep asks for up to {needed_v:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on "
-            "this bench (amplitude_limit_vpp of the hardware configuration): lower its levels."
+            f"The sweep needs up to {needed_v:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on this "
+            "bench (amplitude_limit_vpp of the hardware configuration). Lower the levels of the sweep."
         )
 
 

@@ -150,17 +150,17 @@ class QueuePage(Page):
         self.summary = SentenceLabel(name="Summary of the campaign")
         self.progress = ProgressBar("Progress of the campaign", "not running")
         self.arm_button = push_button(
-            "Arm the ca&mpaign…", "Describe in words what will happen", self._arm, "first"
+            "Arm the ca&mpaign…", "Arm, and describe what will be played", self._arm, "first"
         )
         self.resume_button = push_button(
             "Resume: arm what is missin&g…",
-            "Keep complete recordings in the folder and record the rest",
+            "Keep the complete recordings of the folder; record only the missing ones",
             self._arm_missing,
         )
         self.unattended = QCheckBox("Left alone")
         self.unattended.setToolTip(
-            "The engine controls limits, ramps and recordings. 'vibench watch' and 'vibench stop' reach it "
-            "from a terminal.\nUnticked, the drive ramps down when the window does not answer."
+            "Ticked: the engine keeps limits, ramps and recordings without the window; use 'vibench watch' "
+            "and 'vibench stop'.\nNot ticked: the drive ramps down when the window does not respond."
         )
         self.unattended.setChecked(True)
         self.hold_button = push_button(
@@ -338,7 +338,7 @@ class QueuePage(Page):
             try:
                 campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
             except (ConfigurationError, tomllib.TOMLDecodeError) as error:
-                self.context.say(notice_of(error, "It was ignored; open or create another one."))
+                self.context.say(notice_of(error, "It was ignored; open or create another campaign."))
             else:
                 self.context.selection.choose_campaign(campaign)
         self._show_campaign()
@@ -367,7 +367,7 @@ class QueuePage(Page):
             push_button("&Remove", "Remove the chosen entry", self._remove),
         )
         campaign = titled_box("Campaign", self.entries, edits)
-        attended = SentenceLabel("continues when the window freezes or is closed", rank="second")
+        attended = SentenceLabel("The campaign continues if the window freezes or is closed", rank="second")
         left = column(self.choice, files, (campaign, 1), self.sweep)
         right = column(
             self.summary,

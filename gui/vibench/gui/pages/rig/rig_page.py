@@ -43,7 +43,7 @@ from ...widgets.notice import RIG, moment_text
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, prefixed_unit
 
-PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
+PACES = {"wall": "in real time, like a real bench", "free": "as fast as this computer can"}
 
 
 class RigChoice(QWidget):
@@ -60,8 +60,8 @@ class RigChoice(QWidget):
         self.complaint = self.warning = ""
         """Error and warnings about the selected file; each text is empty if there is none."""
         self._box, self.pace = Choice(), Choice(items=PACES.values())
-        self._box.setToolTip("Instruments connected to this computer; a simulated rig runs anywhere")
-        self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
+        self._box.setToolTip("A real bench needs its instruments; a simulated rig needs none")
+        self.pace.setToolTip("Speed of the simulated instruments; a real bench runs in real time")
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
         self._form.addRow(label_for("Configuration", self._box, "Hardware configuration"), self._box)
@@ -129,11 +129,11 @@ class KnobSheetForm(QGroupBox):
 
     def __init__(self) -> None:
         super().__init__("Settings made by hand")
-        self._note = QLabel("Look at each knob, then tick it. No instrument can report these.")
+        self._note = QLabel("Check each knob, then tick it. Instruments cannot report these settings.")
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")
         self.operator_field = LineField()
-        self.operator_field.setToolTip("Your name; it goes into every recording")
+        self.operator_field.setToolTip("Your name; it is stored in every recording")
         self.operator_field.textChanged.connect(self.changed)
         self._ticks: dict[Knob, QCheckBox] = {}
         self._layout = QVBoxLayout(self)
@@ -196,9 +196,9 @@ def expected_text(finding: Finding) -> str:
 
 
 FIRST_STEPS = (
-    "A first measurement takes three keys: Alt+O opens this bench, Ctrl+Return arms the test of the Test "
-    "page and says in words what will happen, F5 starts it. It ends by itself; Files and Compare show what "
-    "was recorded. F1 lists all keys."
+    "A first measurement needs three keys: Alt+O opens this bench, Ctrl+Return arms the test of the Test "
+    "page and describes what will happen, F5 starts the test. The test ends by itself; the Files and Compare "
+    "pages show the recording. F1 lists all keys."
 )
 VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ fail"}
 
@@ -216,10 +216,10 @@ class RigPage(Page):
             "&Open bench", "Open every instrument; the generator stays silent", self.open_bench, "first"
         )
         self.close_button = push_button(
-            "Close bench", "Silence everything and close the instruments", self._close
+            "Close bench", "Silence all outputs and close the instruments", self._close
         )
         self.check_button = push_button(
-            "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks", self._actions.check
+            "Check bench  (F6)", "Play a small sine; check noise, gains, clocks", self._actions.check
         )
         self.find_button = push_button("Find instruments", "List all instruments found", self._find)
         self.instruments = ReadTable(
@@ -294,7 +294,7 @@ class RigPage(Page):
             self.verdict.setText("◍ Checking: a small sine plays for some seconds")
         elif report is None:
             self.verdict.setText(
-                "Not checked yet. F6 plays two per cent of the allowed level for some seconds."
+                "Not checked yet. F6 plays a sine at two per cent of the allowed level for some seconds."
             )
             self.findings.show_rows([])
         else:
@@ -331,7 +331,7 @@ class RigPage(Page):
         if rig is None:
             return
         self.find_button.setEnabled(False)
-        self.instruments.show_rows([("looking", "some seconds; a simulated rig is switched on for it")])
+        self.instruments.show_rows([("looking", "takes some seconds; a simulated rig is started for it")])
         self.context.background.ask(list_rig_instruments, self._found, self._not_found, rig)
 
     def _found(self, found: InstrumentList) -> None:

@@ -72,7 +72,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
     """Return the plot of Responses I and II."""
     up = PlotAxis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
     plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
-    plot.with_hint("A point every tenth of a second of a dwell or a sweep, with the prediction.")
+    plot.with_hint("One point per tenth of a second of a dwell or sweep, and the prediction.")
     made = SweepPlot("Responses", plot)
     made.predicted = {
         "response_i": plot.curve(PREDICTED, "I, simulated"),
@@ -89,7 +89,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
 def sweep_envelope(theme: Theme) -> SweepPlot:
     """Return the plot of the largest and smallest velocity of m0."""
     plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "m/s"), theme).with_legend()
-    plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
+    plot.with_hint("Largest and smallest velocity of m0 during a sweep.")
     made = SweepPlot("Envelope", plot)
     made.measured = {
         "upper": plot.curve(curve_style(3), "largest"),
@@ -178,7 +178,7 @@ class TimeHistoryPlots(PlotStack):
         for (role, unit), plot, curve in zip(channels, plots, self._curves, strict=True):
             curve.clear()
             plot.setAccessibleName(f"Time history of {channel_word(role)}")
-            plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
+            plot.with_hint(f"The newest seconds of {channel_word(role)} appear while a test runs.")
             plot.up.show_unit(channel_axis(role, unit))
         self.plots = plots
         self._span_s = 0.0
@@ -198,7 +198,7 @@ class TransmissibilityPlot(QWidget):
         super().__init__()
         up = PlotAxis("|x / U|", scale=Scale.LOGARITHMIC)
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
-        self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
+        self.magnitude.with_hint("Motion of m0 / motion of the base, with bounds, appears while a test runs.")
         self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
         shade = LineStyle(lambda theme: theme.traces[0], fill_opacity=0.25)
         self._band = self.magnitude.band(shade, MEASURED)
@@ -248,7 +248,7 @@ class SpectrumPlot(QWidget):
         label = "Amplitude density, channel's unit / √Hz"
         up = PlotAxis(label, scale=Scale.LOGARITHMIC, short="unit / √Hz")
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
-        self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
+        self.plot.with_hint("Spectra of all channels over the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []
         self._view: LiveView | None = None
         UNITS.on_change(self._redraw)
@@ -300,8 +300,8 @@ class PortraitPlot(QWidget):
         super().__init__()
         self.orbit = Plot("Phase portrait of the newest periods", _ACROSS, _UP, theme)
         self.section = Plot("Poincaré section of the run so far", _ACROSS, _UP, theme)
-        self.orbit.with_hint("The orbit of the newest periods of a sine.")
-        self.section.with_hint("One point a drive period, of the run so far.")
+        self.orbit.with_hint("Orbit over the newest drive periods of a sine test.")
+        self.section.with_hint("One point per drive period of the run so far.")
         self._orbit = self.orbit.curve(curve_style(0))
         self._strobe = self.orbit.dots(curve_style(3), size=6)
         self._points = self.section.dots(curve_style(3), size=3)
@@ -334,7 +334,7 @@ _SHADES = 5
 """Number of shades of a forecast; the faintest is at its end, where the error is a quarter of the gap."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
-_HINT = "p of m1 between its stops, while a test runs and the live twin is on."
+_HINT = "Motion p of m1 between its stops; shown while a test runs with the live twin."
 
 
 def _faded(number: int, theme: Theme) -> Colour:

@@ -103,7 +103,7 @@ class LevelMeters(QWidget):
         self._theme = theme
         self._rows: tuple[tuple[str, Level], ...] = ()
         self.setAccessibleName("Level meters")
-        self.setToolTip(f"Peak of each channel, of its full scale; red above {OVER_SHARE:.0%}")
+        self.setToolTip(f"Peak of each channel as a share of its full scale; red above {OVER_SHARE:.0%}")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def show_view(self, view: LiveView) -> None:
@@ -135,7 +135,7 @@ class LevelMeters(QWidget):
         """Paint every row."""
         painter = QPainter(self)
         if not self._rows:
-            paint_hint(painter, self.rect(), "Levels of all channels, while a test runs.", self._theme.muted)
+            paint_hint(painter, self.rect(), "Shows all channels while a test runs.", self._theme.muted)
         row_height = _ROW * self.fontMetrics().height()
         for number, (word, level) in enumerate(self._rows):
             self._paint_row(painter, QRectF(0, number * row_height, self.width(), row_height), word, level)
@@ -178,7 +178,7 @@ class WatchCard(QGroupBox):
         self.impacts = QLabel("0")
         self.impacts.setAccessibleName("Impacts so far")
         self.impacts.setProperty("rank", "title")
-        self.impacts.setToolTip("Jumps in the acceleration of m0, derived from its sensor")
+        self.impacts.setToolTip("Number of jumps in the acceleration of m0, derived from its sensor")
         self.meters = LevelMeters(theme)
         self.span = Choice(tip="Seconds in a time history", items=(f"{span_s:g} s" for span_s in SPANS_S))
         self.span.setCurrentIndex(SPANS_S.index(USUAL_SPAN_S))
@@ -186,15 +186,15 @@ class WatchCard(QGroupBox):
         self.freeze.setToolTip("Only the picture stops; the recording continues")
         self.twin = QCheckBox("Live twin")
         self.twin.setToolTip(
-            "Estimate the motion of m1 between its stops, and report changes of the specimen. It runs in a "
-            "separate process, so that the measurement never waits"
+            "Estimate the motion of m1 between its stops, and report changes of the specimen. The estimate "
+            "runs in a separate process, so the measurement never waits"
         )
         self.twin.clicked.connect(
             lambda is_on: self.twin_requested.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
         )
         self._begun = 0
         self.averages = QLabel("–")
-        self.averages.setToolTip("Averages of noise, started and planned")
+        self.averages.setToolTip("Averages of a noise test: started and planned")
         self.reject_button = push_button(
             "Reject this one", "Exclude the current average from all results", self.reject_requested.emit
         )
@@ -282,7 +282,7 @@ class ArmCard(QGroupBox):
         super().__init__("What will happen")
         self._words = SentenceLabel(name="What will happen")
         self.arm_button = push_button(
-            "A&rm…  (Ctrl+Return)", "Describe in words what will happen", self.arm_wanted.emit, "first"
+            "A&rm…  (Ctrl+Return)", "Arm, and describe what will be played", self.arm_wanted.emit, "first"
         )
         self.cancel_button = push_button("Cancel", "Disarm; nothing was played", self.cancel_wanted.emit)
         self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit, "first")
@@ -323,7 +323,7 @@ class ArmCard(QGroupBox):
             words = (f"Campaign {armed.campaign}", *armed.lines)
             self._show_words("\n".join((*words, left)))
         elif state in DRIVING:
-            self._show_words("Plan and limits are fixed while it runs. Stop ramps down; Esc aborts.")
+            self._show_words("Plan and limits are fixed during a run. STOP ramps down; Esc aborts.")
         else:
             self._show_words(_HINTS.get(state) or reason or f"Ready to arm: {test}")
         self.arm_button.setVisible(not is_armed and state not in DRIVING)

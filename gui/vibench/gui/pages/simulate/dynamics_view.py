@@ -158,9 +158,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return column(scene, before, 1)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button(
-            "Find", "Compute the request of the form in another process", self.begin, "first"
-        )
+        self._begin = push_button("Find", "Start the computation in a separate process", self.begin, "first")
         self.simulator.cancel_button.setText("Cancel")  # Alt+C is taken by another tab of the page
         return row((self._begin, 1), self.simulator.cancel_button)
 
@@ -168,7 +166,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._state = SentenceLabel("Nothing has been computed yet.")
         self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
         self._compare = push_button(
-            "Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+            "Lay over recordings", "Overlay these curves on recordings (Compare page)", self._hand_to_compare
         )
         self._compare.setEnabled(False)
         return column((self.picture.widget, 1), row((self._state, 1), self._compare))
@@ -181,8 +179,8 @@ BRANCHES = DynamicsKind(
     answer=BranchDiagram,
     curves=BranchDiagram.curves,
     before=(
-        "A search runs every start for 300 drive periods. A branch takes one to several seconds. Each "
-        "motion is shown with its error (docs/branches.md)."
+        "A search simulates every start for 300 drive periods. A branch takes one to several seconds. "
+        "Each motion is shown with its error (docs/branches.md)."
     ),
 )
 SPECTRUM = DynamicsKind(
@@ -191,8 +189,8 @@ SPECTRUM = DynamicsKind(
     hidden=frozenset({"described"}),
     answer=ExponentSpectrum,
     before=(
-        "Each point integrates six perturbations over its whole duration. The sum of the exponents is "
-        "known from the damping and checks the result (docs/branches.md)."
+        "At each point, six perturbations are integrated over the whole duration. The sum of the exponents "
+        "is known from the damping and is used as a check (docs/branches.md)."
     ),
 )
 CHAIN = DynamicsKind(
@@ -201,8 +199,8 @@ CHAIN = DynamicsKind(
     hidden=frozenset({"others", "described"}),
     answer=ChainAnswer,
     before=(
-        "Waves need no run. One simulated second with contacts takes a few hundredths of a second for 8 "
-        "cells, a third of a second for 64. Errors of contacts follow the accuracy; energies have a "
-        "standard error (docs/chains.md)."
+        "Waves are computed without a simulation. With contacts, one simulated second takes a few "
+        "hundredths of a second for 8 cells and a third of a second for 64. The error of contacts follows "
+        "the accuracy; energies have a standard error (docs/chains.md)."
     ),
 )

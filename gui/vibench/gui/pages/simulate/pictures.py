@@ -68,7 +68,7 @@ class BranchPicture(_PairPicture):
 
     def __init__(self, theme: Theme) -> None:
         axes = RESPONSES[0][1], RESPONSES[1][1]
-        hint = "Periodic motions: stable ones solid, unstable ones dashed, as they are found."
+        hint = "Periodic motions, drawn when found: solid if stable, dashed if unstable."
         titles = ("Response I of branches", "Response II of branches")
         super().__init__(theme, titles, axes, hint)
 
@@ -99,7 +99,7 @@ class SpectrumPicture(_PairPicture):
     """Plots of the six Lyapunov exponents and of the dimension, with their intervals."""
 
     def __init__(self, theme: Theme) -> None:
-        hint = "All six Lyapunov exponents with their intervals, as they are found."
+        hint = "All six Lyapunov exponents with their intervals, drawn when found."
         titles = ("Exponents", "Kaplan-Yorke dimension")
         super().__init__(theme, titles, (EXPONENT, DIMENSION), hint)
 
@@ -178,7 +178,7 @@ class ChainPicture:
             self._show_motion(run)
             known = np.isfinite(run.energy_j) & (run.energy_j > 0.0)
             place = np.arange(1.0, run.cells + 1.0)[known]
-            impacts = f"{run.impacts.sum() / run.observed_s:.4g} impacts a second in all"
+            impacts = f"{run.impacts.sum() / run.observed_s:.4g} impacts per second in total"
             where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
             self.energies.dots(curve_style(1), f"{run.cells} cells{where}, {impacts}", size=7).setData(
                 place, run.energy_j[known]
@@ -215,15 +215,15 @@ class ChainPicture:
 RESPONSE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 LARGEST_EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent")
 DIFFERENCE = PlotAxis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
-RUN_TIME = PlotAxis("Time, to the end of the run", "ms", factor=1e3)
+RUN_TIME = PlotAxis("Time in the last part of the run", "ms", factor=1e3)
 DISPLACEMENT = PlotAxis("Displacement", "m")
 _COLLIDING = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _EDGE = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _HINTS = (
-    "Responses I and II of every model, as they are found.",
+    "Responses I and II of every model, drawn while computed.",
     "The motion of the masses at the frequency given under Signal.",
-    "Largest Lyapunov exponents: choose them under Exponent in the scene.",
-    "How far the two models differ, where both are known.",
+    "Largest Lyapunov exponents, if chosen under Exponent in the scene.",
+    "Difference of the two models, where both are known.",
 )
 _SMALLEST_DIFFERENCE = 1e-6
 """Smaller differences are drawn at this value, because zero has no logarithm."""

@@ -173,7 +173,7 @@ class SimulatePage(Page):
 
     def _buttons(self) -> QLayout:
         self._begin = push_button(
-            "&Simulate", "Compute the request of the form in another process", self.begin, "first"
+            "&Simulate", "Start the computation in a separate process", self.begin, "first"
         )
         return row((self._begin, 1), self.simulator.cancel_button)
 
@@ -183,7 +183,7 @@ class SimulatePage(Page):
         self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance(letters))
         self._state = SentenceLabel()
         self._compare = push_button(
-            "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+            "&Lay over recordings", "Overlay these curves (Compare page)", self._hand_to_compare
         )
         self.motions = ReadTable(
             "Motions of points that depend sensitively on the start, and their shares", MOTION_COLUMNS

@@ -101,7 +101,7 @@ class TestForm(ValidatedForm[Measurement]):
         super().__init__(Measurement, "test", frozenset({"repeats"}))
         limits = self.form.editors["limits"].widget
         assert isinstance(limits, QGroupBox)
-        limits.setTitle("Limits  (1 = the rig's own)")
+        limits.setTitle("Limits  (1 = limit of the rig)")
         excitation = self.form.editors["excitation"]
         assert isinstance(excitation, GroupEditor)
         lines = {word: (each.group, each.about) for word, each in EXCITATION_KINDS.items()}
@@ -167,7 +167,7 @@ class PredictionPlot(Plot):
         up = PlotAxis("Response", "x / A0", scale=Scale.LOGARITHMIC)
         super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
         self.with_legend()
-        self.with_hint("The specimen is being simulated under this test.")
+        self.with_hint("The response of the specimen to this test is being simulated.")
         self._first = self.curve(
             LineStyle(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated"
         )
@@ -204,7 +204,7 @@ class PreviewPlots(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self.time = Plot("Signal at the generator, in time", TIME, PlotAxis("Generator", "V"), theme)
+        self.time = Plot("Signal of the generator over time", TIME, PlotAxis("Generator", "V"), theme)
         self.spectrum = Plot(
             "Spectrum of the signal",
             LOG_FREQUENCY,
@@ -296,7 +296,7 @@ def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
     if seen.least_growth_time_s is not None:
         parts.append(
-            f"holds motions that take {seen.least_growth_time_s:.3g} s or more to grow by a factor e"
+            f"holds motions whose deviations take {seen.least_growth_time_s:.3g} s or more to grow e-fold"
         )
     passed = [check for check in seen.checks if not check.is_kept]
     broken = sorted(passed, key=lambda check: not check.forbids)
@@ -346,7 +346,7 @@ class TestPage(Page):
         self.expectation = SentenceLabel(rank="second")
         self.arm_button = push_button(
             "A&rm the test…  (Ctrl+Return)",
-            "Show in words what will happen; nothing plays before Start",
+            "Arm, and describe what will be played; nothing plays before Start",
             self._actions.arm_test,
             "first",
         )
@@ -458,7 +458,7 @@ class TestPage(Page):
         known = [each.sentence for each in prediction.expected if each.scatter is not None]
         text = f"Will be known: {known[0]} …" if known and sentences[1:] else "".join(sentences[:1])
         if prediction.recorded_s is not None:
-            text = f"Will record for about {prediction.recorded_s:.3g} s, until known. {text}"
+            text = f"Records until the results are known, about {prediction.recorded_s:.3g} s. {text}"
         self.expectation.setText(text)
         self.expectation.setToolTip("\n".join(sentences))
 
@@ -539,7 +539,7 @@ class TestPage(Page):
         cells.addWidget(titled_box("Against the limits", (self.limits, 1)), 2, 0)
         cells.addWidget(
             titled_box(
-                "What the specimen is predicted to do",
+                "Predicted response of the specimen",
                 (self.prediction, 1),
                 self.prediction_note,
                 self.expectation,
