@@ -81,7 +81,7 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
     if not programs or any(fate_of(stop) is not Fate.SILENT for stop in stops):
         return None
     for each in living:
-        print(f"{each.name()}: has taken the stop ({level}); its output is off.")  # noqa: T201
+        print(f"{each.name()}: has carried out the stop ({level}); its output is off.")  # noqa: T201
     killed = [each for each in programs if not each.is_alive]
     for each in killed:
         print(f"error: {each.name()}, was killed. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201

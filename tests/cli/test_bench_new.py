@@ -146,9 +146,9 @@ def test_ctrl_c_at_a_question_stops_without_writing(tmp_path, monkeypatch):
         raise typer.Abort
 
     monkeypatch.setattr("typer.prompt", stopped)
-    with pytest.raises(CheckStopped, match="nothing is written"):
+    with pytest.raises(CheckStopped, match="nothing was written"):
         _configure(LAB, tmp_path / "lab.toml", seen(), "note")
-    with pytest.raises(CheckStopped, match="nothing is written"):
+    with pytest.raises(CheckStopped, match="nothing was written"):
         _operator_at_terminal()
     assert not list(tmp_path.iterdir())
 

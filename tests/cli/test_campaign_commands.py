@@ -73,8 +73,8 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     expected = CampaignEstimate(recordings=3, kept=2, **times, **sizes)
     first, rest, second, third = estimate_text(expected).splitlines()
     assert first == "3 recordings (2 kept), 1:02:03 (h:min:s) of rig time, about 2 MB; 1 MB are free"
-    assert rest == "0:02:00 of it are silence between recordings"
-    assert second == "0:01:00 of it lead to points along their chains"
+    assert rest == "Silence between recordings: 0:02:00 (included)"
+    assert second == "Lead-ins to points of chains: 0:01:00 (included)"
     assert third.startswith("The disk may be full before the end")
     # Feedback ends when it has found what it searches for.
     searching = estimate_text(replace(expected, searching=1))

@@ -112,7 +112,7 @@ def test_an_exponent_is_reported_with_its_error():
         (("--amplitude", "1e-6", "--frequency", "200:200"), "200 is not below 200"),
         (("--amplitude", "1e-6", "--frequency", "a:b"), "'a' is not a number"),
         (("--amplitude", "1e-6:2e-6", "--frequency", "200"), "2 numbers are not allowed here"),
-        (("--recording", "a.h5", "--frequency", "200"), "a recording has its own base motion"),
+        (("--recording", "a.h5", "--frequency", "200"), "which defines the base motion"),
         (("--recording", "nowhere.h5"), "nowhere.h5"),
         (("--specimen", "rigid_stops"), "Cell 1 has rigid stops"),
         (("--specimen", "nothing"), "no specimen is called 'nothing'"),

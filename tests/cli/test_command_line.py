@@ -183,7 +183,7 @@ def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_p
     result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
     assert result.returncode == 1
     said = " ".join(result.stderr.replace("│", " ").split())
-    assert f"{words[-1].removeprefix('--gap=')!r} is not a number; give one in SI units without the" in said
+    assert f"{words[-1].removeprefix('--gap=')!r} is not a number; give a number in SI units" in said
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_empty_paths_and_names_are_refused(vibench_here, tmp_path, words, place)
     """An empty variable of the shell filled the folder that the user stood in."""
     result = vibench_here(*words, cwd=tmp_path)
     assert result.returncode == 1
-    assert f"{place} was given as '', with nothing in it" in " ".join(result.stderr.replace("│", " ").split())
+    assert f"{place} was given as '', which is empty" in " ".join(result.stderr.replace("│", " ").split())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -244,7 +244,7 @@ def test_an_option_without_effect_is_refused(refusal, words, said):
 def test_a_page_path_that_is_a_folder_is_refused_before_computation(refusal, tmp_path):
     (tmp_path / "pages").mkdir()
     said = refusal("reproduce", "--out", "new", "--markdown", "pages")
-    assert "pages is a folder. Nothing was computed; give the name of a page" in said
+    assert "pages is a folder. Nothing was computed; give the name of a file" in said
 
 
 @pytest.mark.parametrize(

@@ -125,9 +125,9 @@ def test_an_invalid_zero_is_quoted_as_typed(command):
         (("branches", "--amplitude", "5e-6"), "--amplitude or --frequency is missing"),
         (
             ("branches", "--like", "any.h5", "--amplitude", "1e-6:5e-6"),
-            "leave --amplitude out (--frequency START:STOP may stay",
+            "leave out --amplitude (--frequency START:STOP is allowed",
         ),
-        (("branches", "--resonance", "92:97"), "give --amplitude START:STOP too"),
+        (("branches", "--resonance", "92:97"), "also give --amplitude START:STOP"),
         (
             ("branches", "--resonance", "92", "--amplitude", "1e-8:1e-7"),
             "--resonance was given as '92': 1 numbers are",

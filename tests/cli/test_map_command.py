@@ -71,7 +71,7 @@ def test_a_basin_map_reports_shares_and_kicks(answered, tmp_path):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (BASIN, "too few starts lie near a boundary, or most do."),
+        (BASIN, "too few or too many starts are near a boundary."),
         (LINE, "it needs ranges for two coordinates"),
     ],
 )
@@ -106,7 +106,7 @@ def test_an_invalid_map_is_refused_in_one_sentence_without_a_folder(refusal, tmp
     [
         (("--branches", "none.h5"), "none.h5"),
         (("--kicks", "5"), "--kicks needs a map in which only the start varies"),
-        (("--show", "lyapunov"), "--show lyapunov needs a map that finds exponents"),
+        (("--show", "lyapunov"), "--show lyapunov needs a map with exponents"),
     ],
 )
 def test_an_estimate_refuses_the_same_requests_as_the_map(refusal, tmp_path, options, told):

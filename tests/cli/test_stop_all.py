@@ -60,7 +60,7 @@ def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
         told = vibench_here("stop", "--level", "off", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         for what, program in (("north", north), ("south", south)):
-            assert f"{what}, process {program.pid}: has taken the stop (off)" in told.stdout
+            assert f"{what}, process {program.pid}: has carried out the stop (off)" in told.stdout
             assert program.communicate(timeout=20)[0] == "off smoke\n"
 
 
@@ -86,7 +86,7 @@ def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_h
             told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
             assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
             assert told.returncode == 1
-            assert f"south, process {south.pid}: has taken the stop (abort)" in told.stdout
+            assert f"south, process {south.pid}: has carried out the stop (abort)" in told.stdout
             assert f"hangs, process {hangs.pid} runs but does not answer" in told.stderr
         assert hangs.communicate(timeout=20)[0] == "abort vibench stop\n"
 
@@ -98,8 +98,8 @@ def test_programs_in_containers_with_a_shared_state_folder_are_all_found(vibench
         programs = [running.enter_context(driving(what, *CONTAINER)) for what in ("north", "south")]
         told = vibench_here("stop", "--level", "abort", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
-        assert "north, process 1: has taken the stop (abort)" in told.stdout
-        assert "south, process 1: has taken the stop (abort)" in told.stdout
+        assert "north, process 1: has carried out the stop (abort)" in told.stdout
+        assert "south, process 1: has carried out the stop (abort)" in told.stdout
         assert [each.communicate(timeout=20)[0] for each in programs] == ["abort smoke\n"] * 2
     assert list(engines_folder().iterdir()) == []
 

@@ -48,7 +48,7 @@ def test_an_estimate_counts_points_and_work_without_a_file(answered, tmp_path):
         told[duration_s] = answered("study", asked, "--out", "a.h5", "--estimate", "--json")
     assert [each["points"] for each in told.values()] == [12, 12]
     assert 3.0 < told[5.0]["work_s"] / told[0.5]["work_s"] <= 10.5
-    assert "12 points, planned as" in answered("study", asked, "--out", "a.h5", "--estimate")
+    assert "12 points, estimated work" in answered("study", asked, "--out", "a.h5", "--estimate")
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 

@@ -124,8 +124,8 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
         if empty is not None:
             place = empty if empty.startswith("--") else "an argument"
             raise typer.BadParameter(
-                f"{place} was given as '', with nothing in it; give a value, or leave it out. A variable of "
-                "the shell that is not set leaves nothing there."
+                f"{place} was given as '', which is empty; give a value, or leave it out. An unset variable "
+                "of the shell is a common cause."
             )
         yield
     except _USAGE_ERROR as error:
@@ -145,7 +145,7 @@ def _add_given_value(error: typer.BadParameter, words: Sequence[str]) -> None:
     if given is None:
         return
     if any(kind in error.message for kind in ("number", "float", "integer")) and not _is_number(given):
-        advice = "give one in SI units without the unit, such as 5 or 5e-6"
+        advice = "give a number in SI units without the unit, such as 5 or 5e-6"
         error.message = f"{given!r} is not a number; {advice}."
     elif error.message.startswith("Input should be "):
         error.message = f"{given!r} was given; it {error.message.removeprefix('Input ').partition(', ')[0]}."
@@ -272,8 +272,8 @@ def vibench(
     log_level: Annotated[
         LogLevel,
         typer.Option(
-            help="Log on standard error. info: also what recordings note; debug: also every message to an "
-            "instrument."
+            help="Level of the log on standard error. info: also notes of recordings; debug: also every "
+            "message to an instrument."
         ),
     ] = LogLevel.WARNING,
     _version: Annotated[
@@ -335,20 +335,20 @@ def _shortage(error: BaseException | None) -> str:
     if isinstance(error, MemoryError) or any(phrase in text for phrase in _NO_MEMORY):
         return (
             "this process is out of memory; data written so far are kept. Close other "
-            "programs, or raise its limit (ulimit -v)"
+            "programs, or raise the memory limit (ulimit -v)"
         )
     if isinstance(error, OSError | ImportError) and os.strerror(errno.EMFILE) in text:
         return (
-            "this process cannot open more files; data written so far are kept. Raise its limit (ulimit "
-            "-n), or close other programs"
+            "this process cannot open more files; data written so far are kept. Raise the limit of open "
+            "files (ulimit -n), or close other programs"
         )
     return _shortage(error.__cause__ or error.__context__)
 
 
 _PLACE = "{name} cannot be written or read; data written before are kept. Give another path"
-_ROOM = "there is no space for {name}; data written before are kept. Free some, or give another path"
+_ROOM = "there is no space for {name}; data written before are kept. Free space, or give another path"
 DISK_ERRORS = {
-    errno.ENAMETOOLONG: "the name {name} is too long for this disk; nothing was done; give a shorter one",
+    errno.ENAMETOOLONG: "the name {name} is too long for this disk; nothing was done. Give a shorter name",
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
 }

@@ -73,7 +73,7 @@ def analyse(
         Path, typer.Argument(metavar="RECORDING.h5", help="A recording, or a folder of recordings.")
     ],
     out: Annotated[
-        Path | None, option("Folder for the report; beside the recording if absent.", "DIR")
+        Path | None, option("Folder for the report; by default beside the recording.", "DIR")
     ] = None,
     simulate: Annotated[
         bool,
@@ -85,8 +85,8 @@ def analyse(
     driven_by: Annotated[
         DrivenBy,
         option(
-            "voltage: rig and specimen, as an ensemble that is valid in chaos; base: the specimen under "
-            "the recorded base motion."
+            "voltage: simulate rig and specimen as an ensemble, valid in chaos; base: simulate the specimen "
+            "under the recorded base motion."
         ),
     ] = DrivenBy.VOLTAGE,
     draws: Annotated[
@@ -95,37 +95,37 @@ def analyse(
     fit: Annotated[
         bool,
         option(
-            "Fit damping, frequencies and gaps to the recordings, and overlay the fitted specimen; if none "
-            "fits, report which assumption to change."
+            "Fit damping, frequencies and gaps to the recordings, and overlay the fitted specimen; if the "
+            "fit fails, report which assumption to change."
         ),
     ] = False,
     free: Annotated[
         list[Parameter] | None,
-        option("With --fit: also fit this to noise; may be repeated, with one mass at most.", "NAME"),
+        option("With --fit: also fit this number to noise; repeat for more, at most one mass.", "NAME"),
     ] = None,
     hidden: Annotated[
         bool,
-        option("Estimate the hidden motion of m1 too: p between its stops, impacts, gaps, m1, contact law."),
+        option("Also estimate the hidden motion of m1: p between its stops, impacts, gaps, m1, contact law."),
     ] = False,
     keep: Annotated[
-        bool, option("With --hidden: save that motion in the recording, for vibench export --results.")
+        bool, option("With --hidden: save the motion in the recording, for vibench export --results.")
     ] = False,
     specimen: SpecimenOption = None,
     branches: Annotated[
         list[Path] | None,
         option(
-            "Overlay branches from vibench branches on stepped sines and sweeps; may be repeated.",
+            "Overlay branches (file of vibench branches) on stepped sines and sweeps; may be repeated.",
             "BRANCHES.h5",
         ),
     ] = None,
     maps: Annotated[
         list[Path] | None,
-        option("Draw levels of stepped sines and sweeps on a map of vibench map.", "MAP.h5", name="--map"),
+        option("Draw levels of stepped sines and sweeps on this map (vibench map).", "MAP.h5", name="--map"),
     ] = None,
     quantity: Annotated[
         str,
         option(
-            "Quantity of m0 over quantity of the base, such as velocity/acceleration; one word means both.",
+            "Quantity of m0 / quantity of the base, such as velocity/acceleration; one word stands for both.",
             "Q[/Q]",
             panel=NOISE,
         ),
@@ -146,7 +146,7 @@ def analyse(
     request = replace(request, segment_s=segment, view=quantities_named(quantity, scale))
     if fit and specimen is not None:
         raise InvalidRequest(
-            "--fit and --specimen were given; give one of the two to select the specimen to overlay"
+            "--fit and --specimen were given; give only one of them, to select the overlaid specimen"
         )
     if free and not fit:
         raise InvalidRequest(

@@ -63,13 +63,13 @@ def list_bench(
 @with_options
 def check(
     bench: BenchPath = None,
-    out: Annotated[Path, option("Folder of the recordings, to check its disk.", "DIR")] = Path(),
+    out: Annotated[Path, option("Folder of recordings, to check free disk space.", "DIR")] = Path(),
     knobs: Annotated[
-        Path | None, option("Store the confirmations for `vibench measure --knobs`.", "SHEET.toml")
+        Path | None, option("New file of confirmed settings, for `measure --knobs`.", "SHEET.toml")
     ] = None,
     last: Annotated[bool, option("Show the result of the last check, without using the bench.")] = False,
     new_reference: Annotated[
-        bool, option("Do not compare with an earlier check, because changes were intended.")
+        bool, option("Make this check the reference, because the bench was changed on purpose.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -79,8 +79,8 @@ def check(
     """
     if last and (knobs is not None or new_reference):
         raise ConfigurationError(
-            "--last makes no check, and --knobs and --new-reference need one. Nothing was done; leave out "
-            "--last or the other option"
+            "--last only shows an earlier check, but --knobs and --new-reference need a new check. Nothing "
+            "was done; leave out --last or the other option"
         )
     path = bench_path(bench)
     result = _last(load_rig(path)) if last else _now(path, out, knobs, new_reference=new_reference)

@@ -78,7 +78,7 @@ class Answers:
         """Return the confirmation of all settings made by hand; raises CheckFailed if it is missing."""
         if self.given.get(_KNOBS) != "as in the file":
             raise CheckFailed(
-                "settings made by hand are not confirmed; compare them, then give "
+                "settings made by hand are not confirmed; compare them with the configuration, then give "
                 'knobs = "as in the file" in the answers'
             )
         return KnobSheet(operator=self.operator, confirmed=datetime.now(UTC), knobs=knobs)
@@ -118,7 +118,7 @@ def _allow_interrupt() -> Iterator[None]:
     try:
         yield
     except typer.Abort as stop:
-        raise CheckStopped("the setup was stopped at its questions; nothing is written") from stop
+        raise CheckStopped("the setup was stopped during its questions; nothing was written") from stop
 
 
 @_allow_interrupt()
@@ -138,8 +138,8 @@ def _confirm_wire(target: Path, pair: str) -> str:
         return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
     except (KeyboardInterrupt, typer.Abort) as stop:
         raise CheckStopped(
-            "the setup was stopped at its wires, before any output; the configuration is written: continue "
-            f"with `vibench bench check --bench {in_a_command(target)}`"
+            "the setup was stopped while wires were plugged in, before any output; the configuration was "
+            f"written: continue with `vibench bench check --bench {in_a_command(target)}`"
         ) from stop
     finally:
         signal.signal(signal.SIGINT, before)
@@ -149,7 +149,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     """Ask the questions, write the configuration, run the checks of a new bench, and write the report."""
     given = None if answers is None else Answers.read(answers)
     if given is None and not sys.stdin.isatty():
-        raise ConfigurationError("this is no terminal, and there are no answers; give --answers FILE.toml")
+        raise ConfigurationError("the questions need a terminal, but there is none; give --answers FILE.toml")
     seen = list_rig_instruments(load_rig(template))
     for remark in seen.remarks:
         console.print(f"! {remark}")

@@ -46,7 +46,7 @@ def branches(
     like: Annotated[
         Path | None,
         option(
-            "Use range and level of a stepped sine or sweep, and overlay the branches on it.", "RECORDING.h5"
+            "Use range and level of this stepped sine or sweep, and overlay the branches.", "RECORDING.h5"
         ),
     ] = None,
     resonance: Annotated[
@@ -59,10 +59,10 @@ def branches(
     *,
     options: Annotated[RequestOptions[BranchRequest], Fields(OPTIONS)],
     error: Annotated[
-        str | None, option("Relative error to reach, as 1%, by a balance; shooting is far more exact.", "E")
+        str | None, option("Relative error of harmonic balance, as 1%; shooting is far more exact.", "E")
     ] = None,
     time_limit: Annotated[
-        str | None, option("Time to search, as 20s: the branches found by then.", "T", name="--time")
+        str | None, option("Time limit of the search, as 20s; gives the branches found.", "T", name="--time")
     ] = None,
     holdable: Annotated[
         Path | None,
@@ -120,8 +120,8 @@ def _drive(
         if amplitude is not None:
             raise InvalidRequest(
                 f"--amplitude {amplitude} and --like were both given, but the recording defines the "
-                "amplitude; leave --amplitude out (--frequency START:STOP may stay, within the "
-                "recording's own range)"
+                "amplitude; leave out --amplitude (--frequency START:STOP is allowed, within the "
+                "range of the recording)"
             )
         curves, level = _recorded_curves(like)
         low, high = level[0][0], level[-1][0]
@@ -131,7 +131,7 @@ def _drive(
         return curves, {"along": Parameter.FREQUENCY, "recorded_level": level, "start": low, "stop": high}
     if amplitude is None or frequency is None:
         raise InvalidRequest(
-            "--amplitude or --frequency is missing; give both, one of them as a range START:STOP, or --like"
+            "--amplitude or --frequency is missing; give both, one as a range START:STOP, or give --like"
         )
     a, f = range_of(amplitude, Parameter.AMPLITUDE, (1, 2)), range_of(frequency, Parameter.FREQUENCY, (1, 2))
     if (a.stop is None) == (f.stop is None):
@@ -148,8 +148,8 @@ def _resonance(
     """Return no curves, and the request's fields to follow a phase resonance over the amplitude."""
     if amplitude is None or frequency is not None or like is not None:
         raise InvalidRequest(
-            f"--resonance {resonance} follows the amplitude; give --amplitude START:STOP too, and neither "
-            "--frequency nor --like"
+            f"--resonance {resonance} is followed over the amplitude; also give --amplitude START:STOP, and "
+            "leave out --frequency and --like"
         )
     band = range_of(resonance, Parameter.FREQUENCY, (2,), "resonance")
     levels = range_of(amplitude, Parameter.AMPLITUDE, (2,))

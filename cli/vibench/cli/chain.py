@@ -42,17 +42,17 @@ def chain(
     specimen: Annotated[
         list[str] | None,
         option(
-            "Specimen file, or a name listed by `vibench specimen`; repeat it for alternating cells.",
+            "Specimen file, or a name listed by `vibench specimen`; repeat --specimen for alternating cells.",
             "NAME|FILE.toml",
         ),
     ] = None,
     *,
     options: Annotated[RequestOptions[ChainRequest], Fields(OPTIONS)],
     error: Annotated[
-        str | None, option("Relative error of each transmission to reach under a steady sine, as 1%.", "E")
+        str | None, option("Relative error to reach in each steady-sine transmission, such as 1%.", "E")
     ] = None,
     time_limit: Annotated[
-        str | None, option("Time for each steady run, as 2s: the best answer by then.", "T", name="--time")
+        str | None, option("Time limit of each steady run, as 2s; gives the best result.", "T", name="--time")
     ] = None,
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
@@ -106,7 +106,7 @@ def _drive(amplitude: str | None, frequency: str | None, recording: Path | None)
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(
-                "--recording was given beside --amplitude or --frequency; a recording has its own base motion"
+                "--recording was given, which defines the base motion; leave out --amplitude and --frequency"
             )
         return {"drive": ChainDrive.RECORDED, "recording": str(recording)}
     if frequency is None and amplitude is None:

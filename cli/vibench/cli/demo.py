@@ -64,8 +64,8 @@ class Analyst:
             match self._parts[number]:
                 case ChildProcessError() as error:
                     raise AnalysisError(
-                        "the process that analyses has ended (somebody ended it, or memory was short); every "
-                        f"recording is kept: vibench analyse {shlex.quote(str(self._folder))}"
+                        "the analysis process has ended (killed, or out of memory); every recording is kept. "
+                        f"Analyse the recordings with: vibench analyse {shlex.quote(str(self._folder))}"
                     ) from error
                 case BaseException() as error:
                     raise error
@@ -88,7 +88,7 @@ def second_process(name: str, draws: int) -> Iterator[Analyst]:
 
 
 def demo(
-    out: Annotated[Path | None, option("New folder for everything; vibench_demo if absent.", "DIR")] = None,
+    out: Annotated[Path | None, option("New folder for all results; default vibench_demo.", "DIR")] = None,
     draws: Annotated[
         int,
         option("Simulation runs per test.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS),

@@ -24,9 +24,9 @@ NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
 
 def docs(
     out: Annotated[Path | None, option("Folder of the site; by default the user's own.", "DIR")] = None,
-    rebuild: Annotated[bool, option("Build it again if it exists.")] = False,
-    quick: Annotated[bool, option("Omit the tutorials' results, which take about five minutes.")] = False,
-    show: Annotated[bool, option("Open its first page in the browser.", name="--open")] = False,
+    rebuild: Annotated[bool, option("Build an existing site again.")] = False,
+    quick: Annotated[bool, option("Do not run the tutorials, which takes about five minutes.")] = False,
+    show: Annotated[bool, option("Open the first page in the browser.", name="--open")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Build the documentation site of this version unless it exists; print the path of its first page."""
@@ -47,8 +47,8 @@ def build(target: Path, extent: str) -> None:
     for library in ("sphinx", "myst_nb", "furo"):
         if find_spec(library) is None:
             raise MissingLibrary(
-                f"{library} is not installed, which builds the site: pip install 'vibench[docs]'; the pages "
-                f"lie as text in {shipped_folder('docs')}"
+                f"{library}, which builds the site, is not installed: pip install 'vibench[docs]'; the pages "
+                f"are also available as text in {shipped_folder('docs')}"
             )
     room_for_folder(target)
     with tempfile.TemporaryDirectory() as scratch:

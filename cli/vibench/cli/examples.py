@@ -16,7 +16,7 @@ FOLDERS = ("campaigns", "hardware_configs", "studies", "schemas", "examples")
 
 
 def examples(
-    copy: Annotated[Path | None, option("Copy all files there; nothing is overwritten.", "DIR")] = None,
+    copy: Annotated[Path | None, option("Copy all files to DIR; nothing is overwritten.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """List the shipped campaigns, rigs, studies and scripts, or copy them to be changed."""
@@ -28,7 +28,7 @@ def examples(
     elif copy is None:
         for folder, paths in found.items():
             console.print(f"{folder}: {', '.join(names_of(paths))}")
-        console.print("Use one by name: vibench measure quick --out DIR. Copy it to change it: --copy DIR")
+        console.print("Use a file by its name: vibench measure quick --out DIR. Copy all files: --copy DIR")
     else:
         console.print(f"copied {sum(map(len, found.values()))} files to {copy}")
 

@@ -29,7 +29,7 @@ def export(
         Path,
         typer.Argument(
             metavar="RECORDING.h5",
-            help="Complete or still growing; or the folder of a scan, with --to uff --spectra.",
+            help="Recording, complete or still growing; or the folder of a scan, with --to uff --spectra.",
         ),
     ],
     to: Annotated[Format, option("Format of the new file.")],
@@ -43,13 +43,13 @@ def export(
     spectra: Annotated[
         bool,
         option(
-            "Export spectral densities of the channels, and for noise the frequency response, in place of "
-            "samples (uff)."
+            "Export spectra in place of samples (uff): spectral densities of the channels, and for noise "
+            "the frequency response."
         ),
     ] = False,
     quantity: Annotated[
         str | None,
-        option("For --spectra, as in 'vibench analyse'; by default displacement."),
+        option("With --spectra: quantity as in 'vibench analyse'; by default displacement."),
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

@@ -21,7 +21,7 @@ from .progress_bars import transfer_bar
 def import_file(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV file.")],
     mapping: Annotated[
-        Path | None, option("Mapping of its channels; without it, the channels are listed.", "MAP.toml")
+        Path | None, option("Mapping of the channels; without a mapping, they are listed.", "MAP.toml")
     ] = None,
     out: Annotated[
         Path | None, option("New recording, or its folder; by default beside FILE.", "NAME.h5")
@@ -60,7 +60,7 @@ def _print_contents(file: Path, as_json: bool) -> None:
         return
     for each in channels:
         console.print(_line(each))
-    console.print("Describe them in a mapping (docs/exchange.md), and give it with --mapping.")
+    console.print("Describe the channels in a mapping (docs/exchange.md), and give its file with --mapping.")
 
 
 def _line(channel: SourceChannel) -> str:

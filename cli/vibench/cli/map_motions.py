@@ -49,7 +49,7 @@ def map_motions(
         bool, option("Print number of points, time and size without computing.", name="--estimate")
     ] = False,
     show: Annotated[
-        str | None, option(f"Quantity beside the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
+        str | None, option(f"Quantity drawn with the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
     ] = None,
     branches: Annotated[
         Path | None, option("Overlay branches on a map along one parameter.", "BRANCHES.h5")
@@ -68,14 +68,14 @@ def map_motions(
     gaps_m = request.specimen.specimen().gaps_m if request.gap_m is None else _ends(request.gap_m)
     print_warnings(plausibility_warnings(_ends(request.amplitude_m), gaps_m))
     if show not in (None, *SHOWN):
-        raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
+        raise InvalidRequest(f"--show was given as {show!r}; give one of {', '.join(SHOWN)}")
     if kicks and not request.is_basin:
         raise InvalidRequest(
             "--kicks needs a map in which only the start varies; give ranges for two coordinates"
         )
     if show == Observable.LYAPUNOV and Observable.LYAPUNOV not in request.observe:
         raise InvalidRequest(
-            "--show lyapunov needs a map that finds exponents, and this one observes "
+            "--show lyapunov needs a map with exponents, but this map has observe = "
             f'{", ".join(request.observe)}; give observe = ["response", "lyapunov"]'
         )
     if like and not request.is_over_drive:
@@ -119,7 +119,7 @@ def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> N
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(motion)}")
     if len(results.motions) > SHOWN_MOTIONS:
-        console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer ones are in the table and in --json.")
+        console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer motions: see the table or --json.")
     if results.plan.is_basin:
         console.print(_boundary_words(results))
     for each in stability:
@@ -135,7 +135,7 @@ def _boundary_words(results: MapResults) -> str:
         return f"{unknown} it needs ranges for two coordinates of the start."
     rough = _roughness(results)
     if rough is None:
-        return f"{unknown} too few starts lie near a boundary, or most do."
+        return f"{unknown} too few or too many starts are near a boundary."
     return (
         f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to {rough.high:.2f}), "
         f"so its dimension is {2.0 - rough.exponent:.2f}."

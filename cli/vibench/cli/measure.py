@@ -106,10 +106,10 @@ def estimate_text(expected: CampaignEstimate) -> str:
     count = "1 recording" if expected.recordings == 1 else f"{expected.recordings} recordings"
     lines = [f"{count}{kept}, {length} (h:min:s) of rig time, {room}"]
     if expected.rest_s:
-        lines.append(f"{timedelta(seconds=round(expected.rest_s))} of it are silence between recordings")
+        lines.append(f"Silence between recordings: {timedelta(seconds=round(expected.rest_s))} (included)")
     if expected.lead_in_s:
         lead_in = timedelta(seconds=round(expected.lead_in_s))
-        lines.append(f"{lead_in} of it lead to points along their chains")
+        lines.append(f"Lead-ins to points of chains: {lead_in} (included)")
     if not expected.fits:
         lines.append("The disk may be full before the end: free disk space, or record elsewhere")
     return "\n".join(lines)
@@ -138,7 +138,7 @@ def duration_s(text: str) -> float:
 NotifyCommand = Annotated[
     str | None,
     option(
-        "Command to run at every fault and at the end, without a shell; it reads the reason as JSON.",
+        "Command to run (no shell) at every fault and at the end; it gets the reason as JSON on stdin.",
         "COMMAND",
         name="--notify",
     ),
@@ -146,8 +146,8 @@ NotifyCommand = Annotated[
 MoveCommand = Annotated[
     str | None,
     option(
-        "Command that moves the vibrometer to each point of a scan, without a shell; it reads the point as "
-        "JSON.",
+        "Command (no shell) that moves the vibrometer to each point of a scan; it gets the point as JSON "
+        "on stdin.",
         "COMMAND",
         name="--move-beam",
     ),
@@ -182,7 +182,7 @@ def measure(
         Path | None, option("Settings confirmed before with `vibench bench check --knobs`.", "SHEET.toml")
     ] = None,
     check: Annotated[
-        CheckRule, option("Whether a passed check of today is required, made, or not needed.")
+        CheckRule, option("Require a recent passed check, make a check now, or require no check.")
     ] = CheckRule.FRESH,
     only_estimate: Annotated[
         bool,
@@ -193,7 +193,7 @@ def measure(
     ] = False,
     time_limit: Annotated[
         str | None,
-        option("Divide this time among the measurements by their `until`.", "TIME", name="--within"),
+        option("Divide this time among the measurements that have `until`.", "TIME", name="--within"),
     ] = None,
     as_json: AsJson = False,
     twin: Annotated[

@@ -52,7 +52,7 @@ def pack(
     for name in unfinished:
         errors.print(f"note: {name} is not finished and was omitted; vibench recover finishes it")
     for name, why in untrusted.items():
-        way = "the crate states this; restore it and pack again, or deposit the crate as it is"
+        way = "the crate states this; restore the file and pack again, or deposit the crate as it is"
         errors.print(f"error: {name} cannot be trusted ({why.rstrip('.')}): {way}")
     if untrusted:
         raise typer.Exit(ExitCode.FAILED)

@@ -20,7 +20,7 @@ BenchPath = Annotated[
 ]
 FaultsPath = Annotated[
     Path | None,
-    option("Scheduled faults of a virtual rig; a file, or night.", "FAULTS", name="--faults"),
+    option("Scheduled faults of a virtual rig: a file, or the name night.", "FAULTS", name="--faults"),
 ]
 AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
 AllowExternal = Annotated[
@@ -79,7 +79,7 @@ def room_for_page(path: Path) -> None:
     Raises ConfigurationError when the path is a folder, or its folder cannot be created.
     """
     if path.is_dir():
-        raise ConfigurationError(f"{path} is a folder. Nothing was computed; give the name of a page in it")
+        raise ConfigurationError(f"{path} is a folder. Nothing was computed; give the name of a file in it")
     room_for_folder(path.parent)
 
 
@@ -100,7 +100,7 @@ def file_at(out: Path | None, usual: Path) -> Path:
     if out.is_dir():
         return out / usual.name
     if out.suffix.lower() in SUFFIXES - {usual.suffix}:
-        raise ConfigurationError(f"{out} has the suffix of another format; end its name with {usual.suffix}")
+        raise ConfigurationError(f"{out} has the suffix of another format; use the suffix {usual.suffix}")
     return out
 
 

@@ -25,7 +25,7 @@ def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> No
     if print_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:
-        errors.print(f"stopped after {kept} of {plan.grid.size} points; --resume continues a file")
+        errors.print(f"stopped after {kept} of {plan.grid.size} points; --resume continues a stored file")
         raise typer.Exit(ExitCode.STOPPED)
 
 
@@ -38,5 +38,5 @@ def print_failures(plan: "GridPlan", failures: Failures) -> int:
         errors.print(f"error: {place}: {why}")
     if len(failures) > SHOWN_FAILURES:
         more = len(failures) - SHOWN_FAILURES
-        errors.print(f"error: {more} more points have no answer: see `failures` with --json")
+        errors.print(f"error: {more} more points have no result: see `failures` with --json")
     return len(failures)

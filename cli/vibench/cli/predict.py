@@ -47,17 +47,17 @@ def predict(
     amplitude: Annotated[float, option("Amplitude of the base displacement.", "M")],
     frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
     duration: Annotated[
-        str | None, option("Length of each run, or until it settles.  [default: 30]", "S|auto")
+        str | None, option("Length of each run; auto: until the motion settles.  [default: 30]", "S|auto")
     ] = None,
-    observe: Annotated[str, option("response, and with it lyapunov, scatter.")] = Observable.RESPONSE.value,
+    observe: Annotated[str, option("response; optional: lyapunov, scatter.")] = Observable.RESPONSE.value,
     start: Annotated[
-        Start, option("rest, or continued from lower (up) or higher (down) frequencies.")
+        Start, option("Start from rest, or from the motion at a lower (up) or higher (down) frequency.")
     ] = Start.REST,
     budget: Annotated[
         str | None,
         option(
-            "Processor time per point for other starts, if the motion depends on the start, and for tests "
-            f"whether chaos lasts; 0 disables both.  [default: {BUDGET_S:g}s]",
+            "Processor time per point to simulate other starts where the motion depends on the start, and "
+            f"to test whether chaos lasts; 0 disables both.  [default: {BUDGET_S:g}s]",
             "S",
         ),
     ] = None,
@@ -164,7 +164,7 @@ def _observables(text: str) -> tuple[Observable, ...]:
     known = (Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER)
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise InvalidRequest(f"--observe was given as {text!r}; a point has response, lyapunov and scatter")
+        raise InvalidRequest(f"--observe was given as {text!r}; allowed are response, lyapunov and scatter")
     return tuple(Observable(name) for name in names)
 
 
@@ -173,7 +173,7 @@ def _seconds(name: str, text: str) -> float:
         return number_of(text, "ms", "s", "min", "h")
     except ValueError as error:
         other = f", or {AUTO}" if name == "duration" else ""
-        allowed = f"give seconds, as in 1s or 0.5{other}"
+        allowed = f"give a time in seconds, such as 1s or 0.5{other}"
         raise InvalidRequest(f"--{name} was given as {text!r}; {allowed}") from error
 
 
@@ -204,7 +204,7 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
         text += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
-        text += f" {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
+        text += f" {len(known_s)} of {len(points)} points took {sum(known_s):.2g} s."
     if len(points) == 1:
         return f"{worst_hz:g} Hz: {method}. {text}"
     span = f"{len(points)} points, {points[0][0]:g} to {points[-1][0]:g} Hz"
@@ -233,7 +233,7 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
     if points:
         print_table(rows)
     if step > 1:
-        console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
+        console.print(f"every {step}th of {len(points)} points is shown; --json or --out gives all")
     motions = _motions_table(points)
     if motions is not None:
         print_table(motions)
@@ -269,7 +269,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
     if not several:
         return None
     title = "Motions with sensitive dependence on the start: starts differ by a millionth of a gap"
-    more = f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None
+    more = f"{len(several) - _SHOWN} more motions: see --json" if len(several) > _SHOWN else None
     rows = _table(title, ("f [Hz]", "I", "II", "I of p", "II of p", "motion", "error", "share"), more)
     for point, motion in several[:_SHOWN]:
         responses = (motion.response_i, motion.response_ii, motion.relative_i, motion.relative_ii)
@@ -294,8 +294,8 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
     text = f"{where} the motion depends sensitively on the start, or did not settle."
     if not ensembles:
         averaged = sum(point.target.starts for point in lost if point.target is not None)
-        return f"{text} There the answer is a mean over starts, {averaged} in all." if averaged else text
+        return f"{text} The result there is a mean over {averaged} starts in total." if averaged else text
     return (
-        f"{text} There {starts} starts were simulated for {followed_s:.0f} s in all; "
+        f"{text} At these points, {starts} starts were simulated, {followed_s:.0f} s in total; "
         f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
     )

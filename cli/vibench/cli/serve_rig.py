@@ -26,11 +26,11 @@ class ServedPace(StrEnum):
 def serve_rig(
     bench: Annotated[Path | None, option("Rig with a table 'virtual'.", "BENCH")] = None,
     address: Annotated[
-        str, option("Address to listen at; other computers need a token.", "HOST:PORT")
+        str, option("Address to listen on; other computers need a token.", "HOST:PORT")
     ] = "127.0.0.1:31763",
     scpi_port: Annotated[int, option("Socket port of the generator; 0 selects a free one.", "N")] = 0,
     pace: Annotated[
-        ServedPace, option("Rig time in real time, or as fast as a program samples.")
+        ServedPace, option("Run the rig in real time, or as fast as a program samples.")
     ] = ServedPace.WALL,
     faults: FaultsPath = None,
 ) -> None:
@@ -52,9 +52,9 @@ def serve_rig(
                 console.print(f"  {line}")
         if rig.token is not None:
             console.print()
-            console.print("Other computers can reach it; access requires the token:")
+            console.print("Other computers can reach the rig; they need the token:")
             console.print(
-                f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata"
+                f"  export {TOKEN_VARIABLE}={rig.token}  # for vibench; other programs send it as metadata"
             )
             console.print(f"  {TOKEN_KEY}: {rig.token}")
         stop.wait()
@@ -79,7 +79,7 @@ def _hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
             (usb, "import pyvisa", f'generator = {opened}("{rig.visa_resource}")'),
         ),
         (
-            f"The generator, for any other program: {rig.socket_resource}, lines that end in newlines:",
+            f"The generator, for any other program: {rig.socket_resource}, every line ends in a newline:",
             ("import pyvisa", f'generator = {opened}("{rig.socket_resource}", {ends})'),
         ),
     )

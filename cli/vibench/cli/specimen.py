@@ -21,14 +21,14 @@ def show_specimen(
     specimen: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME|FILE.toml", help="Shipped specimen or a file; by default all are listed."
+            metavar="NAME|FILE.toml", help="Shipped specimen or a file; by default, list all specimens."
         ),
     ] = None,
     forces: Annotated[
         Path | None,
-        option("Draw the stop force over p = y - z, of the specimen or of every contact law.", "DIR"),
+        option("Draw the stop force over p = y - z, for the specimen or for every contact law.", "DIR"),
     ] = None,
-    as_toml: Annotated[bool, option("Print its complete file, as a template.", name="--toml")] = False,
+    as_toml: Annotated[bool, option("Print the whole file, as a template.", name="--toml")] = False,
     as_json: AsJson = False,
 ) -> None:
     """List the specimens and contact laws, or describe one specimen."""
@@ -37,7 +37,7 @@ def show_specimen(
         return
     if specimen is None and as_toml:
         raise InvalidRequest(
-            f"--toml was given without a specimen; name a file, or one of {', '.join(shipped_specimens())}"
+            f"--toml was given without a specimen; give a file, or one of {', '.join(shipped_specimens())}"
         )
     if specimen is None:
         _list(as_json)

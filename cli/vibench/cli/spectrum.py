@@ -84,5 +84,5 @@ def _print_result(found: ExponentSpectrum) -> None:
             f"({each.dimension_low:.3g} to {each.dimension_high:.3g}); {each.verdict}"
         )
     if step > 1:
-        console.print(f"every {step}th of {len(found.points)} points; --json or --out gives all")
+        console.print(f"every {step}th of {len(found.points)} points is shown; --json or --out gives all")
     console.print(found.cost_sentence)

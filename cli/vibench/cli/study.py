@@ -49,7 +49,7 @@ def study(
         if as_json:
             print_json({"points": points, "work_s": work_s})
         else:
-            console.print(f"{points} points, planned as {work_s:.2g} s of one core")
+            console.print(f"{points} points, estimated work {work_s:.2g} s on one core")
         return
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with (
@@ -107,7 +107,7 @@ class KeptStudies:
         self._failed += print_failures(study, list(results.failures()))
         if not results.is_complete:
             errors.print(
-                f"stopped after {results.kept} of {study.grid.size} points; the same command continues"
+                f"stopped after {results.kept} of {study.grid.size} points; repeat the command to continue"
             )
             raise typer.Exit(ExitCode.STOPPED)
         return results

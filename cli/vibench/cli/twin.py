@@ -128,7 +128,7 @@ class _Following:
                 keep_baseline(before.model_copy(update={"levels": levels}), path)
             except OSError as error:  # such as a full disk; the twin continues without a stored baseline
                 reason = f"{path} could not be written ({error.strerror})"
-                print_warnings([f"{reason}: the usual level of this run is not stored; make room"])
+                print_warnings([f"{reason}: the usual level of this run is not stored; free disk space"])
 
     def _status(self, rate_hz: float) -> TwinStatus:
         newest = self.live.newest
@@ -173,7 +173,7 @@ def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], 
 def twin(
     pid: Pid = None,
     specimen: SpecimenOption = None,
-    new_baseline: Annotated[bool, option("New baseline: the specimen was changed on purpose.")] = False,
+    new_baseline: Annotated[bool, option("Start a new baseline after changing the specimen.")] = False,
 ) -> None:
     """Estimate the hidden motion of an engine's measurement, and report changes of the specimen."""
     lower_priority(NICE)  # the window and the measurement have priority

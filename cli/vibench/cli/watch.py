@@ -59,10 +59,10 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
 
 
 def stop(
-    pid: Annotated[int | None, option("Process id; by default all, with hold the only one.", "N")] = None,
+    pid: Annotated[int | None, option("Process id; default all; hold: the only process.", "N")] = None,
     level: Annotated[
         StopLevel,
-        option("Hold until vibench release, the plan's ramp, the shortest ramp, or off at once."),
+        option("hold until vibench release; ramp of the plan; abort: shortest ramp; off: at once."),
     ] = StopLevel.RAMP,
     reason: Annotated[str, option("Reason, stored in the recording.")] = "vibench stop",
 ) -> None:
@@ -94,18 +94,18 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
         case StopDelivery.KEPT:
             raise EngineSilent(
                 f"{name} runs but does not answer: it hangs, or was suspended. The stop ({level.value}) is "
-                "stored, and obeyed when it answers again. Its drive continues until then: in an "
-                "emergency switch the amplifier off by hand"
+                "stored, and takes effect when the program answers again. The drive continues until then: in "
+                "an emergency switch the amplifier off by hand"
             )
         case StopDelivery.UNHEEDED:
             raise EngineSilent(
-                f"{name} has taken the stop ({level.value}) and has not confirmed that its output is off: an "
-                f"instrument hangs, or the computer does. {SWITCH_OFF}"
+                f"{name} has received the stop ({level.value}) but has not confirmed that its output is off: "
+                f"an instrument or the computer hangs. {SWITCH_OFF}"
             )
         case StopDelivery.TOLD if level is StopLevel.HOLD:
             return f"{name}: has received the hold; 'vibench release' resumes it."
         case StopDelivery.TOLD | StopDelivery.TAKEN:
-            return f"{name}: has taken the stop ({level.value}); its output is off."
+            return f"{name}: has carried out the stop ({level.value}); its output is off."
 
 
 def release(pid: Pid = None) -> None:
