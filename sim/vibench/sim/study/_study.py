@@ -123,7 +123,7 @@ Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValida
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(expand_ranges)]
 
-TargetError = Annotated[float, Field(gt=0.0, le=1.0), NumberWith("%")]
+TargetError = Annotated[float, Field(gt=0.0, lt=1.0), NumberWith("%")]
 """Relative error, such as 0.01 or "1 %"."""
 TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), NumberWith("ms", "s", "min", "h")]
 """Time in seconds or with a unit, such as "200 ms", "2 s", "5 min"."""
