@@ -17,7 +17,7 @@ from vibench.acquisition import shipped_folder
 from vibench.acquisition.host.extras import EXTRAS
 from vibench.cli.__main__ import COMMANDS
 from vibench.cli.doctor import VARIABLES, libraries
-from vibench.cli.exit_code import ExitCode
+from vibench.cli.output import ExitCode
 
 ROOT = Path(__file__).resolve().parents[2]
 PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")

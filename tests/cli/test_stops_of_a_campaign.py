@@ -20,7 +20,7 @@ from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import RecordingState, _writer as writer
 from vibench.acquisition.run import silence_watch as drive_guard
 from vibench.acquisition.stopping.stop import Cause, StopRequest
-from vibench.cli.exit_code import ExitCode
+from vibench.cli.output import ExitCode
 
 RIG = (Path(__file__).resolve().parents[2] / "hardware_configs" / "virtual_rig.toml").read_text()
 RUN = """

@@ -36,9 +36,8 @@ from vibench.sim.study import StudyError
 from vibench.stop_files import SWITCH_OFF
 
 from . import environment  # noqa: F401 - numpy reads its setting, so it comes first
-from .exit_code import ExitCode
 from .options import SectionedCommand, SectionedGroup, with_options, words_of
-from .output import errors
+from .output import ExitCode, errors
 
 
 class Panel(StrEnum):

@@ -38,9 +38,8 @@ from vibench.sim import Specimen
 from vibench.sim.background import Observer
 from vibench.sim.maps import MapResults, open_map
 
-from .exit_code import ExitCode
 from .options import Fields, RequestOptions, option
-from .output import bold, console, errors, print_json
+from .output import ExitCode, bold, console, errors, print_json
 from .paths import AllowExternal, AsJson, external_data, free_path, room_for_folder
 from .progress_bars import reading_bar
 from .specimen_option import SpecimenOption, read_specimen

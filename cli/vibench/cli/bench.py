@@ -23,9 +23,8 @@ from vibench.acquisition.instruments import PlugInKind, plug_in_names
 from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
-from .exit_code import ExitCode
 from .options import SectionedCommand, SectionedGroup, option, with_options
-from .output import bold, console, paragraph, print_json
+from .output import ExitCode, bold, console, paragraph, print_json
 from .paths import AsJson, BenchPath, bench_path
 
 bench = typer.Typer(

@@ -9,9 +9,8 @@ import typer
 
 from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recordings
 
-from .exit_code import ExitCode
 from .options import option
-from .output import console, errors, print_json
+from .output import ExitCode, console, errors, print_json
 from .paths import AllowExternal, AsJson, external_data
 
 COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "length", "size", "verdict")

@@ -27,10 +27,9 @@ from vibench.sim.background import Pool, Progress
 from vibench.sim.operating_system.this import replace_file
 
 from .analyse import complain_about
-from .exit_code import ExitCode
 from .measure import the_bench
 from .options import option
-from .output import bold, console, leave_output_to_json, print_json
+from .output import ExitCode, bold, console, leave_output_to_json, print_json
 from .paths import AsJson, free_path
 from .progress_bars import analysis_bar
 

@@ -14,9 +14,8 @@ import typer
 
 from vibench.acquisition import MissingLibrary, built_site, documentation_page, shipped_folder
 
-from .exit_code import ExitCode
 from .options import option
-from .output import console, print_json
+from .output import ExitCode, console, print_json
 from .paths import AsJson, room_for_folder
 
 NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")

@@ -11,9 +11,8 @@ from vibench.analysis import InvalidRequest
 from vibench.analysis.report import ImageKind
 from vibench.sim.study import software
 
-from .exit_code import ExitCode
 from .interruption import watch_interrupt
-from .output import bold, console, errors, print_json
+from .output import ExitCode, bold, console, errors, print_json
 from .paths import room_for_folder
 
 if TYPE_CHECKING:

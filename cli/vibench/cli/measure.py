@@ -46,9 +46,8 @@ from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 from vibench.sim import number_of
 
 from .engine_bars import Watching
-from .exit_code import ExitCode
 from .options import option
-from .output import console, errors, leave_output_to_json, paragraph, print_json
+from .output import ExitCode, console, errors, leave_output_to_json, paragraph, print_json
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:

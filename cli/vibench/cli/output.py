@@ -1,8 +1,9 @@
-"""Output of commands: consoles for text and for errors, and JSON on standard output."""
+"""Output of commands: consoles for text and for errors, JSON on standard output, and exit codes."""
 
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -14,6 +15,19 @@ from vibench.acquisition import printable, shortened
 if TYPE_CHECKING:
     from rich.progress import TextColumn
     from rich.table import Table
+
+
+class ExitCode(IntEnum):
+    """Exit codes of all commands: docs/installation.md."""
+
+    DONE = 0
+    """The command did everything that was requested."""
+    FAILED = 1
+    """An error, a value that is not allowed, or a failed part; standard error has a sentence about it."""
+    MISUSED = 2
+    """A command or an option is unknown or missing."""
+    STOPPED = 3
+    """The command was stopped without a failure; ``--resume`` continues."""
 
 
 LONGEST_LINE = 1800

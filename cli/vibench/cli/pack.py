@@ -9,9 +9,8 @@ from vibench.acquisition.campaign import verify_recordings
 from vibench.acquisition.recording import SealState, seal_key
 from vibench.analysis.exchange import CrateFacts, pack_folder
 
-from .exit_code import ExitCode
 from .options import option
-from .output import console, errors, leave_output_to_json, print_json
+from .output import ExitCode, console, errors, leave_output_to_json, print_json
 from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
 

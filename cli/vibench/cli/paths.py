@@ -26,8 +26,7 @@ AsJson = Annotated[bool, option("Print one JSON document and nothing else.", nam
 AllowExternal = Annotated[
     bool,
     option(
-        "Read other files to which an HDF5 file refers: external storage and links, virtual datasets.",
-        name="--allow-external",
+        "Read data that an HDF5 file keeps in other files (external or virtual).", name="--allow-external"
     ),
 ]
 
@@ -68,8 +67,7 @@ def room_for_folder(path: Path) -> None:
         why = "may not be written to" if standing.is_dir() else "is a file"
         raise ConfigurationError(
             f"{path} cannot be created as a folder: {standing} {why}. Nothing was computed; give a folder "
-            "that "
-            "exists, or the name of a new one"
+            "that exists, or the name of a new one"
         ) from error
 
 
@@ -90,8 +88,7 @@ SUFFIXES = frozenset({".csv", ".h5", ".json", ".mat", ".nxs", ".toml", ".uff", "
 def file_at(out: Path | None, usual: Path) -> Path:
     """Return the path of a new file: ``out`` itself, or ``usual`` in the folder ``out``.
 
-    If ``out`` has no suffix and does not exist, it is created as a folder. Raises ConfigurationError if its
-    suffix is that of another format.
+    A new ``out`` without suffix becomes a folder. Raises ConfigurationError for another format's suffix.
     """
     if out is None:
         return usual

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .exit_code import ExitCode
 from .options import option
-from .output import errors
+from .output import ExitCode, errors
 
 if TYPE_CHECKING:
     from vibench.sim.study import GridPlan

@@ -16,10 +16,9 @@ from vibench.sim.study import (
     solve_study,
 )
 
-from .exit_code import ExitCode
 from .interruption import watch_interrupt
 from .options import option
-from .output import console, errors, print_json, print_warnings
+from .output import ExitCode, console, errors, print_json, print_warnings
 from .paths import AllowExternal, AsJson, external_data
 from .points import Cluster, Workers, complain_about_points, print_failures
 from .progress_bars import study_bar

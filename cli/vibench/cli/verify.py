@@ -10,9 +10,8 @@ import typer
 from vibench.acquisition.campaign import verify_recordings
 from vibench.acquisition.recording import SealDepth, seal_key
 
-from .exit_code import ExitCode
 from .options import option
-from .output import console, errors, print_json
+from .output import ExitCode, console, errors, print_json
 from .paths import AllowExternal, AsJson, external_data
 
 
