@@ -104,7 +104,7 @@ def test_periodic_noise_accepts_an_estimator_and_refuses_segments(noise_file):
     found = response(noise_file(), estimator=Estimator.HV, noise_ratio=1e-6, confidence=0.8)
     assert found.frequency_response.settings.estimator is Estimator.HV
     assert found.frequency_response.settings.confidence == 0.8
-    with pytest.raises(InvalidRequest, match=r"repeats every 0\.25 s.*line every 4 Hz.*streamed noise only"):
+    with pytest.raises(InvalidRequest, match=r"repeats every 0\.25 s.*lines are 4 Hz apart.*streamed noise"):
         response(noise_file(), resolution_hz=1.0)
 
 

@@ -130,5 +130,5 @@ class Short:
 
 
 def test_a_record_too_short_for_its_lowest_frequency_is_refused():
-    with pytest.raises(NotEnoughData, match=r"0\.08 s of noise leave segments of 0\.017 s, .* 50 Hz"):
+    with pytest.raises(NotEnoughData, match=r"0\.08 s of noise allow segments of 0\.017 s, .* 50 Hz"):
         streamed_response(Short(), noise(1.0, 0.08))

@@ -86,7 +86,7 @@ def test_zero_order_hold_images_do_not_affect_clock_or_band():
     assert result.repetitions[0].period_samples == pytest.approx(period, rel=1e-10)
     assert result.repetitions[0].periods == 2
     np.testing.assert_allclose(result.frequency_response.frequency_hz, band * 51200 / period)
-    with pytest.raises(InvalidRequest, match="requested is 30000; lines are known up to 20481"):
+    with pytest.raises(InvalidRequest, match="requested line is 30000; known lines end at 20481"):
         periodic_frequency_response(
             [(drive, drive, drive)], 51200.0, repetition_hz=1.0, orders=np.array([30_000])
         )

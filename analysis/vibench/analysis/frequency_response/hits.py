@@ -80,8 +80,8 @@ def find_hits(
     kept = starts[clear >= segment]
     if not kept.size or segment < rate / low_hz:
         raise NotEnoughData(
-            f"{starts.size} hits were found with up to {np.max(clear) / rate:.3g} s after one, and segments "
-            f"of {segment / rate:.3g} s; one must fit before the next hit and contain a period of "
+            f"{starts.size} hits were found, at most {np.max(clear) / rate:.3g} s apart; a segment of "
+            f"{segment / rate:.3g} s must end before the next hit and contain a period of "
             f"{low_hz:g} Hz: request another segment length, or wait longer between hits"
         )
     return Hits(tuple(int(each) for each in kept), int(segment), int(starts.size - kept.size))

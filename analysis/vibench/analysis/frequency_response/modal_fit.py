@@ -60,7 +60,7 @@ class Resonance:
     def remark(self) -> str:
         """Sentence on a fit that does not describe its lines, or on overlapping modes; otherwise empty."""
         if self.is_explained and self.overlap > 1.0:
-            return f"two modes overlap at {self.frequency_hz:.5g} Hz; the bounds allow for one between them"
+            return f"two modes overlap at {self.frequency_hz:.5g} Hz; the bounds include this overlap"
         if self.is_explained:
             return ""
         return (

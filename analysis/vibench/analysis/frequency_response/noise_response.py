@@ -114,8 +114,8 @@ def repeated_response(
     """
     if request.cuts_segments:
         raise InvalidRequest(
-            f"this noise repeats every {1 / noise.repetition_hz:g} s: its periods are its segments, without "
-            f"window, and give a line every {noise.repetition_hz:g} Hz; resolution, segment, averages, "
+            f"this noise repeats every {1 / noise.repetition_hz:g} s, so segments are its periods, without "
+            f"window, and lines are {noise.repetition_hz:g} Hz apart; resolution, segment, averages, "
             "window and overlap can be chosen for streamed noise only"
         )
     rate = channels.sample_rate_hz
@@ -257,8 +257,8 @@ def streamed_response(
     segment = request.segment_samples(stretch.samples, rate)
     if segment < round(rate / noise.band_start_hz):
         raise NotEnoughData(
-            f"{stretch.samples / rate:.3g} s of noise leave segments of {segment / rate:.3g} s, and one "
-            f"must contain a period of {noise.band_start_hz:g} Hz: ask for fewer averages, or measure "
+            f"{stretch.samples / rate:.3g} s of noise allow segments of {segment / rate:.3g} s, but each "
+            f"must contain a period of {noise.band_start_hz:g} Hz: request fewer averages, or measure "
             "longer"
         )
     sums = FrequencyResponseSums(
@@ -375,9 +375,9 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
         if worth >= 1:
             off = float(np.median(chosen.magnitude[lines] / referenced.magnitude[lines])) - 1
             if abs(off) > np.median(sd[lines]) * max(0.5, _SURELY / np.sqrt(worth)):
-                deviations.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} it {where}")
+                deviations.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} drive {where}")
     name = chosen.settings.estimator
-    return f"noise biases {name}; use drive: {name} lies {' and '.join(deviations)}" if deviations else ""
+    return f"noise biases {name}; use drive. {name} is {' and '.join(deviations)}" if deviations else ""
 
 
 def as_displacements(frequency_response: FrequencyResponse, channels: Channels) -> FrequencyResponse:

@@ -61,7 +61,7 @@ def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetiti
         count = whole_periods(drive.size, period)
         if count < 2:
             raise NotEnoughData(
-                f"the record holds {drive.size / period:.2f} periods of {period:.1f} samples; "
+                f"the record contains {drive.size / period:.2f} periods of {period:.1f} samples; "
                 "measuring the repetition rate needs at least 2"
             )
         spectra = period_spectra(drive, period, count)
@@ -108,7 +108,7 @@ def driven_lines(spectra: Complexes) -> Flags:
     amplitude[0] = 0.0
     strongest = float(np.max(amplitude))
     if not strongest > 0:
-        raise UnusableData("the drive channel is silent; check that it was recorded")
+        raise UnusableData("the drive channel is silent; check that the drive was recorded")
     return np.asarray(amplitude > _WEAKEST_LINE * strongest)
 
 
@@ -125,8 +125,8 @@ def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
     weight = np.abs(mean) ** 2
     if np.sum(weight) < _LEAST_SIMILARITY * np.mean(np.sum(np.abs(turned) ** 2, axis=1)):
         raise UnusableData(
-            "the drive does not repeat at the stated rate; check the repetition rate of this segment "
-            "and that it holds one realisation only"
+            "the drive does not repeat at the stated rate; check the repetition rate of this segment, "
+            "and that the segment contains only one realisation"
         )
     phase = np.angle(turned * np.conj(mean))
     information = np.sum(weight * lines**2.0) * np.sum(order**2)
@@ -181,7 +181,7 @@ class Drift:
             "all lines together": self.common_share,
         }
         shares = " and ".join(f"{what} by {100 * share:.2g} %" for what, share in drifts.items() if share)
-        return f"realisations differ by a drift of {shares}"
+        return f"realisations differ because of a drift of {shares}"
 
 
 @dataclass(frozen=True)
@@ -471,7 +471,7 @@ class PeriodicSums:
         """
         if not drive.size == base.size == response.size:
             sizes = f"{drive.size}, {base.size} and {response.size}"
-            raise InvalidRequest(f"drive, base and response hold {sizes} samples; they must be equally long")
+            raise InvalidRequest(f"drive, base and response have {sizes} samples; they must be equally long")
         if repetition is None:
             repetition = measured_repetition(drive, self._sample_rate_hz / self._repetition_hz)
         channels = np.stack([drive, base, response])
@@ -586,8 +586,8 @@ def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
     marked = np.isin(np.arange(frequency_hz.size), orders)
     if not np.any(marked):
         raise InvalidRequest(
-            f"the lowest line requested is {np.min(orders)}; lines are known up to {frequency_hz.size - 1}, "
-            f"{frequency_hz[-1]:g} Hz: record with a higher sample rate"
+            f"the lowest requested line is {np.min(orders)}; known lines end at {frequency_hz.size - 1} "
+            f"({frequency_hz[-1]:g} Hz): record with a higher sample rate"
         )
     return np.asarray(marked)
 

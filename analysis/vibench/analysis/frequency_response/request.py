@@ -116,7 +116,7 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
     known = {each.value: each for each in Quantity}
     if len(words) > _ABOVE_AND_BELOW or any(word not in known for word in words):
         raise InvalidRequest(
-            f"the quantity {text!r} is not known; give m0's over the base's, each one of "
+            f"the quantity {text!r} is not known; give that of m0, a slash and that of the base, each of "
             f"{', '.join(known)}, such as velocity/acceleration"
         )
     found = FrequencyResponseView(response=known[words[0]], base=known[words[-1]])
@@ -161,7 +161,7 @@ class FrequencyResponseRequest:
         }
         given = {name: value for name, value in lengths.items() if value is not None}
         if len(given) > 1:
-            raise InvalidRequest(f"{' and '.join(given)} were given; give one, the others follow from it")
+            raise InvalidRequest(f"{' and '.join(given)} were given; give one, which sets the others")
         for name, value in given.items():
             if not (np.isfinite(value) and value > 0):
                 raise InvalidRequest(f"{name} of {value:g} was requested; it must be finite and more than 0")
@@ -170,17 +170,17 @@ class FrequencyResponseRequest:
         if self.estimator is Estimator.HV and self.noise_ratio is None:
             raise InvalidRequest(
                 "hv was requested without a noise ratio; give the noise density of the response over that of "
-                "the base, or use the drive-referenced estimator"
+                "the base, or use the estimator drive"
             )
         if self.estimator is not Estimator.HV and self.noise_ratio is not None:
             raise InvalidRequest(f"a noise ratio has no meaning for {self.estimator.value}; only hv uses it")
         if self.noise_ratio is not None and not (np.isfinite(self.noise_ratio) and self.noise_ratio >= 0):
             raise InvalidRequest(
-                f"the noise ratio is {self.noise_ratio:g}; it is a finite number, zero or more"
+                f"the noise ratio is {self.noise_ratio:g}; it must be a finite number, zero or more"
             )
         if not 0 < self.confidence < 1:
             raise InvalidRequest(
-                f"a confidence of {self.confidence:g} was requested; it lies between 0 and 1"
+                f"a confidence of {self.confidence:g} was requested; it must be between 0 and 1"
             )
         hop_samples(_PROXY_SAMPLES, self.overlap)
 

@@ -239,13 +239,13 @@ class FrequencyResponseSums:
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
             raise InvalidRequest(
-                "the estimator drive needs a reference, and these sums have none; create them for drive"
+                "the estimator drive needs a reference channel; create these sums for the estimator drive"
             )
         averages = self._spectra.averages()
         if averages.segments_used < _LEAST_SEGMENTS:
             raise NotEnoughData(
-                f"{averages.segments_used} valid segment of {averages.segment_samples} samples was found, "
-                f"{averages.segments_excluded} touched invalid samples; a coherence needs at least "
+                f"valid segments of {averages.segment_samples} samples: {averages.segments_used}; "
+                f"{averages.segments_excluded} others contain invalid samples. A coherence needs at least "
                 f"{_LEAST_SEGMENTS}: use shorter segments or a longer record"
             )
         return frequency_response_of(averages, settings)
@@ -319,16 +319,16 @@ def _check(settings: FrequencyResponseSettings) -> None:
         if ratio is None:
             raise InvalidRequest(
                 "hv was requested without a noise ratio; give noise_ratio = noise density of the response "
-                "over that of the drive, or use the drive-referenced estimator"
+                "over that of the drive, or use the estimator drive"
             )
         if not (ratio >= 0 and np.isfinite(ratio)):
-            raise InvalidRequest(f"noise_ratio is {ratio:g}; it is a finite number, zero or more")
+            raise InvalidRequest(f"noise_ratio is {ratio:g}; it must be a finite number, zero or more")
     elif ratio is not None:
         raise InvalidRequest(f"noise_ratio has no meaning for {settings.estimator.value}; only hv uses it")
     if not 0 < settings.confidence < 1:
-        raise InvalidRequest(f"confidence is {settings.confidence:g}; it lies between 0 and 1")
+        raise InvalidRequest(f"confidence is {settings.confidence:g}; it must be between 0 and 1")
     if not settings.sample_rate_hz > 0:
-        raise InvalidRequest(f"sample_rate_hz is {settings.sample_rate_hz:g}; it is more than 0")
+        raise InvalidRequest(f"sample_rate_hz is {settings.sample_rate_hz:g}; it must be more than 0")
 
 
 def frequency_response_of(

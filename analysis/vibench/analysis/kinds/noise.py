@@ -32,7 +32,7 @@ Estimate = Callable[[Channels, Any, FrequencyResponseRequest], Estimated]
 def _warnings(found: NoiseResponse) -> Iterator[Check]:
     """Warn of poor fits of resonances, of a biased estimator, of drift and of a single hit."""
     drift = found.periodic and found.periodic.drift
-    alone = "there is one hit, and its scatter is not known, so no result has bounds; hit five times or more"
+    alone = "only one hit was recorded, so scatter is unknown and no result has bounds; hit at least 5 times"
     for what, remarks in (
         ("Resonances", [each.remark for each in found.resonances]),
         ("Estimator", [found.bias]),

@@ -123,7 +123,7 @@ class SegmentSpectra:
         if count == 0:
             raise NotEnoughData(
                 f"no whole valid segment of {self._taper.size} samples was found "
-                f"({used.size} touched invalid samples); use shorter segments or a longer record"
+                f"({used.size} contain invalid samples); use shorter segments or a longer record"
             )
         products = self._sums / count
         lower = np.tril_indices(products.shape[0], -1)
