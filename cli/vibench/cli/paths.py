@@ -25,9 +25,7 @@ FaultsPath = Annotated[
 AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
 AllowExternal = Annotated[
     bool,
-    option(
-        "Read data that an HDF5 file keeps in other files (external or virtual).", name="--allow-external"
-    ),
+    option("Read data that HDF5 files keep in other files (external or virtual).", name="--allow-external"),
 ]
 
 
