@@ -2,6 +2,8 @@ from ._branch_lines import (
     BranchDiagram as BranchDiagram,
     BranchLine as BranchLine,
     LineEvent as LineEvent,
+    branch_lines as branch_lines,
+    diagram_of as diagram_of,
 )
 from ._branch_request import (
     BranchMethod as BranchMethod,
@@ -17,12 +19,6 @@ from ._chain_computing import (
 from ._chain_request import (
     ChainDrive as ChainDrive,
     ChainRequest as ChainRequest,
-)
-from ._computing import (
-    branch_lines as branch_lines,
-    diagram_of as diagram_of,
-    exponent_spectrum as exponent_spectrum,
-    spectrum_points as spectrum_points,
 )
 from ._dynamics_file import (
     branch_curves as branch_curves,
@@ -46,4 +42,6 @@ from ._spectrum_request import (
     ExponentSpectrum as ExponentSpectrum,
     SpectrumPoint as SpectrumPoint,
     SpectrumRequest as SpectrumRequest,
+    exponent_spectrum as exponent_spectrum,
+    spectrum_points as spectrum_points,
 )

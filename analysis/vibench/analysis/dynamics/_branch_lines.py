@@ -1,5 +1,6 @@
-"""Results on branches: columns of numbers, special points, and cost."""
+"""Branches of a request: columns of numbers, special points, and cost."""
 
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -8,8 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim import Parameter
-from vibench.sim.branches import FoundBranch, growth_time_s, least_growth_time_s
+from vibench.sim import OrbitShape, Parameter, phase_resonance_branch
+from vibench.sim.branches import (
+    BranchOrigin,
+    FoundBranch,
+    balanced_branches,
+    growth_time_s,
+    least_growth_time_s,
+    shot_branches,
+)
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..signals.arrays import Reals
@@ -270,3 +278,30 @@ class BranchDiagram(Labelled):
         if not places:
             return np.zeros(0), np.zeros(0)
         return np.concatenate(places)[:-1], np.concatenate(sizes)[:-1]
+
+
+def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
+    """Follow the branches one by one and yield each."""
+    where = request.shaken, request.path, request.start, request.stop
+    if request.resonance_band_hz is not None:
+        found = _resonance(request, request.resonance_band_hz)
+    elif request.method is BranchMethod.SHOOTING:
+        found = shot_branches(*where, request.search)
+    else:
+        found = balanced_branches(*where, request.balance_options, request.search)
+    return (line_of(each) for each in found)
+
+
+def _resonance(request: BranchRequest, band_hz: tuple[float, float]) -> Iterator[FoundBranch]:
+    began = time.perf_counter()
+    levels_m = request.start, request.stop
+    branch = phase_resonance_branch(request.shaken, band_hz, levels_m, request.phase_of)
+    origin, elapsed_s = BranchOrigin.PHASE_RESONANCE, time.perf_counter() - began
+    yield FoundBranch(branch, OrbitShape.MIRRORED, 1, origin, has_twin=False, elapsed_s=elapsed_s)
+
+
+def diagram_of(request: BranchRequest) -> BranchDiagram:
+    """Compute all branches of a request."""
+    began = time.perf_counter()
+    lines = tuple(branch_lines(request))
+    return BranchDiagram(request, lines, time.perf_counter() - began)

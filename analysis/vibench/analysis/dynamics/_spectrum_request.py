@@ -1,13 +1,15 @@
-"""Request for Lyapunov exponents, and the result at one drive."""
+"""Lyapunov exponents over frequency or level: request, computation and results."""
 
 import math
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
+from vibench.sim import Accuracy, Harmonic, LyapunovSpectrum, Parameter, PowerLaw, lyapunov_spectrum
 
 from ..signals.arrays import Reals
 from ..tables import Labelled
@@ -189,3 +191,21 @@ class ExponentSpectrum(Labelled):
             check = f"sums of exponents differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
             check += f"at most {self.largest_sum_difference:.1g} of this value"
         return f"{len(self.points)} points in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
+
+
+def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
+    """Compute the exponents of each value of a request in order, and yield each."""
+    specimen = request.shaken
+    for value in request.values:
+        began = time.perf_counter()
+        drive = Harmonic(*request.drive(value))
+        found = lyapunov_spectrum(specimen, drive, request.accuracy, request.duration_s, request.settle_s)
+        elapsed_s = time.perf_counter() - began
+        yield point_of(found, request.damping_sum_per_s, request.confidence, elapsed_s)
+
+
+def exponent_spectrum(request: SpectrumRequest) -> ExponentSpectrum:
+    """Compute all exponents of a request."""
+    began = time.perf_counter()
+    points = tuple(spectrum_points(request))
+    return ExponentSpectrum(request, points, time.perf_counter() - began)
