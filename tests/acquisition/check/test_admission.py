@@ -176,12 +176,12 @@ class TestKeeping:
         healthy = check_bench(bench, tmp_path)
         was_louder = tuple(
             each.model_copy(update={"number": 2 * each.number})
-            if each.name.startswith("m0_velocity h")
+            if each.name.startswith("m0_velocity detects")
             else each
             for each in healthy.findings
         )
         keep(healthy.model_copy(update={"findings": was_louder}))
-        name = "m0_velocity hears the sine since last time"
+        name = "m0_velocity detects the sine since last time"
         for _ in range(2):
             found = check_bench(bench, tmp_path)
             assert found.report[name].verdict is Verdict.FAIL

@@ -77,9 +77,13 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
     [
         (lambda v: v.faults.turn_amplifier_gain(20.0), "amplifier gain", "set the gain"),
         (lambda v: v.faults.turn_amplifier_gain(20.0), "base acceleration", "gain"),
-        (lambda v: v.faults.drop_laser(60.0), "m0_velocity hears the sine", "laser"),
-        (lambda v: v.faults.disconnect("cDAQ1Mod1/ai2"), "base_acceleration hears the sine", "accelerometer"),
-        (lambda v: v.faults.disconnect("cDAQ1Mod1/ai1"), "amplifier_voltage hears the sine", "cable"),
+        (lambda v: v.faults.drop_laser(60.0), "m0_velocity detects the sine", "laser"),
+        (
+            lambda v: v.faults.disconnect("cDAQ1Mod1/ai2"),
+            "base_acceleration detects the sine",
+            "accelerometer",
+        ),
+        (lambda v: v.faults.disconnect("cDAQ1Mod1/ai1"), "amplifier_voltage detects the sine", "cable"),
         (lambda v: v.faults.disconnect("cDAQ1Mod1/ai0"), "drive over setting", "cable"),
         (lambda v: v.faults.over_range(60.0), "offset of m0_velocity", "bias"),
         (lambda v: v.faults.reverse("cDAQ1Mod1/ai2"), "sign of base_acceleration", "reverse the acceler"),

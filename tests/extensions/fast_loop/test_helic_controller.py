@@ -158,7 +158,7 @@ def test_a_lost_connection_is_reported_and_closes_the_safety_gate(played):
     assert not board.is_armed
     with pytest.raises(InstrumentLost, match=r"does not answer .*Its gate closes by itself"):
         bench.controller.report()
-    assert contract.line_v(contract.heard_v(bench, 0.2), 100, 12_800) < 0.02 * PLAYED_V
+    assert contract.line_v(contract.measured_v(bench, 0.2), 100, 12_800) < 0.02 * PLAYED_V
 
 
 @pytest.mark.thorough

@@ -100,7 +100,7 @@ DRIVE_LEFT = "drive left after stop"
 
 def detection_name(role: Role) -> str:
     """Return the name of the finding that states whether a channel detects the sine."""
-    return f"{role.value} hears the sine"
+    return f"{role.value} detects the sine"
 
 
 class Lasting(Enum):

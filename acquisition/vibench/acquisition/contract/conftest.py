@@ -105,7 +105,7 @@ def refused() -> Iterator[None]:
     assert not isinstance(error.value, BrokenPromise), str(error.value)
 
 
-def heard_v(bench: Bench, duration_s: float) -> Samples:
+def measured_v(bench: Bench, duration_s: float) -> Samples:
     """Return the voltage at the generator's terminal over ``duration_s``, after settling [V]."""
     count = int(duration_s * bench.digitizer.sample_rate_hz)
     bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))

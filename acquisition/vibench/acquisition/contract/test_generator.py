@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refused
+from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refused
 from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.instruments import Knob, PlugInKind, Sweep
 from vibench.acquisition.rig import Rig, generator_driver
@@ -27,11 +27,11 @@ def terminal_v(bench: Bench) -> float:
 
 
 def is_quiet(bench: Bench) -> bool:
-    return float(np.ptp(heard_v(bench, 0.2))) < 2 * QUIET * 2 * terminal_v(bench) + 2e-3
+    return float(np.ptp(measured_v(bench, 0.2))) < 2 * QUIET * 2 * terminal_v(bench) + 2e-3
 
 
 def tone_v(bench: Bench, frequency_hz: float) -> float:
-    return line_v(heard_v(bench, 0.5), frequency_hz, bench.digitizer.sample_rate_hz)
+    return line_v(measured_v(bench, 0.5), frequency_hz, bench.digitizer.sample_rate_hz)
 
 
 def test_it_is_described_before_it_is_opened(rig: Rig) -> None:
@@ -85,7 +85,7 @@ def test_a_waveform_is_played_point_by_point_at_its_repetition(bench: Bench) -> 
     bench.generator.load_waveform(waveform, 10.0, level_vpp(bench))
     bench.generator.start()
     bench.digitizer.start()
-    volts, rate_hz = heard_v(bench, 1.0), bench.digitizer.sample_rate_hz
+    volts, rate_hz = measured_v(bench, 1.0), bench.digitizer.sample_rate_hz
     for harmonic, share in ((8, 0.35), (13, 0.15)):
         assert line_v(volts, 10.0 * harmonic, rate_hz) == pytest.approx(share * terminal_v(bench), rel=SAME)
 
@@ -128,7 +128,7 @@ def test_a_burst_plays_its_cycles_and_ends_by_itself(bench: Bench) -> None:
     bench.digitizer.start()
     assert is_quiet(bench), "an armed burst must wait for its trigger"
     bench.generator.trigger()
-    volts = heard_v(bench, 1.0)
+    volts = measured_v(bench, 1.0)
     played_s = np.count_nonzero(np.abs(volts) > 0.3 * terminal_v(bench)) / bench.digitizer.sample_rate_hz
     assert played_s < cycles / TONE_HZ
     assert is_quiet(bench)

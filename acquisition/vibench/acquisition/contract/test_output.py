@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refused
+from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refused
 from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.instruments import AnalogOutput, IdleOutput, PlugInKind, Samples
 
@@ -85,7 +85,7 @@ def test_stop_outputs_zero_at_any_time_and_allows_another_stream(bench: Bench) -
     output_of(bench).stop()
     bench.digitizer.stop()
     bench.digitizer.start()
-    assert float(np.ptp(heard_v(bench, 0.2))) < 0.1 * level_v(bench) + 2e-3
+    assert float(np.ptp(measured_v(bench, 0.2))) < 0.1 * level_v(bench) + 2e-3
     bench.digitizer.stop()
     with playing(bench):
         bench.digitizer.read(256)

@@ -82,28 +82,28 @@ class Equaliser:
 
         Raises LimitExceeded when the base moves far less than the model predicts.
         """
-        heard = MeasuredDensities(
+        densities = MeasuredDensities(
             self._density(drive),
             self._density(base),
             self._density(response) * self._to_velocity,
             _kurtosis(base),
         )
-        self._require_answer(heard)
-        newest = heard.base / np.maximum(heard.drive, 1e-300)
+        self._require_answer(densities)
+        newest = densities.base / np.maximum(densities.drive, 1e-300)
         mixed = _NEWEST * newest + (1 - _NEWEST) * self._gain
         self._gain = np.clip(mixed, self._gain / _MOST_CHANGE, self._gain * _MOST_CHANGE)
-        ratio = heard.response / np.maximum(heard.base, 1e-300)
+        ratio = densities.response / np.maximum(densities.base, 1e-300)
         known = self._to_response
         self._to_response = ratio if known is None else _NEWEST * ratio + (1 - _NEWEST) * known
-        return heard
+        return densities
 
-    def require_below_abort(self, heard: MeasuredDensities) -> None:
+    def require_below_abort(self, densities: MeasuredDensities) -> None:
         """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at any line."""
         most = 10 ** (self._plan.abort_db / 10)
-        lines = [("base", "(m/s2)2/Hz", heard.base, self._plan.density)]
+        lines = [("base", "(m/s2)2/Hz", densities.base, self._plan.density)]
         if self._plan.response_limits:
             limit = density_at(self._plan.response_limits, self.frequency_hz)
-            lines.append(("velocity of m0", "(m/s)2/Hz", heard.response, limit))
+            lines.append(("velocity of m0", "(m/s)2/Hz", densities.response, limit))
         for what, unit, measured, line in lines:
             worst = int(np.argmax(measured / line))
             if measured[worst] > most * line[worst]:
@@ -114,9 +114,9 @@ class Equaliser:
                     "spectrum, or give more equalisations"
                 )
 
-    def off_db(self, heard: MeasuredDensities, level_db: float) -> Samples:
+    def off_db(self, densities: MeasuredDensities, level_db: float) -> Samples:
         """Return the deviation of the base density from the target of this realisation, per line [dB]."""
-        return np.asarray(10 * np.log10(np.maximum(heard.base, 1e-300) / self.target) - level_db)
+        return np.asarray(10 * np.log10(np.maximum(densities.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
         """Return the density at the lines, averaged over ``resolution_hz``; whole periods avoid leakage."""
@@ -126,9 +126,9 @@ class Equaliser:
         width = max(1, round(plan.resolution_hz / plan.repetition_hz))
         return _average(np.abs(spectrum) ** 2 / 2 / plan.repetition_hz, width)
 
-    def _require_answer(self, heard: MeasuredDensities) -> None:
-        modelled = sqrt(float(np.sum(heard.drive * self._modelled)))
-        measured = sqrt(float(np.sum(heard.base)))
+    def _require_answer(self, densities: MeasuredDensities) -> None:
+        modelled = sqrt(float(np.sum(densities.drive * self._modelled)))
+        measured = sqrt(float(np.sum(densities.base)))
         if measured < LEAST_ANSWER * modelled:
             raise LimitExceeded(
                 f"the base acceleration was {measured / modelled:.1%} of the model's value; feedback needs "
@@ -151,26 +151,26 @@ def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
             yield ControlAction(Phase(RunState.SETTLING, play, plan.settle_s))
         state, segment = (RunState.SETTLING, None) if kept < 0 else (RunState.RECORDING, segments[kept])
         samples = yield ControlAction(Phase(state, play, plan.periods / plan.repetition_hz, segment))
-        heard = equaliser.hear(*loop.channels.rows(samples))
-        off_db = equaliser.off_db(heard, level_db)
-        yield ControlAction(None, (_note(plan, equaliser, heard, off_db, kept),))
-        equaliser.require_below_abort(heard)
+        densities = equaliser.hear(*loop.channels.rows(samples))
+        off_db = equaliser.off_db(densities, level_db)
+        yield ControlAction(None, (_note(plan, equaliser, densities, off_db, kept),))
+        equaliser.require_below_abort(densities)
         yield ControlAction(ramp(RunState.RAMPING_DOWN, play, loop.measurement))
 
 
 def _note(
-    plan: HeldNoise, equaliser: Equaliser, heard: MeasuredDensities, off_db: Samples, kept: int
+    plan: HeldNoise, equaliser: Equaliser, densities: MeasuredDensities, off_db: Samples, kept: int
 ) -> NoiseNote:
     worst = int(np.argmax(np.abs(off_db)))
     return NoiseNote(
         realisation=max(kept, -1),
-        base_rms=sqrt(float(np.sum(heard.base)) * plan.repetition_hz),
+        base_rms=sqrt(float(np.sum(densities.base)) * plan.repetition_hz),
         asked_rms=sqrt(float(np.sum(equaliser.target)) * plan.repetition_hz),
         within=float(np.mean(np.abs(off_db) <= plan.tolerance_db)),
         worst_db=float(off_db[worst]),
         worst_hz=float(equaliser.frequency_hz[worst]),
         notched=float(np.mean(equaliser.target < 0.99 * plan.density)),
-        kurtosis=heard.kurtosis,
+        kurtosis=densities.kurtosis,
     )
 
 

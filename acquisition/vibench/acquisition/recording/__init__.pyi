@@ -1,6 +1,6 @@
 from ._disk import DiskTrouble as DiskTrouble, sole_use as sole_use, troubled_disks as troubled_disks
 from ._dropouts import (
-    DROPOUTS_TOLD_AFTER_S as DROPOUTS_TOLD_AFTER_S,
+    DROPOUT_DELAY_S as DROPOUT_DELAY_S,
     BridgedChannel as BridgedChannel,
     Dropout as Dropout,
     bridged as bridged,

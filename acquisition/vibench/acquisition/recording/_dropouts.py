@@ -25,7 +25,7 @@ LOWEST_RATE_HZ = 20_000.0
 """Lowest sample rate [Hz]; below it, an impact may take only a few samples, like a drop-out."""
 _FAR = 60.0
 """Smallest fourth difference at the edge of a drop-out, relative to the median."""
-_HEARD = 6.0
+_DETECTED = 6.0
 """Smallest fourth difference in the ringing of the converter's filter, relative to the median."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
@@ -40,7 +40,7 @@ _QUANTA = 4.0
 """Smallest change at both ends of equal samples, relative to the smallest change in the channel."""
 _LEAST_OF_FLANK = 0.25
 """Smallest fraction of a flank that must be free of other drop-outs."""
-DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
+DROPOUT_DELAY_S = LONGEST_S + 2.0 * _FLANK_S
 """Time that must follow a sample before it is known whether it belongs to a drop-out [s]."""
 _OUTSTANDING = 8.0
 """Least distance of a drop-out from a smooth fit, relative to the rms residual of the fit in the flanks."""
@@ -83,7 +83,7 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
     found = _held(velocity, longest)
     velocity = bridged(velocity, tuple(found))
     sharp, usual = _corners(velocity)
-    rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
+    rings, far = sharp > _DETECTED * usual, np.flatnonzero(sharp > _FAR * usual)
 
     def explained(edges: Places) -> tuple[Dropout, ...]:
         runs = [
@@ -143,7 +143,7 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
         return velocity.size
     sharp, usual = _corners(velocity)
     far = np.flatnonzero(sharp > _FAR * usual)
-    far = far[far >= velocity.size - round(DROPOUTS_TOLD_AFTER_S * sample_rate_hz)]
+    far = far[far >= velocity.size - round(DROPOUT_DELAY_S * sample_rate_hz)]
     known = np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:
         known[each.first : each.stop] = True
@@ -231,15 +231,15 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     dropouts
         Drop-outs, as returned by `found_dropouts`.
     """
-    mended, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
+    bridged_velocity, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:
         hidden[each.first : each.stop] = True
     for first, stop, behind in _together(dropouts, velocity.size):
         near = slice(max(first - _CONTEXT, 0), min(stop + _CONTEXT, behind))
-        if np.all(np.isfinite(mended[near][~hidden[near]])):
-            mended[near] = _likeliest(mended[near], ~hidden[near])
+        if np.all(np.isfinite(bridged_velocity[near][~hidden[near]])):
+            bridged_velocity[near] = _likeliest(bridged_velocity[near], ~hidden[near])
         hidden[:stop] = False
-    return mended
+    return bridged_velocity
 
 
 def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
@@ -297,13 +297,13 @@ class BridgedChannel:
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
-        mended = bridged(
+        bridged_velocity = bridged(
             self.recording.read(self.role, first, last),
             tuple(Dropout(each.first - first, each.stop - first) for each in dropouts),
         )
         for each in self.between(start, stop):
             begin, end = max(each.first, start), min(each.stop, stop)
-            values[begin - start : end - start] = mended[begin - first : end - first]
+            values[begin - start : end - start] = bridged_velocity[begin - first : end - first]
         return values
 
     def between(self, start: int, stop: int) -> tuple[Dropout, ...]:

@@ -94,7 +94,7 @@ def free_motion(
             offset = latent.smoothed.first
             stop = min(end, begin + round(_BLOCK_S * motion.sample_rate_hz))
             place = slice(max(begin, offset) - offset, stop - offset)
-            p[max(begin, offset) : stop] = np.where(latent.is_dark, np.nan, latent.smoothed.p)[place]
+            p[max(begin, offset) : stop] = np.where(latent.is_dropout, np.nan, latent.smoothed.p)[place]
             sd[max(begin, offset) : stop] = np.sqrt(latent.smoothed.variances[place, 0])
             rows = _impacts(latent, motion.sample_rate_hz)
             inside = (rows[:, 0] >= begin) & (rows[:, 0] < stop)
@@ -149,7 +149,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     # The force is held over the step before a sample, so its centre is half a sample earlier.
     place = np.arange(force.size) - 0.5
     for begin, end in _runs(latent.is_open):
-        if begin < 2 or end > force.size - 2 or latent.is_dark[begin:end].any():
+        if begin < 2 or end > force.size - 2 or latent.is_dropout[begin:end].any():
             continue
         part = slice(begin, end)
         impulse = float(force[part].sum()) / sample_rate_hz

@@ -46,7 +46,7 @@ class LatentMotion:
     smoothed: Smoothed
     is_open: Flags
     """Flags of samples with a possible contact force."""
-    is_dark: Flags
+    is_dropout: Flags
     """Flags of open samples in or near drop-outs."""
     force_variance: Reals
     misfit: float
@@ -69,8 +69,8 @@ def latent_motion(
     variance = np.full(count, guess_n**2)
     run, smoothed = _filter_and_smooth(free, motion, first, variance)
     # During a drop-out, m1 may have struck a stop unseen.
-    is_dark = _widen_marks(motion.is_dark[first + 1 : first + count + 1], motion.sample_rate_hz)
-    windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz) | is_dark
+    is_dropout = _widen_marks(motion.is_dropout[first + 1 : first + count + 1], motion.sample_rate_hz)
+    windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz) | is_dropout
     closed = (closed_share * guess_n) ** 2
     variance = np.where(windows, (6.0 * guess_n) ** 2, closed)
     for _ in range(_RERUNS):
@@ -84,7 +84,7 @@ def latent_motion(
     squared = run.squared[_start_up(motion.sample_rate_hz, count) :]
     squared = np.sort(squared[~np.isnan(squared)])
     misfit = float(np.mean(squared[: int(0.999 * squared.size) or 1])) if squared.size else np.inf
-    return LatentMotion(run, smoothed, windows, is_dark, variance, misfit)
+    return LatentMotion(run, smoothed, windows, is_dropout, variance, misfit)
 
 
 def latent_start(first: int) -> FilterState:

@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import ValidationError
 
-from vibench.acquisition.recording import DROPOUTS_TOLD_AFTER_S, bridged, found_dropouts
+from vibench.acquisition.recording import DROPOUT_DELAY_S, bridged, found_dropouts
 from vibench.acquisition.rig import Rig, channels_of, specimen_of
 from vibench.sim import FrozenModel, Specimen
 from vibench.sim.operating_system.this import replace_file, state_folder
@@ -30,7 +30,7 @@ from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_m
 from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
 from ._parameters import Hidden, with_values
-from ._prepared_motion import ChannelNoise, PreparedMotion, dark_samples, require_channels, white_noise
+from ._prepared_motion import ChannelNoise, PreparedMotion, dropout_samples, require_channels, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
 from ._tracking import ACQUISITION_S, acquire, reliable_samples
 from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
@@ -328,14 +328,14 @@ class LiveTwin:
     def _append(self, acceleration: Reals, velocity: Reals) -> None:
         """Correct and store new samples; drop the oldest."""
         self._raw = np.concatenate([self._raw, (acceleration, velocity)], axis=1)
-        first, stop = self._used, self._raw.shape[1] - HALF_LENGTH - round(DROPOUTS_TOLD_AFTER_S * self._rate)
+        first, stop = self._used, self._raw.shape[1] - HALF_LENGTH - round(DROPOUT_DELAY_S * self._rate)
         if stop <= first:
             return
         dropouts = found_dropouts(self._raw[1], self._rate)
         around = slice(first - HALF_LENGTH, stop + HALF_LENGTH)
         seen = self._correction.corrected(self._raw[0, around], bridged(self._raw[1], dropouts)[around])
         new = [each[HALF_LENGTH:-HALF_LENGTH] for each in seen]
-        is_dark = dark_samples(dropouts, first, stop)
+        is_dropout = dropout_samples(dropouts, first, stop)
         surplus = max(0, stop - round(_LOOKED_S * self._rate))
         self._raw, self._used = self._raw[:, surplus:], stop - surplus
         held = self._motion
@@ -344,7 +344,7 @@ class LiveTwin:
             held,
             acceleration=np.concatenate([held.acceleration, new[0]])[surplus:],
             velocity=np.concatenate([held.velocity, new[1]])[surplus:],
-            is_dark=np.concatenate([held.is_dark, is_dark])[surplus:],
+            is_dropout=np.concatenate([held.is_dropout, is_dropout])[surplus:],
             first_sample=held.first_sample + surplus,
         )
         unknown = np.full((new[0].size, STATES), np.nan)

@@ -53,7 +53,7 @@ class PreparedMotion:
     """Acceleration of the base, shape (samples,) [m/s2]; the tracker corrects its AC coupling."""
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]; bridged in drop-outs."""
-    is_dark: Flags
+    is_dropout: Flags
     """Flags of samples in drop-outs, shape (samples,)."""
     sample_rate_hz: float
     coupling_rad_per_s: float
@@ -72,7 +72,7 @@ class PreparedMotion:
 
     def velocities(self, start: int, stop: int) -> Reals:
         """Return the velocities of a short stretch; NaN in drop-outs."""
-        return np.where(self.is_dark[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
+        return np.where(self.is_dropout[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
         """Return a part of the motion, with the noise of the whole motion."""
@@ -80,7 +80,7 @@ class PreparedMotion:
             self,
             acceleration=self.acceleration[start:stop],
             velocity=self.velocity[start:stop],
-            is_dark=self.is_dark[start:stop],
+            is_dropout=self.is_dropout[start:stop],
             first_sample=self.first_sample + start,
         )
 
@@ -112,21 +112,21 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
             row[begin - start : end - start] = values[HALF_LENGTH:-HALF_LENGTH]
     _require_finite(lost)
     dropouts = response.between(start - _DARK_MARGIN, stop + _DARK_MARGIN)
-    return _motion(kept, dark_samples(dropouts, start, stop), rate, correction, start)
+    return _motion(kept, dropout_samples(dropouts, start, stop), rate, correction, start)
 
 
-def dark_samples(dropouts: Sequence[Dropout], start: int, stop: int) -> Flags:
+def dropout_samples(dropouts: Sequence[Dropout], start: int, stop: int) -> Flags:
     """Return flags of the corrected samples from ``start`` to before ``stop`` that drop-outs affect."""
-    is_dark = np.zeros(stop - start, dtype=np.bool_)
+    is_dropout = np.zeros(stop - start, dtype=np.bool_)
     for each in dropouts:
         first, behind = each.first - _DARK_MARGIN - start, each.stop + _DARK_MARGIN - start
-        is_dark[max(first, 0) : max(behind, 0)] = True
-    return is_dark
+        is_dropout[max(first, 0) : max(behind, 0)] = True
+    return is_dropout
 
 
 def _motion(
     corrected: Samples,
-    is_dark: Flags,
+    is_dropout: Flags,
     sample_rate_hz: float,
     correction: SensorCorrection,
     first_sample: int,
@@ -135,7 +135,7 @@ def _motion(
     return PreparedMotion(
         corrected[0],
         corrected[1],
-        is_dark,
+        is_dropout,
         sample_rate_hz,
         correction.coupling_rad_per_s,
         first_sample,

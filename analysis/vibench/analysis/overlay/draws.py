@@ -89,7 +89,7 @@ def _white(samples: Reals) -> float:
     return float(np.sqrt(np.mean(power[low:high]) / np.sum(np.hanning(samples.size) ** 2)))
 
 
-_HEARD_HZ = (100.0, 2000.0)
+_COMPARED_HZ = (100.0, 2000.0)
 """Band in which drive noise is visible in the base motion; a table has further resonances above it [Hz]."""
 _MEDIAN_SD = 1.44
 """Relative standard deviation of the median of N exponential values, times sqrt(N)."""
@@ -129,7 +129,7 @@ def unseen_noise(
     volts, base, _ = silence_before(channels)
     cycles = np.fft.rfftfreq(max(volts.size, 1))
     frequency_hz: Reals = np.asarray(cycles * channels.sample_rate_hz, dtype=np.float64)
-    inside = (frequency_hz >= _HEARD_HZ[0]) & (frequency_hz <= _HEARD_HZ[1]) & (cycles < _BAND[1])
+    inside = (frequency_hz >= _COMPARED_HZ[0]) & (frequency_hz <= _COMPARED_HZ[1]) & (cycles < _BAND[1])
     lines = int(np.sum(inside))
     if lines < _FEWEST_LINES:
         return None

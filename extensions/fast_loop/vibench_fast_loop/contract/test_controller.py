@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refused
+from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refused
 from vibench.acquisition.instruments import PlugInKind, Samples
 from vibench.acquisition.rig import LoopInput, Role
 
@@ -117,7 +117,7 @@ def test_it_falls_silent_without_requests_and_gives_the_reason(bench: Bench) -> 
     bench.digitizer.start()
     controller.play(series(bench))
     bench.digitizer.read(int((controller.facts.watchdog_s + 0.5) * bench.digitizer.sample_rate_hz))
-    assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
+    assert line_v(measured_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
     report = controller.report()
     assert report.state is LoopState.SILENT
     assert report.reason
@@ -132,7 +132,7 @@ def test_silence_is_allowed_at_any_time_and_reaches_the_terminal(bench: Bench) -
     listened(bench, 0.3)
     controller_of(bench).silence(0.05)
     controller_of(bench).silence(0.0)
-    assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
+    assert line_v(measured_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
     assert controller_of(bench).report().state is LoopState.SILENT
 
 
@@ -143,6 +143,6 @@ def test_close_may_be_repeated_and_is_silence(bench: Bench) -> None:
     listened(bench, 0.3)
     controller.close()
     controller.close()
-    assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
+    assert line_v(measured_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
     with refused():
         controller.play(series(bench))
