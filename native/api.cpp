@@ -1,5 +1,5 @@
-// The C interface: plain numbers only. No function throws, allocates memory, or keeps state between calls, so
-// threads may share tables. Every function checks its arguments and returns a code if it refuses them.
+// The C interface, with plain numbers only. No function throws, allocates memory, or keeps state between
+// calls, so threads may share tables. Every function checks its arguments, and refuses them by a return code.
 #include "batch.hpp"
 #include "chain.hpp"
 #include "cubic.hpp"
@@ -18,7 +18,7 @@ using namespace vibench;
 namespace {
 
 constexpr double LATEST = 1e12;  // largest time [s]
-constexpr int64_t MOST_PARTS = 1000000;  // most parts of an interval between two readings
+constexpr int64_t MOST_PARTS = 1000000;  // largest number of parts of an interval between two readings
 
 bool is_positive(double x) { return x > 0.0 && is_finite(x); }
 bool is_not_negative(double x) { return x >= 0.0 && is_finite(x); }
@@ -95,7 +95,7 @@ bool is_usable(const Readings &readings) {
 
 bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }
 
-// Builds the `Run` that fits the specimen's law, and returns the result of `act` with it.
+// Builds the `Run` for the specimen's law, and returns the result of `act` with it.
 template <class T, class Act>
 Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record &record, const Act &act) {
   auto with = [&](const auto &stops) {
@@ -140,7 +140,7 @@ Outcome advance(State &state, Tangent &tangent, const Tables &tables, double unt
   return outcome;
 }
 
-// Compiled for one change, which is faster, and for up to six.
+// Compiled for one tangent vector, which is faster, and for up to six.
 Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
                 Record &record) {
   if (tangent.changes == 1) return advance<1>(state, tangent, tables, until, tolerance, record);
@@ -158,7 +158,7 @@ constexpr struct {
     DESCRIBED(Readings),
     // Batches
     DESCRIBED(CollisionMonomials), DESCRIBED(CollisionFit), DESCRIBED(BatchMotion), DESCRIBED(Batch),
-    // Signals, analogue world, hidden-state estimation, chains
+    // Signals, analogue part of the virtual rig, hidden-state estimation, chains
     DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
     DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoadedShaker), DESCRIBED(LoopCables),
     DESCRIBED(TrackedStop), DESCRIBED(TrackRecord), DESCRIBED(MotionFilter), DESCRIBED(MotionSmoother),
@@ -169,19 +169,19 @@ constexpr int64_t STRUCTURE_COUNT = sizeof STRUCTURES / sizeof *STRUCTURES;
 
 }  // namespace
 
-// Text and size of each structure. A structure follows the structures that it contains.
+// Return the source text and the size of a structure. A structure follows the structures that it contains.
 VIBENCH_API const char *vibench_structure(int64_t index) {
   return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].text : nullptr;
 }
 VIBENCH_API int64_t vibench_size_of(int64_t index) {
   return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].size : 0;
 }
-// Size of the tables of a `Law` [bytes].
+// Returns the size of the tables for a `Law` [bytes].
 VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
   return sizeof(Tables) + (law == POWERS ? sizeof(PowerTables) : 0);
 }
 
-// Fills `tables`, of vibench_size_of_tables(law) bytes. The scene's shapes must outlive them.
+// Fills `tables`, which has vibench_size_of_tables(law) bytes. The scene's shapes must exist as long.
 VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   fill_tables(*tables, *scene);
@@ -193,7 +193,7 @@ VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   return REACHED_END;
 }
 
-// Determines whether the motion in `state` starts on a stop, and fills the rest of `state`.
+// Determines whether the motion in `state` starts on a stop, and fills the other members of `state`.
 VIBENCH_API int64_t vibench_start(const Body *tables, State *state, double tolerance) {
   if (tables == nullptr || state == nullptr || !is_tolerance(tolerance)) return REFUSED;
   Motion<double> motion = motion_of(*state);
@@ -202,14 +202,14 @@ VIBENCH_API int64_t vibench_start(const Body *tables, State *state, double toler
   return REACHED_END;
 }
 
-// Advances `state` to the time `until` [s], and fills `record`; returns an `Outcome`.
+// Advances `state` to the time `until` [s], and fills `record`. Returns an `Outcome`.
 VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until, double tolerance, Record *record) {
   if (tables == nullptr || state == nullptr || record == nullptr) return REFUSED;
   if (!is_usable(*state, until, tolerance) || !is_usable(*record)) return REFUSED;
   return advance(*state, *tables, until, tolerance, *record);
 }
 
-// Advances `state` like vibench_run, together with the small changes in `tangent`.
+// Advances `state` like vibench_run, together with the tangent vectors in `tangent`.
 VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state, double until, double tolerance,
                                              Record *record, Tangent *tangent) {
   if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr) return REFUSED;
@@ -217,7 +217,7 @@ VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state,
   return advance(*state, *tangent, *tables, until, tolerance, *record);
 }
 
-// Advances `state` and `tangent`, and stores the growth up to reading `last`; returns an `Outcome`.
+// Advances `state` and `tangent`, and stores the growth up to reading `last`. Returns an `Outcome`.
 VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, double tolerance, Record *record,
                                           Tangent *tangent, Readings *readings, int64_t last) {
   if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr || readings == nullptr)
@@ -229,7 +229,7 @@ VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, do
   });
 }
 
-// Upper bound of |p| until the next touch [m]: the sum of the phasors' magnitudes. Infinite on a stop.
+// Returns a bound of |p| until the next touch [m]: the sum of the phasors' magnitudes. Infinite on a stop.
 VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   if (tables == nullptr || state == nullptr || state->side != 0.0) return INFINITE;
   Clock<double> clock{state->clock_high, state->clock_low, 0.0};
@@ -238,11 +238,11 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   return PhasorSum<PHASORS>(phasors, tables->flight.path, tables->flight).reach;
 }
 
-// ---- Bases that are cubics on intervals
+// ---- Motions on a base whose displacement is a cubic on each interval
 
 namespace {
 
-constexpr double MOST_PIECES = 1e15;  // most pieces of an interval
+constexpr double MOST_PIECES = 1e15;  // largest number of pieces of an interval
 
 bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
 bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
@@ -269,12 +269,12 @@ bool is_usable(const CubicDrive &drive, double interval) {
 
 }  // namespace
 
-// Size of the tables of a `Law` for a base of cubics [bytes].
+// Returns the size of the tables for a `Law` on a base of cubics [bytes].
 VIBENCH_API int64_t vibench_size_of_cubic_tables(int64_t law) {
   return sizeof(CubicTables) + (law == POWERS ? sizeof(CubicPowerTables) : 0);
 }
 
-// Fills `tables`, of vibench_size_of_cubic_tables(law) bytes. The scene's shapes must outlive them.
+// Fills `tables`, which has vibench_size_of_cubic_tables(law) bytes. The scene's shapes must exist as long.
 VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   bool has_powers = scene->specimen.law == POWERS;
@@ -282,7 +282,7 @@ VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables 
   return REACHED_END;
 }
 
-// Advances `state` over the intervals of `drive`, and counts impacts in `record`; returns an `Outcome`.
+// Advances `state` over the intervals of `drive`, and counts impacts in `record`. Returns an `Outcome`.
 VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, CubicDrive *drive, double tolerance,
                                        Record *record) {
   if (tables == nullptr || state == nullptr || drive == nullptr || record == nullptr) return REFUSED;
@@ -297,13 +297,13 @@ VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, 
   return outcome;
 }
 
-// ---- Batches, signals, analogue world, hidden-state estimation, chains: functions of one structure
+// ---- Functions of one structure: batches, signals, analogue part, hidden-state estimation, chains
 
 namespace {
 
-constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // most motions of a batch
-constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // most drive periods of a motion in a batch
-constexpr int64_t LAST_STEP = int64_t(1) << 60;  // largest number of a step of the analogue world
+constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // largest number of motions of a batch
+constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // largest number of drive periods of a motion in a batch
+constexpr int64_t LAST_STEP = int64_t(1) << 60;  // largest step number in the analogue part
 constexpr int64_t MOST_SMALL_STEPS = 100000;
 constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
 constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
@@ -493,14 +493,14 @@ int64_t follow_chain(ChainMotion &chain) { return ChainRun(chain).advance(); }
 
 }  // namespace
 
-// Advances shaker and controller over the remaining steps of `loop`; returns a `LoopEnd`, or REFUSED.
+// Advances shaker and controller over the remaining steps of `loop`. Returns a `LoopEnd`, or REFUSED.
 VIBENCH_API int64_t vibench_close_loop(LoopCables *loop) {
   if (loop == nullptr || loop->shaker == nullptr || !is_usable(*loop) || !is_usable(*loop->shaker)) return REFUSED;
   if (loop->shaker->drive.at != loop->drive.at || loop->shaker->drive.size != loop->drive.size) return REFUSED;
   return close_loop(*loop);
 }
 
-// Size of the memory that a chain needs [doubles].
+// Returns the size of the memory that a chain needs [doubles].
 VIBENCH_API int64_t vibench_chain_memory(int64_t cells, int64_t kinds) {
   bool is_chain = cells > 0 && cells <= MOST_CELLS && kinds > 0 && kinds <= cells;
   return is_chain ? chain_memory(cells, kinds) : int64_t(REFUSED);

@@ -1,8 +1,8 @@
 // Eight motions of one specimen in parallel, one per lane of a vector register (decision 0061). In flight, p
-// is the real part of four rotating terms. Lanes advance by grid steps, as in flight.hpp, until at most one
-// is clear of the stops. For the others the touch, the collision (by polynomials) and the first step after it
-// are then computed under masks. A lane that has finished takes the next motion of the batch. Other lanes can
-// delay a motion, but never change its numbers.
+// is the real part of a sum of four rotating phasors ("terms"). Lanes advance by grid steps, as in
+// flight.hpp, until at most one lane is clear of the stops. For the other lanes the touch, the collision (by
+// polynomials) and the first step after it are then computed under masks. A lane with a finished motion takes
+// the next motion of the batch. Other lanes can delay a motion, but never change its results.
 #pragma once
 #include "collision_fit.hpp"
 #include "motion.hpp"
@@ -11,16 +11,16 @@ namespace vibench {
 
 constexpr int LANES = 8;
 constexpr unsigned ALL_LANES = (1u << LANES) - 1;
-constexpr int DRIVEN = 3, FLYING = 4;     // terms of p: three modes, then the drive
-constexpr int ORDERS = 12;                // terms of a series over a grid step; the next is 0.25^12 / 12!
-constexpr double FOUR = 4.0;              // number of grid steps taken at once far from the stops
-constexpr int SHORT = 6, LONG = 10;       // terms of cosine and sine for angles up to 0.25 and up to 1 [rad]
-constexpr int WAITING = 1;                // lanes that may still be clear of the stops when a march ends
-constexpr int TOUCH_CORRECTIONS = 3;      // Newton steps to a touch from a second-order guess
-constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root, from a guess within a few per cent
-constexpr int HIGHEST = 8;                // highest derivative of p at a touch
-constexpr double LONGEST_PART = 0.25;     // longest collision, over the drive period: LONG terms suffice
-constexpr int64_t MOST_EVENTS = 10000;    // most events per drive period, on average; no motion has so many
+constexpr int DRIVEN = 3, FLYING = 4;     // index of the drive's term, after three modes; number of terms
+constexpr int ORDERS = 12;                // number of series terms over a grid step; the next is 0.25^12 / 12!
+constexpr double FOUR = 4.0;              // number of grid steps taken together far from the stops
+constexpr int SHORT = 6, LONG = 10;       // number of sine and cosine terms for angles up to 0.25 and 1 [rad]
+constexpr int WAITING = 1;                // number of lanes clear of the stops at which a march may end
+constexpr int TOUCH_CORRECTIONS = 3;      // number of Newton steps to a touch from a second-order guess
+constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root from a guess with a few % error
+constexpr int HIGHEST = 8;                // order of the highest derivative of p at a touch
+constexpr double LONGEST_PART = 0.25;     // longest collision over the drive period, so that LONG terms suffice
+constexpr int64_t MOST_EVENTS = 10000;    // largest mean number of events per drive period; motions have fewer
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
 using Lanes = Vector<LANES>;
@@ -38,7 +38,7 @@ constexpr InverseFactorials INVERSE_FACTORIALS;
 INLINE LanePhasor fused_product(const LanePhasor &x, const LanePhasor &y) {
   return {fused(x.re, y.re, -(x.im * y.im)), fused(x.re, y.im, x.im * y.re)};
 }
-// sum + Re(x y)
+// Returns sum + Re(x y).
 INLINE Lanes with_real_of_product(Lanes sum, const LanePhasor &x, const LanePhasor &y) {
   return fused(-x.im, y.im, fused(x.re, y.re, sum));
 }
@@ -46,7 +46,7 @@ INLINE LanePhasor select(Mask mask, const LanePhasor &a, const LanePhasor &b) {
   return {select(mask, a.re, b.re), select(mask, a.im, b.im)};
 }
 
-// exp(i angle), by N terms of each of the series of cosine and sine.
+// Returns exp(i angle), by N terms of the series of cosine and of sine.
 template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
   Lanes square = angle * angle, cosine = 0.0, sine = 0.0;
   for (int k = N - 1; k >= 0; k--) {
@@ -57,7 +57,7 @@ template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
   return {cosine, sine * angle};
 }
 
-// exp(rate time), for a mode that decays little during `time`.
+// Returns exp(rate time), for a mode that decays little during `time`.
 template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes time) {
   Lanes shrinks = rate.re * time, size = INVERSE_FACTORIALS.of[6];
   for (int k = 5; k >= 0; k--) size = fused(size, shrinks, INVERSE_FACTORIALS.of[k]);
@@ -65,7 +65,7 @@ template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes
   return {size * turned.re, size * turned.im};
 }
 
-// Calls `act` with the number of each lane whose bit is set.
+// Calls `act` with the index of each lane whose bit is set.
 template <class Act> INLINE void for_each_lane(unsigned lanes, const Act &act) {
   for (; lanes != 0; lanes &= lanes - 1) act(__builtin_ctz(lanes));
 }
@@ -79,45 +79,45 @@ class BatchRun {
   void follow();
 
  private:
-  // States due once per drive period are stored here as terms until eight can be computed together.
+  // States that are due, once per drive period. They are stored as terms until eight are computed together.
   struct DueStates {
     LanePhasor term[FLYING];
-    Lanes later;  // time of each state relative to its due time: negative [s]
+    Lanes later;  // due time minus time of the terms, zero or negative [s]
   };
 
   const Batch &batch;
   const CollisionFit &fit;
-  const Tables &tables;  // of the first motion; all motions have the same specimen
-  double lower, upper;   // gaps [m]
+  const Tables &tables;  // tables of the first motion; all motions have the same specimen
+  double lower, upper;   // clearances [m]
 
-  // Per lane: constants of its motion.
+  // Constants of the motion in each lane.
   BatchMotion *motion[LANES] = {};
-  LanePhasor rate[FLYING] = {};              // [1/s]
-  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // factors of a term for one and four steps
+  LanePhasor rate[FLYING] = {};              // complex rate of each term [1/s]
+  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // factors of a term over one and four grid steps
   LanePhasor series[ORDERS][FLYING] = {};    // Taylor coefficients of exp(rate t)
   Lanes square[FLYING] = {}, cube[FLYING] = {};  // square and cube of |rate|
-  LanePhasor kick[DRIVEN] = {};              // change of a term by a unit impulse over the pair's mass
+  LanePhasor kick[DRIVEN] = {};              // change of a term by the impulse `pair` times 1 m/s
   LanePhasor drive = {};                     // term of the drive at the start of each drive period
   Lanes period = {}, frequency = {}, grid = {};
   Phasor shapes[LANES][FLYING][6] = {};      // motion for a term of 1 m
 
-  // Per lane: current state.
-  LanePhasor term[FLYING] = {};              // p = Re of their sum [m]
+  // Current state of each lane.
+  LanePhasor term[FLYING] = {};              // terms of p, which is the real part of their sum [m]
   Lanes left = {};                           // time until the next state is due, once per drive period [s]
-  Lanes reach = {}, bound = {}, jerk = {};   // bounds of |p|, |d2p/dt2| and |d3p/dt3| until a stop is touched
-  Lanes low = {}, high = {};                 // a step is clear if p is within these limits at both ends
-  Lanes low_four = {}, high_four = {};       // limits for four steps
-  Lanes touch = {};                          // time until the stop is touched [s]
+  Lanes reach = {}, bound = {}, jerk = {};   // bounds of |p|, |d2p/dt2| and |d3p/dt3| until the next touch
+  Lanes low = {}, high = {};                 // a step has no touch if p is within these limits at both ends
+  Lanes low_four = {}, high_four = {};       // the same limits for four steps
+  Lanes touch = {};                          // time until the next touch [s]
   DueStates due_states[LANES] = {};
   int waiting[LANES] = {};                   // number of due states not yet computed
   int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
 
   int64_t taken = 0;  // number of motions taken from the batch
-  unsigned moving = 0, careful = 0;  // bits of lanes that advance; of those limited to single steps
+  unsigned moving = 0, careful = 0;  // bits of lanes that advance, and of lanes limited to single steps
 
   // ---- One lane
 
-  // Returns whether a motion can be finished within the steps allowed for a run.
+  // Returns whether a motion needs fewer steps than the largest number for a run.
   static bool is_short_enough(const BatchMotion &next) {
     const Tables &t = *next.tables;
     return double(next.periods) < double(MOST_STEPS) * t.flight.grid * t.drive.frequency;
@@ -151,7 +151,7 @@ class BatchRun {
 
   Phasor term_of(int lane, int j) const { return {term[j].re[lane], term[j].im[lane]}; }
 
-  // Stores the due state of a lane in flight; returns whether all requested states are stored.
+  // Stores the due state of a lane in flight. Returns whether all states of the motion are stored.
   bool keep_due(int lane) {
     DueStates &due = due_states[lane];
     int place = waiting[lane]++;
@@ -166,7 +166,7 @@ class BatchRun {
     return is_all;
   }
 
-  // Stores a due state within a contact.
+  // Stores a due state during a contact.
   bool keep_due(int lane, const double (&at)[6]) {
     form_states(lane);
     __builtin_memcpy(motion[lane]->sections + 6 * kept[lane], at, sizeof at);
@@ -207,7 +207,7 @@ class BatchRun {
 
   enum class SlowContact { LEFT, ENDED, LOST };
 
-  // Integrates a contact of one lane by steps, and stores the states due meanwhile.
+  // Integrates a contact of one lane in steps, and stores the states that become due during the contact.
   SlowContact contact_by_steps(int lane) {
     const Tables &own = *motion[lane]->tables;
     double at[6];
@@ -215,10 +215,10 @@ class BatchRun {
     Contact<double> contact{};
     double side = touched_side(at[Y] - at[Z], at[VY] - at[VZ], own.specimen);
     begin_contact(contact, at, side, batch.tolerance, own);
-    contact.w = 0.0;  // a touch has no penetration; removes the rounding error
+    contact.w = 0.0;  // removes the rounding error: the penetration at a touch is zero
     HertzForce force{own.specimen.contact_stiffness};
     while (contact.side != 0.0) {
-      // Time zero is when the next state is due, a whole number of drive periods after the start.
+      // The next state is due at clock time zero, a whole number of drive periods after the start.
       Clock<double> clock{-left[lane], 0.0, 0.0};
       double longest = STRETCH_TURN / own.omega, passed = 0.0;
       bool is_due = left[lane] <= longest;
@@ -249,7 +249,7 @@ class BatchRun {
     }
   }
 
-  // ---- Functions of several lanes, which leave all other lanes unchanged
+  // ---- Functions for several lanes. They do not change the other lanes.
 
   unsigned keep_due(unsigned due) {
     unsigned over = 0;
@@ -277,7 +277,7 @@ class BatchRun {
     high_four = select(of, upper - FOUR * FOUR * margin, high_four);
   }
 
-  // Advances until at most `enough` lanes are clear of the stops; returns the lanes with a due state.
+  // Advances until at most `enough` lanes are clear of the stops. Returns the lanes with a due state.
   unsigned march(int enough) {
     Mask going = Mask::of(moving), one_by_one = Mask::of(careful);
     LanePhasor now[FLYING], next[FLYING];
@@ -319,7 +319,7 @@ class BatchRun {
     for (int k = ORDERS - 2; k >= 0; k--) rate = fused(rate, time, p), p = fused(p, time, course[k]);
   }
 
-  // Finds the first touch within the next grid step, like `first_touch`; returns the lanes that touch.
+  // Finds the first touch within the next grid step, like `first_touch`. Returns the lanes that touch.
   unsigned look_closely(unsigned lanes) {
     Lanes course[ORDERS];
     fill_course(course);
@@ -354,10 +354,10 @@ class BatchRun {
     return touched;
   }
 
-  // Advances time, and recomputes the drive's term so that its rounding errors do not accumulate.
+  // Advances the time. The drive's term is recomputed, so that its rounding errors do not accumulate.
   void pass(Mask of, Lanes time) {
     left = left - select(of, time, 0.0);
-    // The series needs a small angle: add half a turn, take a quarter, and raise to the fourth power.
+    // The series needs a small angle: a quarter of the phase plus half a turn, then the fourth power.
     LanePhasor turned = turned_by_series<LONG>((0.5 - left * frequency) * (0.5 * PI));
     LanePhasor half{fused(turned.re, turned.re, -(turned.im * turned.im)), 2.0 * (turned.re * turned.im)};
     LanePhasor whole{fused(half.im, half.im, -(half.re * half.re)), -2.0 * (half.re * half.im)};
@@ -372,7 +372,7 @@ class BatchRun {
     pass(of, later);
   }
 
-  // Advances a flight by a grid step; returns the lanes with a due state.
+  // Advances a flight by one grid step. Returns the lanes with a due state.
   unsigned fly_step(unsigned lanes) {
     Mask of = Mask::of(lanes);
     for (int j = 0; j < FLYING; j++) term[j] = select(of, fused_product(term[j], one_step[j]), term[j]);
@@ -380,8 +380,8 @@ class BatchRun {
     return (of & ~(0.0 < left)).bits();
   }
 
-  // Computes the collisions of lanes that touch a stop; returns the lanes outside the polynomials' range.
-  // Lanes in `last` end at their next due state, so a collision that passes it is returned too.
+  // Computes the collisions of lanes that touch a stop. Returns the lanes outside the polynomials' range.
+  // Lanes in `last` end at their next due state; they are also returned if it is due during the collision.
   unsigned collide(unsigned lanes, unsigned last) {
     Lanes approach = 0.0;
     for (int j = 0; j < FLYING; j++) approach = with_real_of_product(approach, term[j], rate[j]);
@@ -407,8 +407,8 @@ class BatchRun {
     return lanes & ~inside.bits();
   }
 
-  // Computes the polynomials' variables: acceleration at a collision's middle, its derivatives, and u, in
-  // units of the collision. `scale` is side over speed, which normalises the rate of p to 1.
+  // Computes the variables of the polynomials: acceleration at the collision's middle, its derivatives, and
+  // u, in units of the collision. `scale` is side over speed, which normalises the rate of p to 1.
   INLINE void fill_variables(Lanes (&variables)[VARIABLES], Lanes scale, Lanes unit) const {
     for (int k = 0; k < DERIVATIVES; k++) variables[k] = 0.0;
     variables[DERIVATIVES] = unit;
@@ -417,7 +417,7 @@ class BatchRun {
       for (int j = 0; j < FLYING; j++) value = with_real_of_product(value, term[j], series[order][j]);
       scale = scale * unit;
       value = value * scale * (1.0 / INVERSE_FACTORIALS.of[order]);
-      double away = 1.0;  // COLLISION_MIDDLE^n / n!, for the derivative n orders below
+      double away = 1.0;  // COLLISION_MIDDLE^n / n! for the derivative of an order lower by n
       for (int k = order - 2; k >= 0; k--) {
         if (k < DERIVATIVES) variables[k] = fused(value, away, variables[k]);
         away *= COLLISION_MIDDLE / (order - 1 - k);
@@ -442,7 +442,7 @@ class BatchRun {
     }
   }
 
-  // Returns the lanes whose first step after a contact is provably clear of the stop.
+  // Returns the lanes whose first step after a contact has provably no touch.
   unsigned leaves_clear(unsigned lanes) const {
     Lanes rate_of_p = 0.0, half_bend = 0.0;
     for (int j = 0; j < FLYING; j++) {

@@ -1,33 +1,33 @@
-// A chain of cells: specimens whose m0 are coupled in series (decision 0011). It advances in windows of time.
+// A chain of cells: specimens whose m0 are coupled in series (decision 0011). It advances in time windows.
 // Within a window the motion without contact forces is one Taylor polynomial per displacement, from eq. 1. A
-// cell that may touch a stop is integrated separately: the known motion of its neighbours drives its m0.
-// The effect of its force F on the chain is added at the window's end. With the chain's equations
-// s' = A s + b F it is sum_k A^k b M_k, where M_k is the integral of F(t) (end - t)^k / k!.
+// cell that may touch a stop is integrated separately: the known motion of its neighbours drives its m0. The
+// effect of its contact force F on the chain is added at the window's end. With the chain's equations
+// s' = A s + b F, the effect is sum_k A^k b M_k, where M_k is the integral of F(t) (end - t)^k / k!.
 #pragma once
 #include "power_law.hpp"
 
 namespace vibench {
 
-constexpr int WINDOW_MOMENTS = 9;           // the next one is below 7e-10 of the first in windows of 0.4 rad
-constexpr int BLOCK = 8;             // cells in parallel; in a window a force reaches fewer on each side
+constexpr int WINDOW_MOMENTS = 9;           // number of M_k; the next is below 7e-10 of the first at 0.4 rad
+constexpr int BLOCK = 8;             // cells in parallel; in a window a force reaches fewer cells per side
 constexpr int NUMBERS = 3;           // displacements of a cell, at indices P, AT_X, AT_Z; their rates follow
 constexpr int PIECE_TERMS = 8;
-constexpr double LONGEST_WINDOW = 0.5;  // fastest rate times length, so that AHEAD terms suffice [rad]
-constexpr double IDLE_WINDOWS = 2.0;  // length of a window without contacts, over the longest normal one
-constexpr int MOST_TOUCHES = 1000;   // most touches of a cell in a window
-constexpr int MOST_STRETCHES = 100000;  // most flights, contacts and steps of a cell in a window
-// A window is cut at a late touch only if it is cheap: if the number of cells integrated separately, plus one
-// for each CELLS_AS_ONE cells of the chain, is at most MOST_CUT. Otherwise contact steps cost less.
+constexpr double LONGEST_WINDOW = 0.5;  // limit of fastest rate times length, so that AHEAD terms suffice [rad]
+constexpr double IDLE_WINDOWS = 2.0;  // length of a window without contacts, over the longest other window
+constexpr int MOST_TOUCHES = 1000;   // largest number of touches of a cell in a window
+constexpr int MOST_STRETCHES = 100000;  // largest number of flights, contacts and steps of a cell in a window
+// A window is cut at a late touch only if this saves time: if the number of cells integrated separately, plus
+// one for each CELLS_AS_ONE cells of the chain, is at most MOST_CUT. Otherwise contact steps cost less.
 constexpr int64_t MOST_CUT = 12, CELLS_AS_ONE = 16;
-constexpr double SOON = 1e-3;        // a window is not cut at a touch within this first part of it
-constexpr double HAIR = 1e-12;       // a touch in this last part of a window is left to the next one
-constexpr double ROUNDED_PIECE = 1e-9;  // a rest of a piece of the drive below this part is rounding error
-// Constants of steps under a power law, whose windows are short; see power_law.hpp.
+constexpr double SOON = 1e-3;        // a window is not cut at a touch in this first part of it
+constexpr double HAIR = 1e-12;       // a contact from a touch in this last part continues in the next window
+constexpr double ROUNDED_PIECE = 1e-9;  // a smaller remaining part of a piece of the drive is rounding error
+// Constants for steps under a power law, whose windows are short; see power_law.hpp.
 constexpr double FINER_FIT = 0.01, CLOSE_PLACE = 1e-3, CLOSEST_PLACE = 1e-15, CELL_FADING = 0.999;
 constexpr double LONGER_STEP = 1.4142135623730951, SHORTER_STEP = 0.5;
-constexpr int MOST_TRIES = 200;      // most tries of a step, each half as long as the one before
+constexpr int MOST_TRIES = 200;      // largest number of tries of a step, each half as long as the last
 
-// One number per cell, with a block of zeros before and after as neighbours of the first and last cell.
+// One value per cell, with a block of zeros before and after as neighbours of the first and last cell.
 using Row = double *;
 struct Rows {
   Row of[NUMBERS];
@@ -35,32 +35,32 @@ struct Rows {
 
 // Data of a kind of cell, shared by all cells of this kind.
 struct KindTables {
-  Tables tables;                  // of the specimen on two springs, to the cells before and after
+  Tables tables;                  // tables of a specimen with springs to the cells before and after
   double struck[WINDOW_MOMENTS][WIDE];   // like `CollisionTables::struck`
   PowerForce power;
-  double link[2][2];              // stiffness and damping, before and after
+  double link[2][2];              // stiffness and damping of the links before and after
   double gain_length;             // length of the step for which `gain` was computed [s]
-  double gain[GAUSS][GAUSS];      // change of p at each Gauss point per force at each of them [m/N]
+  double gain[GAUSS][GAUSS];      // change of p at each Gauss point per force at each Gauss point [m/N]
 };
 
 struct CellMotion {
   double at[2 * NUMBERS];         // P, AT_X, AT_Z, and their rates
   Contact<double> contact;
   double power_step, size;
-  double moments[WINDOW_MOMENTS];        // M_k of the force so far; they end where `cross` ends
+  double moments[WINDOW_MOMENTS];        // M_k of the force so far, for the time at which `cross` ends
 };
 
-// Pointers to a run's arrays in the caller's memory, which is zeroed first.
+// Pointers to the arrays of a run in the caller's memory, which is zeroed first.
 struct ChainMemory {
   int64_t cells, kinds, padded;
   double *base;
   int64_t used = 0;
   Row inverse0, inverse2, inverse_pair, k0, k1, k2, c0, c1, c2;
   Rows terms[AHEAD];              // Taylor terms in the window
-  Rows end[2], sampled[2], heard[3];  // motion at the window's end, at a sample, and due to the forces alone
+  Rows end[2], sampled[2], heard[3];  // motion at the window's end, at a sample, and by contact forces alone
   Row bounds[2];                  // bounds of the accelerations of p and x in the window
-  CellMotion *now, *begun;        // motion of each separately integrated cell, and at the window's start
-  int64_t *busy;                  // numbers of the separately integrated cells, ascending
+  CellMotion *now, *begun;        // separately integrated cells: motion now, and at the window's start
+  int64_t *busy;                  // indices of the separately integrated cells, ascending
   KindTables *tables;
 
   ChainMemory(double *memory, int64_t cell_count, int64_t kind_count)
@@ -99,7 +99,7 @@ inline void shift(double *series, double by) {
     for (int k = AHEAD - 2; k >= low; k--) series[k] += by * series[k + 1];
 }
 
-// Moves the end of the integrals M_k later by `by`, without a force: M_k grows by parts of the lower ones.
+// Moves the end time of the integrals M_k by `by`, without a force: M_k grows by parts of the lower moments.
 inline void age(double *moments, double by) {
   double shares[WINDOW_MOMENTS] = {1.0};  // by^k / k!
   for (int k = 1; k < WINDOW_MOMENTS; k++) shares[k] = shares[k - 1] * by * (1.0 / k);
@@ -107,7 +107,7 @@ inline void age(double *moments, double by) {
     for (int back = 1; back <= k; back++) moments[k] += shares[back] * moments[k - back];
 }
 
-// Taylor terms of p, x and z of one cell without contact force; `push` is the neighbours' force on its m0.
+// Taylor terms of p, x and z of a cell without contact force. `push` is the force of the neighbours on m0.
 struct CellCourse {
   double of[NUMBERS][AHEAD];
 
@@ -134,14 +134,14 @@ struct CellCourse {
   const double *operator[](int number) const { return of[number]; }
 };
 
-// Largest magnitude over a flight, or `best` if that is larger; searched only if the bounds allow more.
+// Returns the largest magnitude over a flight, at least `best`. It is searched only if a bound allows more.
 inline double course_peak(double best, const double *series, double length) {
   double ends = larger(magnitude(series[0]), magnitude(polynomial_at(series, length).value));
   if (ends + derivative_bound(series, length, 2) * length * length / 8.0 <= best) return best;
   return series_peak(best, series, 0.0, length);
 }
 
-// Computes the Hertz collision of a cell that has just touched its stop; returns whether it was solved.
+// Computes the Hertz collision of a cell that has just touched its stop. Returns whether it was solved.
 inline bool collide_cell(Collision<double> &c, CellMotion &cell, const CellCourse &course, double longest,
                          double tolerance, const KindTables &kind) {
   const CollisionTables &t = kind.tables.collision;
@@ -168,17 +168,17 @@ inline bool collide_cell(Collision<double> &c, CellMotion &cell, const CellCours
   return true;
 }
 
-// A step of one cell under a power law: F at Gauss points is found by substitution, as in power_law.hpp.
+// A step of one cell under a power law. F at Gauss points is found by iteration, as in power_law.hpp.
 struct CellStep {
   KindTables &kind;
   const PowerShapes &shapes;
   const CellCourse &course;       // motion without the law's force, from the start of the step
   double length;
   Vector<GAUSS> force, places;
-  double moments[WINDOW_MOMENTS];        // integrals of force times (1 - s)^m over the step, s from 0 to 1
+  double moments[WINDOW_MOMENTS];        // integrals of force times (1 - s)^m over s from 0 to 1 (the step)
   double after[2 * NUMBERS];
 
-  // Tries the step; returns its misfit divided by the allowed misfit.
+  // Tries the step. Returns its misfit divided by the allowed misfit.
   double attempt(const CellMotion &cell, double tolerance) {
     if (length != kind.gain_length) {
       kind.gain_length = length;
@@ -201,7 +201,7 @@ struct CellStep {
     return weight * larger(magnitude(before), magnitude(behind)) / (FINER_FIT * FIT * tolerance * size);
   }
 
-  // Largest magnitude of a displacement over the step, or `best` if that is larger.
+  // Returns the largest magnitude of a displacement over the step, at least `best`.
   double peak(double best, int number, const CellMotion &cell) const {
     ValueAndRate first{cell.at[number], cell.at[number + NUMBERS]}, last{after[number], after[number + NUMBERS]};
     best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
@@ -213,7 +213,7 @@ struct CellStep {
   }
 
  private:
-  // Calls add(factor, m) for each m: the force's m-th integral times `factor` adds to a number of the motion.
+  // Calls add(factor, m) for each m. A coordinate grows by `factor` times the m-th integral of the force.
   template <class Add> void add_shares(int number, const Add &add) const {
     double factor = length;
     for (int m = 0; m < WINDOW_MOMENTS; m++) {
@@ -304,9 +304,9 @@ class ChainRun {
   CellState *states;
   Clock<double> clock;
   double push[AHEAD];             // force of the base on the first m0 in this window [N]
-  int64_t followed = 0;           // cells integrated separately
+  int64_t followed = 0;           // number of cells integrated separately
   double full_length = 0.0;       // length of the window before it is cut [s]
-  double cut = 0.0;               // earlier end, so that a collision lies in the next window [s]; 0: none
+  double cut = 0.0;               // earlier end of the window before a collision [s]; 0 if it is not cut
 
   const CellKind &kind(int64_t k) const { return reinterpret_cast<const CellKind *>(m.kinds.at)[k]; }
   int64_t kind_of(int64_t cell) const { return int64_t(m.kind_of.at[cell]); }
@@ -340,17 +340,17 @@ class ChainRun {
     for (int n = 0; n < NUMBERS; n++) c.at[n] = at.terms[0].of[n][i], c.at[n + NUMBERS] = at.terms[1].of[n][i];
   }
 
-  // ---- The chain without forces
+  // ---- Chain without contact forces
 
-  // Gong et al. 2025, eq. 1, for the cells from `first` to `last` (whole blocks): out = share * acceleration,
-  // for the displacements q, the rates next * v, and the force `base` on the first m0.
+  // Gong et al. 2025, eq. 1, for the cells `first` to `last` (whole blocks). Computes out = share *
+  // acceleration for the displacements q, the rates next * v, and the force `base` on the first m0.
   void accelerate(const Rows &q, const Rows &v, double next, double base, double share, const Rows &out, int64_t first,
                   int64_t last) {
     using Cells = Vector<BLOCK>;
     auto load = [](const double *from) { return Cells::load(from); };
     Cells x = load(q.of[AT_X] + first - BLOCK), vx = load(v.of[AT_X] + first - BLOCK);
-    // Force of the link before each cell of a block. The neighbours are shifted in registers, because an
-    // unaligned load that spans two recent stores stalls.
+    // Force of the link before each cell of a block. Neighbours are shifted in registers, because an
+    // unaligned load that spans two recent stores would stall.
     auto links_of = [&](int64_t i) {
       Cells x_before = x, vx_before = vx;
       x = load(q.of[AT_X] + i), vx = load(v.of[AT_X] + i);
@@ -392,7 +392,7 @@ class ChainRun {
       }
   }
 
-  // Adds sum_k A^k b M_k of the separately integrated cells by Horner's scheme; A maps (q, v) to (v, v').
+  // Adds sum_k A^k b M_k of the separately integrated cells, by Horner's scheme. A maps (q, v) to (v, v').
   void add_forces(Rows (&there)[2], const CellMotion *cells) {
     if (followed == 0) return;
     int64_t first = larger(int64_t(0), (at.busy[0] / BLOCK - 1) * BLOCK);
@@ -416,7 +416,7 @@ class ChainRun {
         for (int64_t i = first; i < last; i++) there[order].of[n][i] += at.heard[order == 0 ? q : v].of[n][i];
   }
 
-  // Computes the base's force as a polynomial in the time from now; returns how long it is valid [s].
+  // Computes the force of the base as a polynomial in the time from now. Returns how long it is valid [s].
   double place_push() {
     for (double &term : push) term = 0.0;
     int64_t pieces = m.pieces.size / PIECE_TERMS;
@@ -440,12 +440,12 @@ class ChainRun {
     return turned_by(angle_at(clock.high, clock.low, later, m.drive.frequency)) * m.drive.start;
   }
 
-  // ---- A window
+  // ---- One window
 
   Outcome cross_window(double left) {
     double longest = smaller(left, place_push());
     expand();
-    // After a window without separately integrated cells, a longer window is tried first (level -1).
+    // After a window without separately integrated cells, the first try is a longer window (level -1).
     for (int level = followed == 0 ? -1 : 0; level < m.windows.size; level++) {
       full_length = smaller(longest, level < 0 ? IDLE_WINDOWS * m.windows.at[0] : m.windows.at[level]);
       place(at.end, full_length);
@@ -466,7 +466,7 @@ class ChainRun {
       outcome = cross_cells(length);
     }
     if (outcome != REACHED_END) {
-      // A cell failed within the window: restore the motion at its beginning.
+      // A cell failed within the window. Restore the motion at the window's start.
       for (int64_t n = 0; n < followed; n++) at.now[at.busy[n]] = at.begun[at.busy[n]];
       m.impacts = impacts;
       return outcome;
@@ -483,7 +483,7 @@ class ChainRun {
     return outcome;
   }
 
-  // Lists the cells that are in contact or may touch in this window; returns false if the motion diverges.
+  // Lists the cells that are in contact or may touch in this window. Returns false if the motion diverges.
   bool find_busy() {
     using Cells = Vector<BLOCK>;
     for (int what = P; what <= (watches() ? AT_X : P); what++)
@@ -542,13 +542,13 @@ class ChainRun {
         if (ends + at.bounds[what][i] * length * length / 8.0 <= best) continue;
         double series[AHEAD];
         for (int k = 0; k < AHEAD; k++) series[k] = at.terms[k].of[what][i];
-        // In two halves, because a window without contacts is twice as long and may contain two extremes.
+        // A window without contacts is twice as long and may contain two extremes: its halves are searched.
         best = series_peak(series_peak(best, series, 0.0, 0.5 * length), series, 0.5 * length, length);
       }
     }
   }
 
-  // Samples come from a second run of the separately integrated cells, which ends at each sample.
+  // Computes samples by a second run of the separately integrated cells, which stops at each sample.
   void keep_samples(double length) {
     double reached = 0.0;
     int64_t room = m.samples.size / (6 * at.cells);
@@ -570,9 +570,9 @@ class ChainRun {
     }
   }
 
-  // ---- A cell in a window
+  // ---- One cell in a window
 
-  // Taylor terms of the neighbours' force on m0 of a cell, without contact forces of this window.
+  // Computes the Taylor terms of the neighbours' force on a cell's m0, without contact forces in this window.
   void place_neighbours(double *force, int64_t i) const {
     const auto &link = at.tables[kind_of(i)].link;
     for (int k = 0; k < AHEAD; k++) {
@@ -585,7 +585,7 @@ class ChainRun {
     }
   }
 
-  // Advances a cell within the window; stops early if the window is to be cut.
+  // Advances a cell within the window. Returns early if the window must be cut.
   Outcome cross(CellMotion &c, int64_t i, double from, double until, Purpose purpose) {
     KindTables &kind = at.tables[kind_of(i)];
     const Tables &t = kind.tables;
@@ -645,7 +645,7 @@ class ChainRun {
       tau += touches_at;
       if (++touches > MOST_TOUCHES) return TOO_MANY_IMPACTS;
       touch(c, touched_side(c.at[P], c.at[P_RATE], s), t);
-      c.contact.w = 0.0;  // a touch has no penetration; removes the rounding error
+      c.contact.w = 0.0;  // removes the rounding error: the penetration at a touch is zero
       if (purpose == Purpose::MOTION) {
         if (ends_too_late(c, tau, until, s)) {
           cut = tau;
@@ -660,7 +660,7 @@ class ChainRun {
     return outcome;
   }
 
-  // Whether the collision that begins would end after this window, but within a new window that begins here.
+  // Returns whether a collision from now would end after this window, but within a full window from now.
   bool ends_too_late(const CellMotion &c, double tau, double until, const Specimen &s) const {
     if (s.law != HERTZ || m.tolerance < LEAST_TOLERANCE || followed + at.cells / CELLS_AS_ONE > MOST_CUT) return false;
     if (!(SOON * until < tau && tau < until * (1.0 - HAIR))) return false;
@@ -681,7 +681,7 @@ class ChainRun {
     begin_contact(c.contact, motion, side, step_tolerance(), t);
   }
 
-  // Adds a force that ended `ago` seconds ago; moment(k) is its integral with (1 - s)^k over `length`.
+  // Adds a force that ended `ago` seconds before `cross` ends; moment(k) is its integral with (1 - s)^k.
   template <class Moment>
   void add_impulse(CellMotion &c, double side, double length, double ago, int count, const Moment &moment) const {
     double added[WINDOW_MOMENTS] = {}, factor = side * length;
@@ -722,7 +722,7 @@ class ChainRun {
     return end == ContactEnd::STALLED ? STALLED : REACHED_END;
   }
 
-  // Adds the step's integrals of F (limit - t)^k / k! dt, with dt = w ds, from the stages of the method.
+  // Adds the integrals of F (limit - t)^k / k! dt over the step, with dt = w ds, from the stages.
   template <class Steps> static void add_step(CellMotion &c, const Steps &steps, double h, double limit) {
     for (int j = 0; j < STAGES; j++) {
       if (END_WEIGHTS[j] == 0.0) continue;
@@ -737,7 +737,7 @@ class ChainRun {
     }
   }
 
-  // One step under a power law; returns its length, or zero after a failure.
+  // Takes one step under a power law. Returns its length, or zero after a failure.
   double power_step(CellMotion &c, const CellCourse &course, double left, KindTables &kind,
                     Observer &observer) const {
     const Tables &t = kind.tables;

@@ -5,7 +5,7 @@
 
 namespace vibench {
 
-// `slip` holds the derivatives of the time, because a slightly changed motion touches earlier or later.
+// `slip` contains the derivatives of the time, because a perturbed motion touches earlier or later.
 template <class T> struct Clock {
   double high, low;
   T slip;
@@ -23,16 +23,16 @@ template <class T> INLINE T time_until(const Clock<T> &clock, double instant) {
   return ((instant - clock.high) - clock.low) - clock.slip;
 }
 
-// Exact rounding error of a product of two doubles.
+// Returns the exact rounding error of a product of two doubles.
 INLINE double product_error(double a, double b, double product) {
-  constexpr double SPLITTER = 134217729.0;  // 2^27 + 1 cuts a double into halves whose products are exact
+  constexpr double SPLITTER = 134217729.0;  // 2^27 + 1 splits a double into halves whose products are exact
   double a_big = SPLITTER * a, b_big = SPLITTER * b;
   double a_high = a_big - (a_big - a), b_high = b_big - (b_big - b);
   double a_low = a - a_high, b_low = b - b_high;
   return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
 
-// Phase of a harmonic at clock time plus `later`, in (-2 pi, 4 pi) [rad]; whole turns are removed exactly.
+// Returns the phase at the clock time plus `later`, in (-2 pi, 4 pi) [rad]; whole turns are removed exactly.
 INLINE double angle_at(double high, double low, double later, double frequency) {
   double turns = frequency * high, extra = frequency * later;
   double rest = product_error(frequency, high, turns) + frequency * low;

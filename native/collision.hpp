@@ -1,31 +1,31 @@
 // A complete Hertz collision: depths at sixteen points and the duration, by Newton's method (decision 0008).
 // With time = duration (1 - cos phi) / 2 the depth is smooth in phi, also at both ends, so sixteen points
-// represent it. Scaled by depth and duration, collisions differ only by the force of the other springs
-// ("press"). Shapes and their response to a misfit are tabulated over the press; a few corrections follow.
+// represent it. Scaled by depth and duration, collisions differ only by the force of the other springs (the
+// "press"). Shapes and their response to a misfit are tabulated over the press; a few corrections follow.
 #pragma once
 #include "flight.hpp"
 
 namespace vibench {
 
 enum { POINTS = 16, SLOW_TERMS = 6, MOST_SHAPE_CORRECTIONS = 8 };
-// Rows of `CollisionShapes::shapes` after the first sixteen, which are responses to misfits of depth.
+// Rows of `CollisionShapes::shapes` after the first sixteen rows, which are responses to depth misfits.
 enum ShapeRow { TO_DURATION = POINTS, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING };
 enum DurationColumn { DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY };
 constexpr double SOFTEST = -0.3, HARDEST = 0.5, SPACING = (HARDEST - SOFTEST) / 40;  // tabulated presses
 constexpr double LONGEST = 3.5;         // duration at the HARDEST press, in units of depth over speed
-constexpr double LONGEST_COLLISION = 0.4;  // fastest rate times duration, so that the series suffices [rad]
-constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed: m v^2 / 2 = 2 k d^(5/2) / 5
+constexpr double LONGEST_COLLISION = 0.4;  // largest fastest rate times duration for the series [rad]
+constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5
 constexpr double LEAST_TOLERANCE = 1e-7;  // sixteen points are not accurate enough for stricter tolerances
 constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance
-constexpr double LAG = 3e-6;  // while depths change by more, the slow terms of the force are recomputed
+constexpr double LAG = 3e-6;  // the slow terms of the force are recomputed while depths change by more
 
-// Coordinates are mirrored so that p is positive at either stop.
+// One collision. Coordinates are mirrored so that p is positive at either stop.
 template <class T> struct Collision {
-  Wide<T, POINTS> depths;  // at the points, divided by `unit`
-  Wide<T, POINTS> force;   // at the points [N]
-  Wide<T, WIDE> motion;    // when it begins
-  Wide<T, WIDE> after;     // when it ends
-  Wide<T, TERMS> course;   // Taylor terms of p without force, in fastest * t
+  Wide<T, POINTS> depths;  // depths at the points, divided by `unit`
+  Wide<T, POINTS> force;   // contact force at the points [N]
+  Wide<T, WIDE> motion;    // motion at the start
+  Wide<T, WIDE> after;     // motion at the end
+  Wide<T, TERMS> course;   // Taylor terms of p without contact force, in powers of fastest * t
   Wide<T, TERMS> moments;  // integrals of the force up to the end
   T duration;              // [s]
   double unit;             // depth of a collision of this speed without other forces [m]
@@ -40,7 +40,7 @@ template <class T> INLINE Wide<T, POINTS> constants(const double (&of)[POINTS]) 
   return row;
 }
 
-// Sum of a Taylor series without its constant term, at the scaled times `turns` of the points.
+// Returns the sum of a Taylor series without its constant term, at the scaled times `turns` of the points.
 template <class T>
 INLINE Wide<T, POINTS> series_at_points(const Wide<T, TERMS> &terms, const Wide<T, POINTS> &turns) {
   Wide<T, POINTS> sum = at(terms, TERMS - 1) * turns;
@@ -48,7 +48,7 @@ INLINE Wide<T, POINTS> series_at_points(const Wide<T, TERMS> &terms, const Wide<
   return sum;
 }
 
-// Effect of the contact force on one number of the motion at the points, by terms `first` to `last` - 1.
+// Returns the effect of the contact force on one coordinate at the points, from terms `first` to `last` - 1.
 template <class T>
 INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last, int number, const T &duration,
                               const CollisionTables &t) {
@@ -62,7 +62,7 @@ INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last,
   return sum;
 }
 
-// Whether a correction was small enough to be the last: in the values or, for duals, in the derivatives.
+// Returns whether a correction is small enough to be the last; for duals its derivatives decide.
 INLINE bool is_settled(const Vector<POINTS> &change, const Vector<POINTS> &, double close) {
   return total(change * change) <= close * close;
 }
@@ -73,8 +73,8 @@ INLINE bool is_settled(const Dual<Vector<POINTS>, M> &change, const Dual<Vector<
   return true;
 }
 
-// Corrects depths and duration until the collision's equations hold; `begun` is p - gap at the start [m]. With
-// derivatives, the values are already solved and stay unchanged, so both kinds of motion agree to the last bit.
+// Corrects depths and duration until they satisfy the equations; `begun` is p - gap at the start [m]. For
+// duals the values are already solved and stay unchanged, so both kinds of motion agree to the last bit.
 template <class T> inline bool correct(Collision<T> &c, const T &begun, double close, const Tables &tables) {
   const CollisionTables &t = tables.collision;
   const auto &shape = t.shapes->shapes[c.press];
@@ -114,7 +114,7 @@ inline void foresee(Collision<double> &c, double press, const Tables &tables) {
   c.press = int((press - SOFTEST) / SPACING + 0.5);
   const auto &shape = t.shapes->shapes[c.press];
   const auto &known = t.shapes->durations[c.press];
-  // All parameters are in units of the collision: unit for depth, pace for time.
+  // All parameters are in units of the collision: `unit` for depth, `pace` for time.
   double turn = t.fastest * c.pace, stiff = tables.specimen.contact_stiffness * c.unit * square_root(c.unit);
   double kick = turn * stiff * c.pace / (c.unit * HALF_FORCE);
   double by[4] = {press - (SOFTEST + SPACING * c.press), c.course[3] * turn * turn * turn / c.unit,
@@ -128,7 +128,7 @@ inline void foresee(Collision<double> &c, double press, const Tables &tables) {
   c.duration *= c.pace;
 }
 
-// The motion at the end of the collision.
+// Computes the motion at the end of the collision.
 template <class T> inline void move_on(Collision<T> &c, const CollisionTables &t) {
   T turn = t.fastest * c.duration, factor = constant<T>(1.0);
   c.after = c.motion + (c.duration * at(c.moments, 0)) * Vector<WIDE>::load(t.struck[0]);
@@ -144,9 +144,9 @@ template <class T> INLINE Collision<double> values_of(const Collision<T> &c) {
           value_of(c.moments), value_of(c.duration), c.unit,             c.pace,            c.press};
 }
 
-// Solves the collision that begins with c.motion and c.course; `pace` as in `Contact`. Returns false if the
-// contact needs the steps of contact.hpp: at nearly zero speed, with springs as fast as the collision, an
-// end of the run within it, or the accuracy `reference`.
+// Solves the collision that starts with c.motion and c.course; `pace` as in `Contact`. Returns false if the
+// contact needs the steps of contact.hpp: at nearly zero speed, with springs as fast as the collision, with
+// the end of the run inside the collision, or for a tolerance below LEAST_TOLERANCE.
 template <class T>
 inline bool find_collision(Collision<T> &c, double gap, double pace, double longest, double tolerance,
                            const Tables &tables) {
@@ -175,8 +175,8 @@ inline bool find_collision(Collision<T> &c, double gap, double pace, double long
   }
 }
 
-// Advances a motion that has just touched the stop on `side` to the end of its collision. If the collision
-// cannot be solved, returns false and leaves the motion unchanged.
+// Advances a motion that has just touched the stop at `side` to the end of its collision. Returns false and
+// leaves the motion unchanged if the collision cannot be solved.
 template <class T>
 inline bool collide(Collision<T> &c, T *motion, double side, double pace, const Complex<T> &drive, double longest,
                     double tolerance, const Tables &tables) {

@@ -1,27 +1,27 @@
 // A Hertz collision as polynomials for batches, without iteration (decision 0061). The units are depth and
-// time u of a collision of the same speed without other forces. In these units a collision depends on u
+// time u of a collision of the same speed without other forces. In these units a collision depends only on u
 // and on the acceleration of p by all other springs. The polynomials' variables are this acceleration at the
-// middle, its first four derivatives, and u. Their values are the duration and the force's moments about the
-// middle. `vibench.sim.engine` fits them to solved collisions.
+// middle, its first four derivatives, and u. Their values are the duration and the moments of the force about
+// the middle. `vibench.sim.engine` fits them to solved collisions.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
 constexpr int DERIVATIVES = 5;              // the acceleration and its first four derivatives
-constexpr int VARIABLES = DERIVATIVES + 1;  // plus u
+constexpr int VARIABLES = DERIVATIVES + 1;  // these derivatives and u
 constexpr int MOMENTS = 5;
 constexpr int POLYNOMIALS = 1 + MOMENTS;    // the duration over u, and the moments
-constexpr double COLLISION_MIDDLE = 1.47;   // middle of a collision, in u
+constexpr double COLLISION_MIDDLE = 1.47;   // time of the middle of a collision, divided by u
 constexpr int MONOMIALS = 289;
 constexpr int COEFFICIENTS = sizeof(CollisionFit::coefficients) / sizeof(double);
 
-// Factor by which each power of a variable reduces a monomial's estimated contribution.
+// Factors by which one more power of each variable reduces the estimated contribution of a monomial.
 constexpr double ADDS[VARIABLES] = {0.3, 0.08, 0.015, 0.002, 2e-4, 0.03};
 // Monomials with smaller contributions are omitted from a polynomial. Higher moments need less accuracy.
 constexpr double LEAST_ADDED[POLYNOMIALS] = {1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05};
 
-// A monomial, computed as the earlier monomial `before` times one variable; the first monomial is 1.
+// A monomial: the product of the earlier monomial `before` and one variable. The first monomial is 1.
 struct Monomial {
   int powers[VARIABLES];
   double adds;
@@ -34,7 +34,7 @@ struct Monomials {
   int count, coefficients;
 };
 
-// Adds all monomials that extend `partly` by powers of `variable` and later ones, sorted by contribution.
+// Adds all products of `partly` and powers of `variable` and later variables, sorted by contribution.
 constexpr void add_monomials(Monomials &to, Monomial partly, int variable) {
   if (variable == VARIABLES) {
     int place = to.count++;
@@ -79,8 +79,8 @@ inline int64_t describe_collisions(const CollisionMonomials &to) {
   return MONOMIALS;
 }
 
-// Evaluates the polynomials at eight points at once. The loop is unrolled: every index is a constant, and
-// the sums stay in registers. g++, used only for tests, keeps the loop; the order of sums is the same.
+// Evaluates the polynomials at eight points at once. clang unrolls the loop: every index is a constant, and
+// the sums stay in registers. g++, used only for tests, keeps the loop, with the same order of summation.
 inline void evaluate(Vector<8> (&values)[POLYNOMIALS], const Vector<8> (&variables)[VARIABLES],
                      const double (&coefficients)[COEFFICIENTS]) {
   constexpr int CHAINS = 4;  // independent sums

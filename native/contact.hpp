@@ -1,6 +1,6 @@
-// Contact with a compliant stop, integrated from touch to release by steps with error control (decisions 0004
-// and 0008). With |p| = gap + w^2 and dt = w ds the force of eq. 2 is k w^3, and every rate is a polynomial.
-// This removes the kink of penetration^(3/2), and makes touch and release simple zeros of w.
+// Contact with a compliant stop, integrated from touch to release in steps with error control (decisions 0004
+// and 0008). With |p| = gap + w^2 and dt = w ds, the force of eq. 2 is k w^3, and every derivative is a
+// polynomial. This removes the kink of penetration^(3/2), and makes touch and release simple zeros of w.
 #pragma once
 #include "dormand_prince.hpp"
 #include "flight.hpp"
@@ -14,8 +14,8 @@ struct HertzForce {
   double stiffness;
   template <class T> INLINE T operator()(const T &w, const T &) const { return stiffness * (w * w * w); }
 };
-// A spring in parallel with a Hertz contact, either of which may be zero, with the loss of Hunt and Crossley,
-// J. Appl. Mech. 42 (1975) 440, eq. 8.
+// A linear spring in parallel with a Hertz contact, with the loss of Hunt and Crossley, J. Appl. Mech. 42
+// (1975) 440, eq. 8. Spring or Hertz contact may be zero.
 struct YieldingForce {
   double spring, hertz, loss;  // [N/m], [N/m^1.5], [s/m]
   template <class T> INLINE T operator()(const T &w, const T &r) const {
@@ -25,44 +25,44 @@ struct YieldingForce {
 
 // ---- A contact
 
-constexpr double SLOWEST_TOUCH = 1e-12;  // least r at w = 0 [m/s]; at w = r = 0 nothing changes with s
+constexpr double SLOWEST_TOUCH = 1e-12;  // least r at w = 0 [m/s]; all derivatives vanish at w = r = 0
 constexpr double ROOT_FLOOR = 1e-6;      // added to the error scale of w [m^0.5]: a penetration of 1 pm
 constexpr double RATE_FLOOR = 1e-6;      // added to the error scale of r [m/s]
-constexpr double STANDARD_TOLERANCE = 3e-7;  // tolerance of `foreseen_step`; steps scale with the eighth root
-constexpr int MOST_CONTACT_STEPS = 100000;   // most steps of one call; a contact takes about ten
-constexpr int MOST_CORRECTIONS = 100;        // a bracketed Newton iteration ends by bisection before this
-constexpr double LANDING = 1e-11;            // a release is accepted when |w| is below this part of its scale
-constexpr double STRETCH_TURN = 0.3;  // longest stretch, as drive phase [rad]: the base force is a polynomial of
-                                      // degree 7 about its middle; the first omitted term is 6e-12 of it
+constexpr double STANDARD_TOLERANCE = 3e-7;  // tolerance assumed by `foreseen_step`
+constexpr int MOST_CONTACT_STEPS = 100000;   // largest number of steps of one call; a contact takes about ten
+constexpr int MOST_CORRECTIONS = 100;        // bisection ends a bracketed Newton iteration before this
+constexpr double LANDING = 1e-11;            // a release is accepted if |w| is below this part of its scale
+constexpr double STRETCH_TURN = 0.3;  // longest stretch, as drive phase [rad]. Its base force is a polynomial
+                                      // of degree 7 about the middle, with a relative error of 6e-12.
 
 template <class T> struct Contact {
   T w, r;
-  double side;  // 0: none
+  double side;  // +1 or -1; 0 without contact
   double step, root_scale, rate_scale, pace;
 };
 
-// Steps accumulate errors, because they always remove energy; collisions solved as a whole do not. Careful
-// steps therefore use the tolerance times STEP_CARE, but at least FINEST_STEP.
+// Steps always remove energy, so their errors accumulate; collisions solved as a whole do not have this
+// defect. Careful steps therefore use the tolerance times STEP_CARE, but at least FINEST_STEP.
 constexpr double STEP_CARE = 1e-4, FINEST_STEP = 1e-11;
 
 INLINE double careful(double tolerance) { return smaller(tolerance, larger(STEP_CARE * tolerance, FINEST_STEP)); }
-// A damped motion forgets the errors of its steps; an undamped one accumulates them.
+// Errors of earlier steps decay in a damped motion, but accumulate in an undamped one.
 INLINE double step_tolerance(double tolerance, const Specimen &s) {
   return s.c0 + s.c1 + s.c2 + s.loss > 0.0 ? tolerance : careful(tolerance);
 }
 
 INLINE double step_scale(double tolerance) { return eighth_root(tolerance / STANDARD_TOLERANCE); }
 
-// Longest step that is accurate enough, over the collision's time scale; `depth` is w over its largest value.
-// Steps must be half as long at the turning point, which the last error estimate cannot predict. But contacts
-// are alike: measured on Hertz collisions of all speeds; slightly too short for stops that are springs.
+// Returns the longest accurate step, divided by the collision's time scale; `depth` is w over its largest
+// value. Steps must be half as long at the turning point, which the last error estimate cannot predict. The
+// values are from Hertz collisions, which are alike at all speeds. They are slightly short for linear stops.
 INLINE double foreseen_step(double depth, double rate) {
   if (rate > 0.0) return larger(1.02 - 0.95 * depth, 0.46);
   return depth > 0.93 ? 0.48 : depth > 0.65 ? 0.6 : 0.9;
 }
 
 // Starts a contact from a flight. The first step resolves the faster of: the elastic collision (a half-wave
-// in s about 5.1 w_max / v long), or a slow contact pressed with the acceleration a (w'' = -(a / 2) w).
+// in s about 5.1 w_max / v long), and a slow contact pressed with the acceleration a (w'' = -(a / 2) w).
 template <class T>
 inline void begin_contact(Contact<T> &c, const T *motion, double side, double tolerance, const Body &t) {
   const Specimen &s = t.specimen;
@@ -76,7 +76,7 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
     c.r = c.r + (SLOWEST_TOUCH - r);
     r = SLOWEST_TOUCH;
   }
-  // Largest speed, and depth for each spring alone: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5.
+  // Largest speed, and largest depth with each spring alone, from m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5.
   double hertz = 0.8 * s.contact_stiffness / t.pair, spring = s.linear_stiffness / t.pair, w2 = w * w;
   double speed = square_root(r * r + hertz * w2 * w2 * w + spring * w2 * w2);
   double deepest = smaller(fifth_root(speed * speed / hertz), square_root(speed / square_root(spring)));
@@ -89,7 +89,7 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
   c.step = step_scale(step_tolerance(tolerance, s)) * foreseen_step(w / c.root_scale, r) * smaller(c.pace, pressed);
 }
 
-// Base force k0 U + c0 dU/dt as a polynomial about the middle of a stretch; for a cubic, about its start [N].
+// Base force k0 U + c0 dU/dt [N] as a polynomial about the middle of a stretch; for a cubic, about its start.
 struct BaseForce {
   double middle, terms[8];
   Phasor drive;  // the drive's phasor at the middle
@@ -106,7 +106,7 @@ struct BaseForce {
   BaseForce(double middle_s, const double *series) : middle(middle_s), terms{}, drive{} {
     __builtin_memcpy(terms, series, sizeof terms);
   }
-  // Summed in pairs, which shortens the chain of dependent products.
+  // Returns the force at `tau`. Summation in pairs shortens the chain of dependent products.
   template <class T> INLINE T at(const T &tau) const {
     T u = tau - middle, u2 = u * u;
     T low = (terms[0] + terms[1] * u) + u2 * (terms[2] + terms[3] * u);
@@ -117,8 +117,8 @@ struct BaseForce {
 
 enum { W, R, CX, CZ, CVX, CVZ, TIME, UNKNOWNS };
 
-// Gong et al. 2025, eq. 1, in contact: derivatives of w, r, x, z, vx, vz and t with respect to s. The stop's
-// force is computed as on the positive side and signed once, so mirrored motions agree to the last bit.
+// Gong et al. 2025, eq. 1, in contact: derivatives of w, r, x, z, vx, vz and t with respect to s. The stop
+// force is computed for the positive side and gets its sign once, so mirrored motions agree to the last bit.
 template <class T, class Force> struct ContactEquations {
   const Body &t;
   const BaseForce &base;
@@ -143,7 +143,7 @@ template <class T, class Force> struct ContactEquations {
 
 enum class ContactEnd { LEFT, HELD, LOST, STALLED };
 
-// The steps of one contact: `point` is the last accepted state, `trial` the state after the step being tried.
+// The steps of one contact: `point` is the last accepted state, `trial` the state after the trial step.
 template <class T, class Force> struct ContactSteps {
   ContactEquations<T, Force> rates;
   double tolerance;
@@ -152,7 +152,7 @@ template <class T, class Force> struct ContactSteps {
 
   void take(const T &h) { dormand_prince_step(stages, point, h, trial, rates); }
 
-  // Error of w, r and vx: of vx too, because a light m0 moves faster than the contact.
+  // Returns the error of w, r and vx. A light m0 moves faster than the contact, so vx is included.
   double error(double h, const Contact<T> &c) const {
     StepError error;
     error.add(stages, W, tolerance * (c.root_scale + magnitude(value_of(point[W]))));
@@ -161,9 +161,9 @@ template <class T, class Force> struct ContactSteps {
     return error.of_step(h, 2.0);
   }
 
-  // Shortens the trial step to the zero of `off` within it, by Newton's method with a bracket. Only values
-  // decide, so they equal those of a motion without derivatives to the last bit. A final correction adds the
-  // derivatives of the step's length.
+  // Shortens the trial step to the zero of `off` within it, by Newton's method with a bracket. Decisions use
+  // only values, so these equal the values of a motion without derivatives to the last bit. A final
+  // correction adds the derivatives of the step length.
   template <class Off> T land(const T &longest, double close, double slope_sign, const Off &off) {
     double low = 0.0, high = value_of(longest);
     T h = longest;
@@ -193,7 +193,7 @@ template <class T, class Force> struct ContactSteps {
   }
   T land_on_time(const T &longest, const T &limit) {
     struct Off { T late, slope; };
-    // Time is resolved to a few units in the last place.
+    // Times are exact to a few units in the last place.
     double close = 4.0 * EPSILON * (magnitude(value_of(limit)) + magnitude(value_of(point[TIME])));
     T h = land(longest, close, 1.0, [&] { return Off{T(trial[TIME] - limit), trial[W]}; });
     trial[TIME] = limit;
@@ -201,8 +201,8 @@ template <class T, class Force> struct ContactSteps {
   }
 };
 
-// Advances a contact from time `tau` to `limit`, or until m1 leaves the stop (then `contact.side` is 0), on
-// the clock of `base`. `seen(steps, h)` is called for each accepted step, before `point` becomes `trial`.
+// Advances a contact from time `tau` to `limit` on the clock of `base`, or until m1 leaves the stop; then
+// `contact.side` is 0. `seen(steps, h)` is called for each accepted step, before `point` is updated.
 template <class T, class Force, class Seen>
 inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &limit, const BaseForce &base,
                                   const Force &force, double allowed, const Body &t, const Seen &seen) {
@@ -233,7 +233,7 @@ inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &lim
       end = ContactEnd::HELD;
     }
     if (value_of(trial[TIME]) < value_of(point[TIME])) {
-      // Time runs backwards where w < 0: the step went past the release and came back. Try half of it.
+      // Time decreases while w < 0: the step went beyond the release and returned. Try half of it.
       step *= 0.5;
       end = ContactEnd::STALLED;
       continue;
@@ -245,7 +245,7 @@ inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &lim
     steps.rates(point, steps.stages[0]);
     step *= factor;
     double depth = value_of(point[W]) / c.root_scale;
-    // The prediction of the step holds only up to about the predicted largest depth.
+    // The prediction of the step is valid only up to about the predicted largest depth.
     if (depth < 1.05) step = smaller(step, longest * foreseen_step(depth, value_of(point[R])));
   }
   c.w = point[W], c.r = point[R], c.step = step;

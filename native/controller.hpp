@@ -1,4 +1,4 @@
-// One sample of a real-time controller: phase, Fourier series, law, and measured coefficients.
+// One sample of a real-time controller: phase, Fourier series, control law, and measured coefficients.
 #pragma once
 #include "structures.hpp"
 
@@ -7,10 +7,10 @@ namespace vibench {
 constexpr int MOST_HARMONICS = 20;
 constexpr int MOST_MEMORY = 64;
 
-// Rises from 0 to 1 along half a cosine.
+// Returns a smooth function of `share` that rises from 0 to 1 along half a cosine.
 INLINE double eased(double share) { return 0.5 - 0.5 * cosine_sine(PI * share).cosine; }
 
-// Returns the output of the control law [V], and prepares its memory for the next sample.
+// Returns the output of the control law [V], and updates its states for the next sample.
 inline double answer_of_law(Controller &c, double base_volts, double m0_volts) {
   double next[MOST_MEMORY], volts = c.direct[0] * base_volts + c.direct[1] * m0_volts;
   for (int k = 0; k < c.remembered; k++) volts += c.output[k] * c.memory[k];
@@ -22,7 +22,7 @@ inline double answer_of_law(Controller &c, double base_volts, double m0_volts) {
   return volts;
 }
 
-// Adds a sample to the Fourier coefficients of a block. With Hann weights the block need not end on a sample.
+// Adds a sample to the Fourier coefficients of a block. With Hann weights a block may end between samples.
 inline void add_to_block(Controller &c, const double (&sampled)[3], const Phasor &turn) {
   double weight = 1.0 - cosine_sine(2.0 * PI * c.turns / c.block).cosine;
   Phasor back{weight, 0.0};
@@ -43,7 +43,7 @@ inline void add_to_block(Controller &c, const double (&sampled)[3], const Phasor
   c.is_steady = 1;
 }
 
-// Output for the mean sensor voltages over the last sample [V]; zero while the controller is off.
+// Returns the output for the mean sensor voltages over the last sample [V]; zero while the controller is off.
 inline double answer(Controller &c, double base_volts, double m0_volts) {
   if (!c.is_on) return 0.0;
   c.unheard += 1.0;
@@ -72,7 +72,7 @@ inline double answer(Controller &c, double base_volts, double m0_volts) {
   return volts;
 }
 
-// Whether the host must act before the next sample: to store a block, or because the controller ends.
+// Returns whether the host must act before the next sample: to store a block, or because the controller ends.
 inline bool wants_attention(const Controller &c) {
   bool has_ended = c.is_on && c.fade <= 0.0;
   return c.done > 0 || c.unheard > c.most_unheard || c.at_limit > c.most_at_limit || has_ended;

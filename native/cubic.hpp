@@ -1,17 +1,17 @@
-// Motion under a base whose displacement is a cubic on each of equal intervals: a sweep, recording or shaker
+// Motion on a base whose displacement is a cubic on each of equal intervals: a sweep, recording or shaker
 // table (decision 0004). Intervals are divided into pieces short enough for a Taylor series. A flight over a
-// piece is one matrix product if a bound on its acceleration excludes a touch; else its series is searched.
+// piece is one matrix product if a bound of its acceleration excludes a touch; else its series is searched.
 #pragma once
 #include "run.hpp"
 
 namespace vibench {
 
-constexpr int CUBIC = 4;  // terms of a cubic
-constexpr int MOST_PHASES = 100000;  // most flights and contacts in a piece; even chatter has fewer
-constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for an interval whose length has rounding errors
+constexpr int CUBIC = 4;  // number of terms of a cubic
+constexpr int MOST_PHASES = 100000;  // largest number of flights and contacts in a piece; chatter has fewer
+constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for the rounding error of an interval's length
 constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // length of a piece in steps of the last level
-constexpr int PIECE_ORDER = 16;  // terms of a series over a piece under a power law
-constexpr double TRY_TWICE = 5e-4;  // a misfit below this part of the allowed one doubles the next step
+constexpr int PIECE_ORDER = 16;  // number of series terms over a piece under a power law
+constexpr double TRY_TWICE = 5e-4;  // below this part of the allowed misfit, the next step is twice as long
 
 // ---- The base
 
@@ -20,13 +20,13 @@ template <class T> struct CubicForce {
   T terms[CUBIC];
 };
 
-// `base` holds the terms of U [m, m/s, ...].
+// Returns the base force for the terms `base` of U [m, m/s, ...].
 INLINE CubicForce<double> base_force(const double *base, const Specimen &s) {
   return {{s.k0 * base[0] + s.c0 * base[1], s.k0 * base[1] + 2.0 * s.c0 * base[2],
            s.k0 * base[2] + 3.0 * s.c0 * base[3], s.k0 * base[3]}};
 }
 
-// The same force as a polynomial in t - `by`.
+// Returns the same force as a polynomial in t - `by`.
 template <class T> INLINE CubicForce<T> shifted(const CubicForce<double> &force, const T &by) {
   const double (&f)[CUBIC] = force.terms;
   return {{f[0] + by * (f[1] + by * (f[2] + by * f[3])), f[1] + by * (2.0 * f[2] + 3.0 * f[3] * by),
@@ -35,7 +35,7 @@ template <class T> INLINE CubicForce<T> shifted(const CubicForce<double> &force,
 
 // ---- Taylor series of a motion
 
-// Rates of (x, y, z, vx, vy, vz) by Gong et al. 2025, eq. 1, without F and with the base force `push` on m0.
+// Computes rates of (x, y, z, vx, vy, vz) by Gong et al. 2025, eq. 1, without F; `push` is the force on m0.
 template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);
@@ -46,7 +46,7 @@ template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates
   rates[VZ] = t.inverse2 * (hold - pull);
 }
 
-// The same rates while m1 rests on a rigid stop and forms one body with m2.
+// Computes the same rates while m1 rests on a rigid stop and forms one body with m2.
 template <class T> INLINE void held_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);
@@ -78,8 +78,8 @@ template <class T> struct Course {
 
 // Effect of each term of the base force on a step under a power law.
 struct BaseNumbers {
-  double places[CUBIC][GAUSS];  // on p at the Gauss points
-  double ends[CUBIC][WIDE];     // on the motion at the end
+  double places[CUBIC][GAUSS];  // effect on p at the Gauss points
+  double ends[CUBIC][WIDE];     // effect on the motion at the end
 };
 
 struct CubicPowerTables : PowerTables {
@@ -87,17 +87,17 @@ struct CubicPowerTables : PowerTables {
 };
 
 struct CubicTables : Body {
-  double interval;  // [s]
-  double fastest;   // rate of the specimen [1/s]
-  int64_t pieces;   // of an interval
-  double length;    // of a piece [s]
+  double interval;  // length of an interval [s]
+  double fastest;   // fastest rate of the specimen [1/s]
+  int64_t pieces;   // number of pieces of an interval
+  double length;    // length of a piece [s]
   double across[6 + CUBIC][WIDE];  // motion at a piece's end per motion and force terms at its start
   double bound_per_root_energy;    // largest |d2p/dt2| in flight, over sqrt(2 energy) [m/s^2 / J^0.5]
-  const CubicPowerTables *power;   // stored after these tables, for a power law; else null
+  const CubicPowerTables *power;   // tables for a power law, stored after these tables; otherwise null
 };
 
-// Largest |d2p/dt2| in flight, over sqrt(2 energy). In the coordinates sqrt(k) e and sqrt(m) v, with
-// elongations e of the springs, it is the norm of the coefficients of d2p/dt2.
+// Returns the largest |d2p/dt2| in flight, over sqrt(2 energy). In the coordinates sqrt(k) e and sqrt(m) v,
+// with elongations e of the springs, it is the norm of the coefficients of d2p/dt2.
 inline double bound_per_root_energy(const Body &t) {
   const Specimen &s = t.specimen;
   const double parts[] = {s.k1 * t.inverse_pair * t.inverse_pair,
@@ -111,7 +111,7 @@ inline double bound_per_root_energy(const Body &t) {
   return square_root(sum);
 }
 
-// By the Taylor series of the motion: a force f_k t^k changes a number by the sum over m of
+// Fills `base` from the Taylor series of the motion: a force f_k t^k changes the motion by the sum over m of
 // f_k (A^m / m!) c t^(m+k+1) m! k! / (m+k+1)!, where c is the effect of a unit force on the rates.
 inline void fill_base(BaseNumbers &base, double length, const PowerTables &t, const Body &body) {
   base = {};
@@ -160,7 +160,7 @@ template <class T, class Stops> class CubicRun {
   CubicRun(Motion<T> &motion, const CubicTables &tables, const Stops &stops, double tolerance, Record &record)
       : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record) {}
 
-  // Advances from `begin` to `end` [s] after the start of an interval; `base` holds the terms of U.
+  // Advances from `begin` to `end` [s] after the start of an interval; `base` contains the terms of U.
   Outcome advance(const double *base, double begin, double end) {
     bool is_whole = begin == 0.0 && end >= t.interval * ALMOST;
     int64_t pieces = is_whole ? t.pieces : -int64_t(whole_part((begin - end) / t.length));
@@ -207,7 +207,7 @@ template <class T, class Stops> class CubicRun {
     return outcome;
   }
 
-  // Each sample is the end of a shorter piece, computed with a copy of the motion.
+  // Computes each sample as the end of a shorter piece, with a copy of the motion.
   void keep_samples_of(const CubicForce<double> &force, double length) {
     keep_samples(record, {m.clock.high, m.clock.low, 0.0}, length, [&](double later, double *sample) {
       Motion<double> copy = values_of(m);
@@ -219,8 +219,8 @@ template <class T, class Stops> class CubicRun {
     });
   }
 
-  // Bound of |d2p/dt2| over one piece in flight, from the energy E at its start: for a base force f,
-  // d/dt sqrt(2E) <= |f| / sqrt(m0); damping only reduces E.
+  // Returns a bound of |d2p/dt2| over one piece in flight, from the energy E at its start. Under a base force
+  // f, d/dt sqrt(2E) <= |f| / sqrt(m0), and damping only reduces E.
   template <class F> double acceleration_bound(const CubicForce<F> &force) const {
     const Specimen &s = t.specimen;
     double x = value_of(m.at[X]), y = value_of(m.at[Y]), z = value_of(m.at[Z]), h = t.length;
@@ -231,7 +231,7 @@ template <class T, class Stops> class CubicRun {
     return t.bound_per_root_energy * (square_root(kinetic + elastic) + h * push * square_root(t.inverse0));
   }
 
-  // Advances a flight across a whole piece; changes nothing if a touch cannot be excluded.
+  // Advances a flight over a whole piece. If a touch cannot be excluded, returns false and changes nothing.
   bool cross(const CubicForce<double> &force) {
     if (m.contact.side != 0.0) return false;
     double margin = acceleration_bound(force) * t.length * t.length / 8.0;
@@ -316,7 +316,7 @@ template <class T, class Stops> class CubicRun {
     }
   }
 
-  // The stop releases m1 when the acceleration that presses m1 onto it becomes zero.
+  // Advances m1 on a rigid stop, until the acceleration that presses m1 on the stop becomes zero.
   Outcome stay_held(const CubicForce<double> &force, double length, T &tau) {
     const Specimen &s = t.specimen;
     double side = m.contact.side, gap = gap_at(s, side), left = length - value_of(tau), path[AHEAD];
@@ -338,7 +338,7 @@ template <class T, class Stops> class CubicRun {
     return REACHED_END;
   }
 
-  // Under a power law: a piece is one step, or is halved repeatedly until each step is accurate.
+  // Advances under a power law: a piece is one step, or is halved repeatedly until each step is accurate.
   Outcome push_on(const CubicForce<double> &force, double length, bool is_whole, T &tau) {
     const CubicPowerTables &of = *t.power;
     PowerStep<T> step{t, of, fit_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
@@ -406,7 +406,7 @@ template <class Run> inline Outcome follow(Run &run, const Motion<double> &motio
   return REACHED_END;
 }
 
-// Builds the `CubicRun` that fits the specimen's law, and returns the result of `act` with it.
+// Builds the `CubicRun` for the specimen's law, and returns the result of `act` with it.
 template <class T, class Act>
 inline Outcome with_cubic_stops(Motion<T> &motion, const CubicTables &t, double tolerance, Record &record,
                                 const Act &act) {

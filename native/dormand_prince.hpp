@@ -1,5 +1,5 @@
-// Dormand and Prince's method of order 8(5,3): coefficients and error estimates after Hairer, Norsett and Wanner,
-// Solving Ordinary Differential Equations I (2nd ed. 1993), section II.10 and the code DOP853.
+// Dormand and Prince's method of order 8(5,3). Coefficients and error estimates are from Hairer, Norsett and
+// Wanner, Solving Ordinary Differential Equations I (2nd ed. 1993), section II.10 and the code DOP853.
 #pragma once
 #include "scalar.hpp"
 
@@ -42,7 +42,7 @@ constexpr double THIRD_ORDER_ERROR[STAGES] = {
 // clang-format on
 constexpr double BLEND = 0.01;  // weight of the third-order estimate in the error
 
-// One step of length `h` from `from`, whose rates are in stages[0]; `rates(at, out)` computes rates.
+// Takes one step of length `h` from `from`, whose rates are in stages[0]; `rates(at, out)` computes rates.
 template <class T, int N, class Rates>
 inline void dormand_prince_step(T (&stages)[STAGES][N], const T (&from)[N], const T &h, T (&to)[N], const Rates &rates) {
   T point[N];
@@ -66,8 +66,8 @@ inline void dormand_prince_step(T (&stages)[STAGES][N], const T (&from)[N], cons
   }
 }
 
-// Error estimate of a step in some unknowns, over the allowed error. It is infinite if a stage is not finite,
-// because the formula would give zero: the fifth-order error over infinity.
+// Error estimate of a step in some unknowns, divided by the allowed error. If a stage is not finite, the
+// estimate is infinite; the formula would give zero, because it divides by infinity.
 struct StepError {
   double fifth = 0.0, third = 0.0;
 
@@ -87,7 +87,7 @@ struct StepError {
   }
 };
 
-// Ratio of the next step length to this one; an error of NaN shortens the step.
+// Returns the ratio of the next step length to the present one; an error of NaN shortens the step.
 INLINE double step_factor(double error) {
   constexpr double SAFETY = 0.9, SHRINK = 0.2, GROW = 4.0;
   if (!(error < 1e300)) return SHRINK;

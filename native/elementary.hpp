@@ -1,6 +1,6 @@
-// exp, logarithm, sine and cosine from basic operations in a fixed order, for the same digits on every
-// processor. Argument reduction after Cody and Waite, Software Manual for the Elementary Functions (1980):
-// the constant is split into two or three parts, so short that products with the first parts are exact.
+// exp, logarithm, sine and cosine from basic operations in a fixed order, which gives the same digits on
+// every processor. Argument reduction follows Cody and Waite, Software Manual for the Elementary Functions
+// (1980): the constant is split into two or three parts; the first parts are short enough for exact products.
 // Errors are below 1.5 units in the last place (native/test_engine.cpp compares with libm).
 #pragma once
 #include "numbers.hpp"
@@ -13,12 +13,12 @@ inline double exponential(double x) {
   constexpr double LOG2_HIGH = 6.93147180369123816490e-01, LOG2_LOW = 1.90821492927058770002e-10;
   double twos = nearest(x * 1.44269504088896338700);
   double r = (x - twos * LOG2_HIGH) - twos * LOG2_LOW;  // |r| < 0.35
-  double sum = 1.0 / 6227020800.0;                      // 1 / 13!, the last term above rounding
+  double sum = 1.0 / 6227020800.0;                      // 1 / 13!, the last term above rounding error
   constexpr double INVERSE_FACTORIALS[] = {1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800, 1.0 / 362880,
                                            1.0 / 40320,     1.0 / 5040,     1.0 / 720,     1.0 / 120,
                                            1.0 / 24,        1.0 / 6,        0.5};
   for (double term : INVERSE_FACTORIALS) sum = sum * r + term;
-  sum = (sum * r + 1.0) * r;  // exp(r) - 1; its rounding error is small beside 1
+  sum = (sum * r + 1.0) * r;  // exp(r) - 1; its rounding error is small compared with 1
   double power = __builtin_bit_cast(double, (int64_t(twos) + 1023) << 52);
   return (1.0 + sum) * power;
 }
@@ -27,7 +27,7 @@ struct CosineSine {
   double cosine, sine;
 };
 
-// cos and sin of x + tail for |x| <= pi / 4. Coefficients from Sun's fdlibm, with errors below 2^-58.
+// Returns cos and sin of x + tail for |x| <= pi / 4. Coefficients from Sun's fdlibm, with errors below 2^-58.
 INLINE CosineSine cosine_sine_near_zero(double x, double tail) {
   double z = x * x;
   double s = -1.66666666666666324348e-01 +
@@ -46,10 +46,10 @@ INLINE CosineSine cosine_sine_near_zero(double x, double tail) {
   return {cosine, sine};
 }
 
-// cos and sin of any angle [rad]. Beyond 10^6 rad the reduction is no longer exact; nor is the angle itself.
+// Returns cos and sin of any angle [rad]. Above 10^6 rad neither the reduction nor the angle itself is exact.
 inline CosineSine cosine_sine(double angle) {
   constexpr double PI_2_HIGH = 1.57079632673412561417e+00;  // 33 bits
-  constexpr double PI_2_MIDDLE = 6.07710050630396597660e-11;  // the next 33
+  constexpr double PI_2_MIDDLE = 6.07710050630396597660e-11;  // the next 33 bits
   constexpr double PI_2_LOW = 2.02226624879595063154e-21;
   if (!is_finite(angle)) return {angle - angle, angle - angle};
   double quarters = nearest(angle * (2.0 / PI));
@@ -66,14 +66,14 @@ inline CosineSine cosine_sine(double angle) {
   }
 }
 
-// ln x to one unit in the last place; -infinity at zero, NaN below. Coefficients from Sun's fdlibm.
+// Returns ln x to one unit in the last place; -infinity at 0, NaN below. Coefficients from Sun's fdlibm.
 inline double logarithm(double x) {
   constexpr double LN2_HIGH = 6.93147180369123816490e-01, LN2_LOW = 1.90821492927058770002e-10;
   constexpr int64_t ROOT_HALF = 0x3fe6a09e667f3bcd;
   if (!(x > 0.0)) return x == 0.0 ? -INFINITE : NOT_A_NUMBER;
   if (!is_finite(x)) return x;
   double exponent = 0.0;
-  if (x < 0x1p-1022) x *= 0x1p54, exponent = -54.0;  // subnormal
+  if (x < 0x1p-1022) x *= 0x1p54, exponent = -54.0;  // subnormal number
   int64_t bits = __builtin_bit_cast(int64_t, x), whole = (bits - ROOT_HALF) >> 52;
   exponent += double(whole);
   double f = __builtin_bit_cast(double, bits - whole * (int64_t(1) << 52)) - 1.0;  // x = 2^whole (1 + f)

@@ -1,5 +1,5 @@
-// Hidden-state estimation from two channels: a Kalman filter and a backward smoother. docs/hidden-motion.md
-// explains the notation of the equations.
+// Hidden-state estimation from two channels: a Kalman filter and a backward smoother. The notation of the
+// equations is explained in docs/hidden-motion.md.
 #pragma once
 #include "tracking.hpp"
 
@@ -11,7 +11,7 @@ constexpr int MOST_STATES = TRACKED + MOST_PARAMETERS;
 using StateRow = Vector<TRACKED>;
 
 // Replaces the covariance P by F P F' + Q. Parameters are constant, so only rows of tracked states change. Q
-// is the noise of the step, plus the noise of an unknown force that is constant over the step.
+// is the process noise of the step, plus the variance due to an unknown force that is constant over the step.
 INLINE void spread(double *covariance, const double (&whole)[TRACKED][MOST_STATES], const MotionFilter &f,
                    double force_variance, int size) {
   double product[TRACKED][MOST_STATES], turned[MOST_STATES][TRACKED];
@@ -83,7 +83,7 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
     const double *of_m0 = covariance + VX * size, *of_base = covariance + BASE_VELOCITY * size;
     double variance =
         of_m0[VX] + 2.0 * of_m0[BASE_VELOCITY] + of_base[BASE_VELOCITY] + f.velocity_variance;
-    // In contact, or where nothing was measured, the sample is not used.
+    // A sample is not used if it is in contact or was not measured.
     bool is_used = kind != IN_CONTACT && is_finite(innovation);
     if (const TrackRecord &kept = f.record; kept.states.size > 0) {
       __builtin_memcpy(kept.states.at + k * TRACKED, state, sizeof moved);
@@ -100,13 +100,13 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
   return f.velocity.size;
 }
 
-// Filters all samples; returns the number of samples before the motion was lost.
+// Filters the samples. Returns the number of samples before the filter lost the motion.
 inline int64_t filter_motion(MotionFilter &f) {
   // Without parameters all sizes are known at compile time, which halves the run time.
   return f.state.size == TRACKED ? filter_samples(f, TRACKED) : filter_samples(f, int(f.state.size));
 }
 
-// ---- The smoother: modified Bryson and Frazier (Bierman, Factorization Methods, 1977, X.3)
+// ---- Smoother of Bryson and Frazier, modified (Bierman, Factorization Methods, 1977, X.3)
 
 struct StateMatrix {
   StateRow rows[TRACKED];
@@ -143,7 +143,7 @@ INLINE void carry_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix
   for (int i = 0; i < TRACKED; i++) matrix.rows[i] = 0.5 * (whole.rows[i] + turned.rows[i]);
 }
 
-// Propagates both backwards over a sample's update: (I - K H)' M (I - K H) + H' H / S; H picks X' + W.
+// Propagates both backwards over a sample's update: (I - K H)' M (I - K H) + H' H / S; H selects X' + W.
 INLINE void use_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &covariance, double innovation,
                      double variance) {
   if (variance == 0.0) return;

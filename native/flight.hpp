@@ -1,16 +1,16 @@
-// Flight under a harmonic drive up to the first touch: exact, as a sum of rotating phasors (decision 0004).
-// Every displacement is Re sum a_j V_j exp(l_j t), over the modes of eq. 1 without F and the drive as the
-// last term. The search for a touch computes only p, sixteen grid steps at once (decision 0027).
+// Flight (motion without contact) under a harmonic drive up to the first touch, exact (decision 0004). Each
+// displacement is Re sum a_j V_j exp(l_j t) over the modes of eq. 1 without F, with the drive as the last
+// term. The search for a touch computes only p, sixteen grid steps at once (decision 0027).
 #pragma once
 #include "clock.hpp"
 #include "detection.hpp"
 
 namespace vibench {
 
-constexpr int RUN_OF_STEPS = 512;  // steps by products before new exponentials: rounding stays below 1e-13
-constexpr double LARGEST_BOUND = 1e150;  // beyond it squares overflow, and touches cannot be detected
+constexpr int RUN_OF_STEPS = 512;  // steps by products between exponentials, so that rounding is below 1e-13
+constexpr double LARGEST_BOUND = 1e150;  // above this bound squares overflow, and touches cannot be detected
 
-// The drive's phasor at clock time plus `later`.
+// Returns the drive's phasor at the clock time plus `later`.
 template <class T> INLINE Complex<T> drive_phasor(const Clock<T> &clock, const T &later, const Tables &t) {
   Phasor now = turned_by(angle_at(clock.high, clock.low, value_of(later), t.drive.frequency)) * t.drive.start;
   if constexpr (is_dual<T>) {
@@ -29,7 +29,7 @@ template <class T> INLINE Complex<T> drive_phasor(const Clock<T> &clock, const T
 // Computes the phasors of the linear motion that starts from `motion`.
 template <class T>
 inline void start_flight(Complex<T> *phasors, const T *motion, const Complex<T> &drive, const LinearTables &t) {
-  T free[6];  // deviation of the motion from the steady one
+  T free[6];  // deviation from the steady motion
   for (int i = 0; i < 6; i++) free[i] = motion[i] - real_of_product(drive, t.shapes[t.modes][i]);
   for (int j = 0; j < t.modes; j++) {
     T re = free[0] * t.rows[j][0].re, im = free[0] * t.rows[j][0].im;
@@ -61,12 +61,12 @@ template <class T> INLINE void copy_values(Phasor *values, const Complex<T> *pha
   for (int j = 0; j <= t.modes; j++) values[j] = {value_of(phasors[j].re), value_of(phasors[j].im)};
 }
 
-// One displacement as N phasors, with bounds that hold from now on, because free phasors only decay.
+// One displacement as N phasors. Its bounds stay valid later, because free phasors only decay.
 template <int N> struct PhasorSum {
   const LinearTables &tables;
   Phasor terms[N];
-  double reach = 0.0;  // of the displacement [m]
-  double bound = 0.0;  // of its acceleration [m/s^2]
+  double reach = 0.0;  // bound of the displacement [m]
+  double bound = 0.0;  // bound of its acceleration [m/s^2]
 
   INLINE PhasorSum(const Phasor *phasors, const Phasor *shape, const LinearTables &t) : tables(t) {
     for (int j = 0; j < N; j++) {
@@ -104,7 +104,7 @@ template <int N> struct PhasorSum {
   }
 };
 
-// Number of whole grid steps in a time, at most `most`.
+// Returns the number of whole grid steps in a time, at most `most`.
 INLINE int whole_steps(double time, double grid, int most) { return int(smaller(double(most), time / grid)); }
 
 enum class FlightEnd { CLEAR, TOUCHES, LOST };
@@ -147,9 +147,9 @@ inline Flight flight_of(const Phasor *phasors, const Clock<double> &clock, doubl
   return {FlightEnd::CLEAR, longest};
 }
 
-// Flight from `phasors` at clock time to the first touch, or for `longest` seconds.
+// Follows a flight from `phasors` at the clock time to the first touch, or for `longest` seconds.
 inline Flight fly(const Phasor *phasors, const Clock<double> &clock, double longest, const Tables &tables) {
-  // Usually there are three modes, one per conjugate pair; beyond critical damping a pair becomes two modes.
+  // Usually there are three modes, one per conjugate pair. Above critical damping a pair becomes two modes.
   if (tables.flight.modes == 3) return flight_of<4>(phasors, clock, longest, tables);
   return flight_of<PHASORS>(phasors, clock, longest, tables);
 }

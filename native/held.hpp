@@ -1,19 +1,19 @@
-// m1 resting on a rigid stop or in contact with a spring stop, impact on a rigid stop, and lift-off. On a
-// rigid stop m1 and m2 move as one body; a spring stop gives a stiffer specimen with another rest position.
+// m1 at rest on a rigid stop or in contact with a linear stop, impact on a rigid stop, and lift-off. On a
+// rigid stop m1 and m2 move as one body; a linear stop gives a stiffer specimen with another rest position.
 // Both motions are linear, and exact until the stop would have to pull. Lift-off is the zero of the
-// acceleration that presses m1 on the stop, or of the indentation; it is found like the zero of a gap.
+// acceleration that presses m1 on the stop, or of the indentation. It is found like the zero of a gap.
 #pragma once
 #include "flight.hpp"
 
 namespace vibench {
 
-constexpr double RESOLVED = 4.0;       // a hop lower than this number of closed gaps counts as rest
+constexpr double RESOLVED = 4.0;       // a hop lower than this multiple of the closed gap counts as rest
 constexpr double LARGEST_PART = 1e-3;  // largest closed gap, as a part of the distance between the stops
-constexpr double SHORTEST_PART = 1e-3;  // least departure, as a part of a grid step: long enough to progress,
-                                        // too short for m1 to enter the stop by more than rounding
+constexpr double SHORTEST_PART = 1e-3;  // least departure time, as a part of a grid step: the run advances, and
+                                        // m1 cannot enter the stop by more than rounding
 constexpr double NEARLY = 0.99;         // factor on the least time to the other stop, a margin for rounding
 
-// Largest distance at which m1 counts as touching a stop [m]; `reach` is the size of the summands of p.
+// Returns the largest distance at which m1 counts as touching a stop [m]; `reach` is the size of p's terms.
 INLINE double closed_gap(double reach, const Specimen &s) {
   return TOUCH * smaller(s.lower_gap, s.upper_gap) + ROUNDING * reach;
 }
@@ -22,12 +22,12 @@ INLINE double closed_gap(const Phasor *phasors, const Tables &t) {
   for (int j = 0; j <= t.flight.modes; j++) reach += magnitude(phasors[j] * t.flight.path[j]);
   return closed_gap(reach, t.specimen);
 }
-// Whether p is exact enough to distinguish m1 between the stops from m1 on a stop.
+// Returns whether p is exact enough to distinguish m1 between the stops from m1 on a stop.
 INLINE bool is_resolved(double closed, const Specimen &s) {
   return closed < LARGEST_PART * (s.lower_gap + s.upper_gap);
 }
 
-// Acceleration that presses m1 on the stop at `side`: d2|p|/dt2 without the stop's force [m/s^2].
+// Returns the acceleration that presses m1 on the stop at `side`: d2|p|/dt2 without the stop's force [m/s^2].
 template <class T> INLINE T press_on(double side, const T *motion, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (motion[Z] - motion[X]) + s.c2 * (motion[VZ] - motion[VX]);
@@ -35,7 +35,7 @@ template <class T> INLINE T press_on(double side, const T *motion, const Body &t
   return side * pull / s.m2 - inner / t.pair;
 }
 
-// Places m1 exactly on a stop with d|p|/dt = `rate` [m/s]; keeps centre and momentum of m1 and m2.
+// Places m1 exactly on a stop with d|p|/dt = `rate` [m/s]. Centre of mass and momentum of m1 and m2 are kept.
 template <class T> inline void place_on_stop(T *motion, double side, const T &rate, const Body &t) {
   double gap = side * gap_at(t.specimen, side), share = t.pair / t.specimen.m2;
   T before = motion[Y] - motion[Z], relative = motion[VY] - motion[VZ];
@@ -45,10 +45,10 @@ template <class T> inline void place_on_stop(T *motion, double side, const T &ra
   motion[VY] = motion[VZ] + side * rate;
 }
 
-// Brings m1 to rest on a stop if the remaining impacts are too small to follow; returns whether it did.
-// Pressed with the acceleration a, m1 chatters: each hop is `restitution` times as long as the one before, so
-// infinitely many impacts take 2 v / (a (1 - restitution)). Hops are omitted if they cannot be distinguished
-// from rest, or if their speeds add up to less than the tolerance times the speed of a fall through the gap.
+// Brings m1 to rest on a stop if the remaining impacts are too small to follow. Returns whether m1 rests.
+// Under an acceleration a towards the stop, m1 chatters: each hop is `restitution` times as long as the hop
+// before, so infinitely many impacts take 2 v / (a (1 - restitution)). Hops are omitted if they cannot be
+// distinguished from rest, or if their speeds sum to less than the tolerance times the speed of a fall.
 template <class T>
 inline bool hold_if_pressed(T *motion, double side, double closed, double tolerance, const Body &t) {
   double rate = value_of(motion[VY] - motion[VZ]), press = value_of(press_on(side, motion, t));
@@ -59,9 +59,9 @@ inline bool hold_if_pressed(T *motion, double side, double closed, double tolera
   return true;
 }
 
-// Impact on a rigid stop: displacements are kept, and the speed of approach is multiplied by `restitution`
-// (Newton). Returns whether m1 comes to rest. The touch is detected slightly before the gap closes; the speed
-// is corrected to that at closure, so that a million impacts do not accumulate an error.
+// Impact on a rigid stop: displacements are kept, and the approach speed is multiplied by `restitution`
+// (Newton). Returns whether m1 comes to rest. A touch is detected slightly before the gap closes. The speed
+// is corrected to its value at closure, so that a million impacts do not accumulate an error.
 template <class T> inline bool rebound(T *motion, double side, double closed, double tolerance, const Body &t) {
   T approach = side * (motion[VY] - motion[VZ]);
   double hair = gap_at(t.specimen, side) - side * value_of(motion[Y] - motion[Z]);
@@ -71,8 +71,8 @@ template <class T> inline bool rebound(T *motion, double side, double closed, do
   return hold_if_pressed(motion, side, closed, tolerance, t);
 }
 
-// Finds how long m1 stays on a stop: until lift-off (reported as TOUCHES), or for `longest` seconds. `level`
-// is the stop's force at rest.
+// Finds how long m1 stays on a stop: until lift-off (returned as TOUCHES), or for `longest` seconds. `level`
+// is `let_go` times the gap.
 inline Flight hold(double side, double level, const Phasor *phasors, const Clock<double> &clock, double longest,
                    const Tables &tables) {
   const LinearTables &t = tables.held;
@@ -101,19 +101,19 @@ inline Flight hold(double side, double level, const Phasor *phasors, const Clock
   return {FlightEnd::CLEAR, longest};
 }
 
-// Returns a lower bound on how long a flight that starts on a rigid stop moves away from it [s]; 0 if it does
-// not start on one. A search cannot distinguish leaving from touching there, because the gap grows from zero,
-// within rounding. But it provably grows while d2|p|/dt2 <= a + j t + b t^2 / 2 <= 0 and the other stop is
-// out of reach. Here a, j are d2|p|/dt2, d3|p|/dt3 at the start, and b bounds the fourth derivative.
+// Returns a lower bound of the time during which a flight that starts on a rigid stop moves away from it [s];
+// 0 if it does not start on a stop. A search cannot distinguish leaving from touching at first, because the
+// gap is zero within rounding. But the gap grows while d2|p|/dt2 <= a + j t + b t^2 / 2 <= 0 and the other
+// stop is out of reach. Here a, j are d2|p|/dt2, d3|p|/dt3 at the start, and b bounds the fourth derivative.
 inline double time_to_lift_off(const double *series, double length, double closed, const Specimen &s) {
   double side = s.upper_gap - series[0] <= closed ? 1.0 : s.lower_gap + series[0] <= closed ? -1.0 : 0.0;
   double rate = side * series[1], bend = side * 2.0 * series[2], jerk = side * 6.0 * series[3];
   double low = RESOLVED * closed, size = magnitude(rate);
-  // A speed counts as zero if acceleration or jerk alone stops m1 within the closed gap.
+  // A speed counts as zero if acceleration or jerk alone can stop m1 within a few closed gaps.
   bool by_bend = rate * rate <= 2.0 * magnitude(bend) * low;
   bool by_jerk = 8.0 * size * size * size <= 9.0 * magnitude(jerk) * low * low;
   if (side == 0.0 || !(by_bend || by_jerk)) return 0.0;
-  // m1 is still pressed on the stop: it would move into the stop by more than rounding before it turns.
+  // Here m1 is still pressed on the stop: it would enter the stop by more than rounding before it returns.
   if (bend > 0.0 && !(jerk < 0.0 && 2.0 * bend * bend * bend <= 3.0 * closed * jerk * jerk)) return 0.0;
   double bound = derivative_bound(series, length, 4), under_root = jerk * jerk - 2.0 * bend * bound;
   double sure = under_root > 0.0 ? 0.5 * (square_root(under_root) - jerk) / larger(bound, 1e-300) : 0.0;

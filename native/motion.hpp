@@ -4,10 +4,10 @@
 
 namespace vibench {
 
-// State that a run under a power law keeps between steps.
+// State of a run under a power law between its steps.
 struct PowerMemory {
-  double level;     // level of the next step, plus one; 0 before the first step
-  double sizes[3];  // recent sizes of p, x, z [m]
+  double level;     // level of the next step plus one; 0 before the first step
+  double sizes[3];  // recent magnitudes of p, x, z [m]
 };
 
 template <class T> struct Motion {
@@ -49,8 +49,8 @@ template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &
   return values;
 }
 
-// Normalises very large or small derivatives and keeps the logarithm of the factor in `growth`, so that
-// products with physical numbers stay finite. Returns whether anything changed.
+// Normalises very large or small derivatives, so that products with physical quantities stay finite. Adds the
+// logarithm of each removed factor to `growth`. Returns whether a derivative changed.
 template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
   constexpr double LARGEST = 1e100, SMALLEST = 1e-100;
   bool is_changed = false;
@@ -66,16 +66,16 @@ template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
   return is_changed;
 }
 
-constexpr int64_t MOST_STEPS = 2000000000;  // most grid steps of flight in a run
-constexpr int64_t RESOLVED_STEP = 50;       // grid steps that take as long to compute as a contact step
+constexpr int64_t MOST_STEPS = 2000000000;  // largest number of grid steps of flight in a run
+constexpr int64_t RESOLVED_STEP = 50;       // computing time of a contact step, in grid steps
 
-// Number of grid steps of a flight; MOST_STEPS if its length or its grid is not finite.
+// Returns the number of grid steps of a flight; MOST_STEPS if its length or its grid is not finite.
 INLINE int64_t steps_of(double length, double grid) {
   double steps = length / grid;
   return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
 }
 
-// Counts an impact, and stores its time if requested; returns false when no more are allowed.
+// Counts an impact, and stores its time if requested. Returns false if the number of impacts is at its limit.
 INLINE bool keep_impact(Record &record, double time) {
   if (record.impacts == record.impact_room) return false;
   if (record.impact_times != nullptr) record.impact_times[record.impacts] = time;

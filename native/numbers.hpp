@@ -25,17 +25,17 @@ INLINE double eighth_root(double x) { return square_root(square_root(square_root
 INLINE bool is_finite(double x) { return magnitude(x) < INFINITE; }  // false for NaN
 INLINE double with_sign_of(double size, double sign) { return __builtin_copysign(size, sign); }
 
-// Largest integer not above x. Doubles of 2^52 and more are integers already.
+// Returns the largest integer not above x. Doubles of at least 2^52 are always integers.
 INLINE double whole_part(double x) {
   if (!(magnitude(x) < 4503599627370496.0)) return x;
   double whole = double(int64_t(x));
   return whole > x ? whole - 1.0 : whole;
 }
 
-// Nearest integer; halves are rounded up.
+// Returns the nearest integer; halves are rounded up.
 INLINE double nearest(double x) { return whole_part(x + 0.5); }
 
-// x^(1/5) for x >= 0: a guess from the exponent, corrected by Newton's method to rounding.
+// Returns x^(1/5) for x >= 0: a guess from the exponent, corrected by Newton's method to rounding error.
 inline double fifth_root(double x) {
   if (!(x > 0.0) || !is_finite(x)) return x;
   double scale = 1.0;

@@ -1,19 +1,19 @@
-// Observation of a run without storing the motion: peaks of x and p, and their spectral lines at the drive's
-// frequency. It uses values only, not derivatives, and never changes a step.
+// Observation of a run without storing the motion: peaks of x and p, and their spectral lines at the drive
+// frequency. It uses only values, not derivatives, and never changes a step.
 #pragma once
 #include "collision.hpp"
 #include "motion.hpp"
 
 namespace vibench {
 
-constexpr int SECANTS = 4;            // iterations to an extreme, so that its value is exact to rounding
-constexpr int APEX_SECANTS = 6;       // iterations to the deepest point of a contact integrated by steps
-constexpr double SMALL_EXPONENT = 1e-3;  // below it (exp(q) - 1) / q is computed by a series of four terms
-constexpr double ABOVE_POINTS = 1.03;  // bound of the largest depth, over the largest depth at the points
+constexpr int SECANTS = 4;            // secant iterations to an extreme; its value is then exact to rounding
+constexpr int APEX_SECANTS = 6;       // secant iterations to the deepest point of a contact in time steps
+constexpr double SMALL_EXPONENT = 1e-3;  // for smaller q, (exp(q) - 1) / q is a series of four terms
+constexpr double ABOVE_POINTS = 1.03;  // bound of the largest depth, divided by the largest depth at the points
 
 // ---- Extremes
 
-// Largest magnitude on [low, high] of a polynomial with at most one extreme there; `best` if that is larger.
+// Returns the largest magnitude of a polynomial with at most one extreme on [low, high]; at least `best`.
 inline double series_peak(double best, const double *series, double low, double high) {
   ValueAndRate first = polynomial_at(series, low), last = polynomial_at(series, high);
   best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
@@ -27,7 +27,7 @@ inline double series_peak(double best, const double *series, double low, double 
   return best;
 }
 
-// The same for the cubic with the given values and rates at both ends of a step.
+// Does the same for the cubic with the given values and rates at both ends of a step.
 inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
   double rise = (last.value - first.value) / step;
   double series[AHEAD] = {first.value, first.rate, (3.0 * rise - 2.0 * first.rate - last.rate) / step,
@@ -36,7 +36,7 @@ inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndR
   return larger(best, larger(magnitude(first.value), magnitude(last.value)));
 }
 
-// Whether a step has an extreme that may exceed `best`; the motion stays below the tangents at both ends.
+// Returns whether an extreme in a step may exceed `best`. The motion stays below the tangents at both ends.
 INLINE bool may_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
   double above = smaller(magnitude(first.value) + step * magnitude(first.rate),
                          magnitude(last.value) + step * magnitude(last.rate));
@@ -49,8 +49,8 @@ template <int N> INLINE ValueAndRate value_and_rate(const PhasorSum<N> &sum) {
   return {sum.now(), rate};
 }
 
-// Largest magnitude of one displacement in a linear motion over `length` seconds, or `best`. A grid
-// step is examined only if a bound allows more than `best`; its extreme is searched if the rate changes sign.
+// Returns the largest magnitude of a displacement in a linear motion over `length` seconds; at least `best`.
+// Only grid steps with a bound above `best` are examined. An extreme is searched if the rate changes sign.
 template <int N>
 inline double linear_peak(double best, const Phasor *shape, const Phasor *phasors, const Clock<double> &clock,
                           double length, const LinearTables &t, const Tables &tables) {
@@ -96,7 +96,7 @@ INLINE double peak_of(double best, const Phasor *shape, const Phasor *phasors, c
 
 // ---- Fourier integrals of the stops' force f on p: integral of f exp(-i (omega t + phase)) dt [N s]
 
-// Integral over `length` of a quantity that grows as exp(rate t) from `first` to `last`.
+// Returns the integral over `length` of a quantity that grows as exp(rate t) from `first` to `last`.
 INLINE Phasor integral(const Phasor &rate, double length, const Phasor &first, const Phasor &last) {
   Phasor exponent = length * rate;
   if (exponent.re * exponent.re + exponent.im * exponent.im < SMALL_EXPONENT * SMALL_EXPONENT) {
@@ -108,7 +108,7 @@ INLINE Phasor integral(const Phasor &rate, double length, const Phasor &first, c
   return quotient(last - first, rate);
 }
 
-// Fourier integral of Re sum weights_j e_j, where each e_j rotates from `first` to `last`.
+// Returns the Fourier integral of Re sum weights_j e_j, where each phasor e_j changes from `first` to `last`.
 inline Phasor line_of(const Phasor *weights, const Phasor *first, const Phasor *last, double length,
                       const LinearTables &t) {
   Phasor drive = t.rates[t.modes], sum{0.0, 0.0};
@@ -134,12 +134,12 @@ struct Observer {
 
   void see_flight(const Phasor *phasors, const Clock<double> &clock, double length) {
     record.peak_x = peak_of(record.peak_x, t.flight.across, phasors, clock, length, t.flight, t);
-    // If the peak is already at a stop, a flight between the stops cannot exceed it.
+    // A flight between the stops cannot exceed a peak that is already at the farther stop.
     if (record.peak_p < larger(t.specimen.lower_gap, t.specimen.upper_gap))
       record.peak_p = peak_of(record.peak_p, t.flight.path, phasors, clock, length, t.flight, t);
   }
 
-  // Observes m1 on a rigid or spring stop. The phasors do not include the constant part of p.
+  // Observes m1 on a rigid or linear stop. The phasors do not include the constant part of p.
   void see_held(const Phasor *first, const Phasor *last, const Clock<double> &clock, double side, double length) {
     double gap = gap_at(t.specimen, side), rests = t.rests * gap;
     record.peak_x = peak_of(record.peak_x, t.held.across, first, clock, length, t.held, t);
@@ -147,7 +147,7 @@ struct Observer {
     if (t.specimen.law == SPRINGS)
       record.peak_p = rests + peak_of(record.peak_p - rests, t.held.path, first, clock, length, t.held, t);
     if (!wants_lines()) return;
-    double push = t.specimen.law == SPRINGS ? t.specimen.linear_stiffness : t.pair;  // force per unit of pull
+    double push = t.specimen.law == SPRINGS ? t.specimen.linear_stiffness : t.pair;  // force per pull
     Phasor begun = conjugate(first[t.held.modes]), ended = conjugate(last[t.held.modes]);
     Phasor at_rest = integral({0.0, -t.omega}, length, begun, ended);
     impulse = impulse + push * (line_of(t.pulls, first, last, length, t.held) - (side * t.let_go * gap) * at_rest);
@@ -158,7 +158,7 @@ struct Observer {
     if (wants_lines()) impulse = impulse - (t.pair * jump) * conjugate(drive);
   }
 
-  // Observes x and p in a complete collision; `course()` gives the Taylor terms of x without force.
+  // Observes x and p in a complete collision; `course()` returns the Taylor terms of x without contact force.
   template <class Course> void see_shape(const Collision<double> &c, double gap, const Course &course) {
     const CollisionTables &of = t.collision;
     see_x_of(c, course);
@@ -173,7 +173,7 @@ struct Observer {
     if (!wants_lines()) return;
     Vector<POINTS> angle = (t.omega * c.duration) * Vector<POINTS>::load(of.shapes->heights), q = angle * angle;
     Vector<POINTS> force = (side * c.duration) * Vector<POINTS>::load(of.shapes->weights) * c.force;
-    // Angles are below LONGEST_COLLISION, so these series are accurate to 3e-11.
+    // Angles are smaller than LONGEST_COLLISION, so these series are accurate to 3e-11.
     Vector<POINTS> cosine = 1.0 + q * (-0.5 + q * (1.0 / 24 + q * (-1.0 / 720 + q * (1.0 / 40320))));
     Vector<POINTS> sine = angle * (1.0 + q * (-1.0 / 6 + q * (1.0 / 120 + q * (-1.0 / 5040 + q * (1.0 / 362880)))));
     impulse = impulse + Phasor{total(force * cosine), -total(force * sine)} * conjugate(drive);
@@ -191,8 +191,8 @@ struct Observer {
     if (wants_lines()) impulse = impulse + impulse_of(steps, h);
   }
 
-  // Adds the lines of x and p over a stretch. With s' = A s + b f + drive, u = s - steady and the drive's
-  // e = exp(-i (omega t + phase)): (i omega - A) integral(u e) = b impulse - [u e], from start to end.
+  // Adds the line integrals of x and p over a stretch. Let s' = A s + b f + drive, u = s - steady motion, and
+  // e = exp(-i (omega t + phase)). Then (i omega - A) integral(u e) = b impulse - [u e], from start to end.
   struct End {
     double motion[6];
     Clock<double> clock;
@@ -217,9 +217,9 @@ struct Observer {
   }
 
  private:
-  // Largest value of a polynomial of depth about the middle of a collision.
+  // Returns the largest value of the Taylor polynomial of the depth about the middle of a collision.
   static double top_of(const Vector<TERMS> &terms) {
-    constexpr double FARTHEST_TOP = 0.5;  // up to this phi from the middle, eight terms are accurate to 1e-7
+    constexpr double FARTHEST_TOP = 0.5;  // within this phi of the middle, eight terms are accurate to 1e-7
     double at = 0.0, value = 0.0;
     for (int n = 0; n < SECANTS; n++) {
       double slope = 0.0, bend = 0.0;
@@ -233,7 +233,7 @@ struct Observer {
     return value;
   }
 
-  // Updates the peak of x in a complete collision, with its extremes between the points.
+  // Updates the peak of x in a complete collision, including extremes between the points.
   template <class Course> void see_x_of(const Collision<double> &c, const Course &course_of_x) {
     const CollisionTables &of = t.collision;
     ValueAndRate first{c.motion[AT_X], c.motion[X_RATE]}, last{c.after[AT_X], c.after[X_RATE]};
@@ -242,7 +242,7 @@ struct Observer {
     Vector<TERMS> course = course_of_x();
     double turn = of.fastest * c.duration, factor = turn;
     Vector<POINTS> turns = turn * Vector<POINTS>::load(of.shapes->heights);
-    // The contact force acts on x only through m2 and c2, so terms begin with the second integral.
+    // The contact force acts on x only through m2 and damper c2, so terms start with the second integral.
     Vector<POINTS> x = first.value + series_at_points<double>(course, turns) +
                        pushed<double>(c.force, 2, SLOW_TERMS, AT_X, c.duration, of);
     Vector<POINTS> rate(0.0);
@@ -260,7 +260,7 @@ struct Observer {
     record.peak_x = cubic_peak(record.peak_x, first, last, c.duration * (1.0 - before));
   }
 
-  // Repeats a contact step up to the deepest point, where r = 0; returns w there.
+  // Repeats a contact step up to the deepest point, where r = 0, and returns w at this point.
   template <class T, class Force>
   double apex_of(const ContactSteps<T, Force> &steps, double h, double rate_scale) const {
     const auto &r = steps.rates;
@@ -273,14 +273,14 @@ struct Observer {
       again.take(part);
       double rate = again.trial[R];
       deepest = larger(deepest, again.trial[W]);
-      if (magnitude(rate) < 1e-5 * rate_scale) break;  // w is stationary there, so its error is quadratic
+      if (magnitude(rate) < 1e-5 * rate_scale) break;  // w is stationary at r = 0, so its error is quadratic
       if (rate > 0.0) low = part, before = rate;
       else high = part, after = rate;
     }
     return deepest;
   }
 
-  // Fourier integral of f dt = side F w ds over a step, from the stages of the method.
+  // Returns the Fourier integral of f dt = side F w ds over a step, from the stages of the method.
   template <class T, class Force> Phasor impulse_of(const ContactSteps<T, Force> &steps, double h) const {
     const BaseForce &base = steps.rates.base;
     Phasor sum{0.0, 0.0};
@@ -296,7 +296,7 @@ struct Observer {
   }
 };
 
-// Runs `act`, which advances the motion, and adds the lines of the time that has passed.
+// Runs `act`, which advances the motion, and adds the line integrals over the elapsed time.
 template <class T, class Act>
 inline Outcome observed(Observer &observer, const Motion<T> &motion, const Tables &t, const Act &act) {
   if (!observer.wants_lines()) return act();

@@ -1,30 +1,30 @@
 // Motion under a power law, whose force acts at every p, in long steps (decision 0026). In a step the force F
-// is a polynomial through its values at eight Gauss points; the motion is linear in F and the motion at start
-// (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2nd ed. 2006, section II.1.3). F determines p
-// at the points, and p determines F: repeated substitution converges like the series of a cosine.
+// is a polynomial through its values at eight Gauss points, and the motion is linear in F and in the motion
+// at the start (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2nd ed. 2006, section II.1.3). F
+// determines p at the points, and p determines F: fixed-point iteration converges like a cosine series.
 #pragma once
 #include "observe.hpp"
 
 namespace vibench {
 
-constexpr int GAUSS = 8;             // points in a step
-constexpr int ORDER = 32;            // terms of the series; the next is at most 1e-20 of the largest
+constexpr int GAUSS = 8;             // number of Gauss points in a step
+constexpr int ORDER = 32;            // number of series terms; the next is at most 1e-20 of the largest term
 constexpr int LEVELS = 40;           // number of step lengths, usually with the ratio sqrt(2)
-constexpr int INSTANTS = GAUSS + 2;  // instants of an observed step: its start, its points, its end
-constexpr double LONGEST_POWER_TURN = 3.0;  // longest step, as the fastest rate times its length [rad]
-constexpr int FIRST_LEVEL = 8;       // level of the first step: a sixteenth of the longest
-constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance: the
-                             // motion that it would cause, over the size of the motion. The error is less
-constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // substitution ends at a relative change of this
-                                                             // part of the tolerance, or of this value
+constexpr int INSTANTS = GAUSS + 2;  // instants of an observed step: its start, its Gauss points, its end
+constexpr double LONGEST_POWER_TURN = 3.0;  // longest step times the fastest rate [rad]
+constexpr int FIRST_LEVEL = 8;       // level of the first step: a sixteenth of the longest step
+constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance, as its
+                             // relative effect on the motion. The error of the step is smaller
+constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // iteration ends at a relative change below this
+                                                             // part of the tolerance, or below this value
 constexpr int MOST_SUBSTITUTIONS = 30;
-constexpr double TRY_LONGER = 0.015;  // a misfit below this part of the allowed one lengthens the next step
-constexpr double FAR_TOO_LONG = 20.0;  // a misfit beyond this multiple of the allowed one halves the step
-constexpr double WALL_TURN = 5.0;  // longest step, as the rate of the stiffest spring times its length [rad]
-constexpr double FADING = 0.98;    // factor per step by which the recorded size of a motion decays
-constexpr double SMALLEST_PART = 1e-3;  // a displacement counts as at least this part of the largest one
+constexpr double TRY_LONGER = 0.015;  // below this part of the allowed misfit, the next step is longer
+constexpr double FAR_TOO_LONG = 20.0;  // above this multiple of the allowed misfit, the step is halved
+constexpr double WALL_TURN = 5.0;  // longest step times the rate of the stiffest spring [rad]
+constexpr double FADING = 0.98;    // decay factor per step of the recorded sizes of a motion
+constexpr double SMALLEST_PART = 1e-3;  // every displacement counts as at least this part of the largest
 constexpr double NOTHING_MOVES = 1e-150;
-constexpr double FINEST_FIT = 1e-10;  // least tolerance; with a steep wall a finer fit is below rounding
+constexpr double FINEST_FIT = 1e-10;  // least tolerance; a finer fit to a steep wall is below rounding
 
 INLINE double fit_tolerance(double tolerance, const Specimen &s) {
   return larger(step_tolerance(tolerance, s), smaller(tolerance, FINEST_FIT));
@@ -35,11 +35,11 @@ INLINE double fit_tolerance(double tolerance, const Specimen &s) {
 struct PowerForce {
   double inverse_reference;  // [1/m]
   int terms;
-  int halves[MOST_POWERS];   // half the difference of successive exponents, starting from 1
-  double forces[MOST_POWERS];  // of each term at the reference [N]
+  int halves[MOST_POWERS];   // half the differences of successive exponents, starting from exponent 1
+  double forces[MOST_POWERS];  // force of each term at the reference [N]
   int highest;               // highest exponent
 
-  // `base` to the power of `exponent`, which is at least 1.
+  // Returns `base` to the power of `exponent`, which is at least 1.
   template <class T> static INLINE T whole_power(T base, int exponent) {
     while (!(exponent & 1)) base = base * base, exponent >>= 1;
     T result = base;
@@ -55,7 +55,7 @@ struct PowerForce {
     for (int i = terms - 2; i >= 0; i--) force = (force + forces[i]) * whole_power(square, halves[i]);
     return force * u;
   }
-  // dF/dp [N/m].
+  // Returns dF/dp [N/m].
   double slope(double p) const {
     double u = p * inverse_reference, square = u * u, grown = 1.0, sum = 0.0;
     for (int i = 0, exponent = 1; i < terms; i++) {
@@ -65,7 +65,7 @@ struct PowerForce {
     }
     return sum * inverse_reference;
   }
-  // Angular frequency at `p` of a mass on k1 and the law's steepest term [rad/s].
+  // Returns the angular frequency of a mass on k1 and a bound of the law's stiffness at `p` [rad/s].
   double stiffest_rate(double p, double linear, double inverse_mass) const {
     double secant = p > 0.0 ? (*this)(p) / p : 0.0;
     return square_root((linear + highest * secant) * inverse_mass);
@@ -84,24 +84,24 @@ INLINE PowerForce power_force(const PowerTerms &law) {
 
 // ---- Coefficients of a step of given length
 
-// One number of the motion at the points, per number of the motion at the start and per F at each point.
+// One coordinate at the points, per unit of each coordinate at the start and per unit of F at each point.
 struct AtPoints {
   double free[WIDE][GAUSS], gain[GAUSS][GAUSS];
 };
 struct StepNumbers {
-  double length;                      // [s]
-  double move[WIDE][WIDE], feed[GAUSS][WIDE];  // change of the motion per motion at start, and per F
-  AtPoints p, x, p_rate, x_rate;      // the last three for observation
-  double cosine[GAUSS], sine[GAUSS];  // rotation of the drive at the points
+  double length;                      // length of the step [s]
+  double move[WIDE][WIDE], feed[GAUSS][WIDE];  // change of the motion per motion at the start, and per F
+  AtPoints p, x, p_rate, x_rate;      // the last three only for observation
+  double cosine[GAUSS], sine[GAUSS];  // rotation of the drive phasor from the start to the points
 };
 
-// Taylor series of exp(A t) for the eight numbers of a motion; accurate in short steps, and needs no modes.
+// Taylor series of exp(A t) for the eight components of a motion: accurate in short steps, without modes.
 struct PowerTables {
   const PowerShapes *shapes;
   PowerForce force;
-  double fastest;  // [1/s]
+  double fastest;  // fastest rate [1/s]
   double powers[ORDER][WIDE][WIDE], struck[ORDER][WIDE];
-  double heights[ORDER][GAUSS];  // powers of the points: points^m
+  double heights[ORDER][GAUSS];  // powers points^m of the Gauss points
   StepNumbers levels[LEVELS];
 };
 
@@ -142,7 +142,7 @@ inline void fill_observed(StepNumbers &numbers, double omega, const PowerTables 
   }
 }
 
-// Fills the levels: the first has steps of `longest` [s], and each further one `ratio` times the one before.
+// Fills the levels: the first has steps of `longest` [s]; each further level multiplies them by `ratio`.
 inline void fill_power_steps(PowerTables &t, const PowerShapes *shapes, const PowerTerms &law, const Specimen &specimen,
                              const Drive &drive, double fastest, double longest, double ratio) {
   t.shapes = shapes;
@@ -172,15 +172,15 @@ template <class T> struct PowerStep {
   const Body &t;
   const PowerTables &of;
   double tolerance;
-  Wide<T, WIDE> motion, ahead;  // motion at the step's start and at its end
+  Wide<T, WIDE> motion, ahead;  // motion at the start and at the end of the step
   Wide<T, GAUSS> force, place;  // F and p at the points
-  Vector<GAUSS> course;         // course of F in the last step, in powers of (s - 1)
-  double sizes[3];              // recent sizes of p, x, z [m]
+  Vector<GAUSS> course;         // polynomial of F in the last step, in powers of (s - 1)
+  double sizes[3];              // recent magnitudes of p, x, z [m]
   double push, push_ahead;      // F at the start and the end [N]
   double last_length = 0.0;     // length of the last step [s]; 0 before the first
   double fading = FADING;
 
-  // The motion without F: p at the points, and the whole motion at the end.
+  // Motion without F: p at the points, and the complete motion at the end.
   struct Unforced {
     Vector<GAUSS> places;
     Vector<WIDE> end;
@@ -190,7 +190,7 @@ template <class T> struct PowerStep {
     return {times(numbers.p.free, begin), begin + times(numbers.move, begin)};
   }
 
-  // Conversion from and to `Motion`, which does not contain the drive's phasor.
+  // Conversion from and to `Motion`, which does not include the drive's phasor.
   void begin_at(const Motion<T> &m) {
     const T numbers[WIDE] = {m.at[Y] - m.at[Z],   m.at[X],  m.at[Z],           m.at[VY] - m.at[VZ],
                              m.at[VX], m.at[VZ], constant<T>(0.0), constant<T>(0.0)};
@@ -219,8 +219,8 @@ template <class T> struct PowerStep {
     return weight * larger(magnitude(before), magnitude(after)) / (FIT * tolerance * largest_unseen(begin, now));
   }
 
-  // Computes the derivatives of the step just tried. With the law's slopes D a change of p at the points
-  // solves (1 - gain D) dp = free du; the change of the motion follows from D dp as the motion from F.
+  // Computes the derivatives of the trial step. With the law's slopes D, a change dp at the points satisfies
+  // (1 - gain D) dp = free du. The change of the motion follows from D dp like the motion from F.
   void differentiate(const StepNumbers &numbers) {
     if constexpr (is_dual<T>) {
       constexpr int M = int(sizeof motion.slope / sizeof motion.slope[0]);
@@ -254,7 +254,7 @@ template <class T> struct PowerStep {
     motion = ahead;
   }
 
-  // Returns the first level, from `level` on, with steps short enough for the wall; LEVELS if there is none.
+  // Returns the first level, from `level` on, with steps short enough for the stiff wall; LEVELS if none.
   int level_that_sees(int level) const {
     Vector<WIDE> now = value_of(motion);
     double p = now[P], outward = larger(p >= 0.0 ? now[P_RATE] : -now[P_RATE], 0.0);
@@ -276,7 +276,7 @@ template <class T> struct PowerStep {
     return sum;
   }
 
-  // `weight` is the change of p per newton over the step [m/N], `close` a negligible distance [m].
+  // Iterates F at the points. `weight` is the change of p per force [m/N], `close` a negligible distance [m].
   bool substitute(Vector<GAUSS> &pushes, Vector<GAUSS> &places, const StepNumbers &numbers, const Vector<GAUSS> &free,
                   double weight, double close) const {
     for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
@@ -291,7 +291,7 @@ template <class T> struct PowerStep {
     return false;
   }
 
-  // Reference size for errors: the smallest of the recent sizes of p, x and z, up to the step's end.
+  // Returns the reference size for errors: the smallest recent magnitude of p, x and z, up to the step's end.
   double largest_unseen(const Vector<WIDE> &begin, const Vector<WIDE> &end) const {
     double p = larger(sizes[0], larger(magnitude(begin[P]), magnitude(end[P])));
     double x = larger(sizes[1], larger(magnitude(begin[AT_X]), magnitude(end[AT_X])));
@@ -299,7 +299,7 @@ template <class T> struct PowerStep {
     return larger(smaller(p, smaller(x, z)), SMALLEST_PART * larger(p, larger(x, z))) + NOTHING_MOVES;
   }
 
-  // Gaussian elimination with pivoting; the columns beyond the square are right-hand sides.
+  // Gaussian elimination with pivoting; columns to the right of the square matrix are right-hand sides.
   template <int N> static void eliminate(double (&rows)[GAUSS][N]) {
     for (int k = 0; k < GAUSS; k++) {
       int pivot = k;
@@ -327,8 +327,8 @@ INLINE int level_after(int level, double misfit) {
 
 // ---- Observation of a step
 
-// One displacement and its rate at ten instants of a step. The polynomial of degree 19 with these values is
-// exact to rounding. Barycentric formulas: Berrut and Trefethen, SIAM Rev. 46 (2004) 501.
+// One displacement and its rate at ten instants of a step. The polynomial of degree 19 through these values
+// is exact to rounding. Barycentric formulas: Berrut and Trefethen, SIAM Rev. 46 (2004) 501.
 struct StepCourse {
   double value[INSTANTS], rate[INSTANTS];
   double length;
@@ -357,7 +357,7 @@ struct StepCourse {
     return sum / (norm * norm);
   }
   double peak(double best) const {
-    constexpr int SECANTS_IN_STEP = 6;  // the error of a peak is then negligible
+    constexpr int SECANTS_IN_STEP = 6;  // number of secants, after which the error of a peak is negligible
     for (double each : value) best = larger(best, magnitude(each));
     for (int i = 0; i + 1 < INSTANTS; i++) {
       double low = shapes.instants[i], high = shapes.instants[i + 1], rate_low = rate[i], rate_high = rate[i + 1];
@@ -456,7 +456,7 @@ template <class T> class PowerRun {
     else step.motion.set(COSINE, now.re), step.motion.set(SINE, now.im);
   }
 
-  // Keeps the derivatives in range, which `Run` does for the other laws.
+  // Keeps the derivatives in range, as `Run` does for the other laws.
   void rescale(PowerStep<T> &step) {
     step.write_to(m);
     if (!keep_in_range(m)) return;

@@ -1,14 +1,14 @@
-// A run: flight, contact, flight, ... up to a given time. The same source serves motions with derivatives.
+// A run: flight, contact, flight, ... up to a given time. The templates also serve motions with derivatives.
 #pragma once
 #include "held.hpp"
 #include "power_law.hpp"
 
 namespace vibench {
 
-// ---- Types of stops, which select the code of a contact at compile time
+// ---- Types of stops. They select the code of a contact at compile time.
 
 struct WithoutStops {};
-// Stops with a contact force. With `whole_collisions` a collision is solved as a whole if possible.
+// Stops with a contact force. If `whole_collisions` is true, collisions are solved without steps if possible.
 template <class Force> struct YieldingStops {
   Force force;
   static constexpr bool whole_collisions = false;
@@ -16,18 +16,18 @@ template <class Force> struct YieldingStops {
 struct HertzStops : YieldingStops<HertzForce> {
   static constexpr bool whole_collisions = true;
 };
-struct SpringStops {};  // linear springs: solved exactly by the modes of the specimen in contact
-struct HardStops {};    // rigid: Newton's restitution, or m1 at rest on the stop
+struct SpringStops {};  // linear stops: solved exactly by the modes of the specimen in contact
+struct HardStops {};    // rigid stops: Newton's restitution, or m1 at rest on the stop
 
-// How much later a changed motion touches. All corrections at switching points (saltation, Mueller 1995)
-// follow by differentiation. At a grazing touch no derivative exists, so the rate is limited from below.
+// Returns the derivatives of the touch time, with value 0. All corrections at switching points (saltation,
+// Mueller 1995) follow from them. At a grazing touch no derivative exists, so the rate is limited from below.
 template <class T> inline T later_touch(const T *motion) {
   T p = motion[Y] - motion[Z];
   double rate = value_of(motion[VY] - motion[VZ]);
   return slopes_only(-p) / with_sign_of(larger(magnitude(rate), SLOWEST_TOUCH), rate);
 }
 
-// Determines from the displacements whether a given motion starts on a stop.
+// Determines from the displacements whether a motion starts on a stop, and sets up its contact state.
 template <class T> inline void place_on_its_side(Motion<T> &m, double tolerance, const Body &t) {
   const Specimen &s = t.specimen;
   double p = value_of(m.at[Y] - m.at[Z]), x = value_of(m.at[X]), z = value_of(m.at[Z]);
@@ -151,7 +151,7 @@ template <class T, class Stops> class Run {
       m.contact.side = rebound(m.at, side, closed_gap(values, t), tolerance, t) ? side : 0.0;
       observer.see_impact(value_of(m.at[VY] - m.at[VZ]) - rate, values[t.flight.modes]);
     } else {
-      // A touch has no penetration; this removes its rounding error.
+      // The penetration at a touch is zero; w = 0 removes its rounding error.
       begin_contact(m.contact, m.at, side, tolerance, t);
       m.contact.w = constant<T>(0.0);
     }
@@ -221,7 +221,7 @@ template <class T, class Stops> class Run {
       }
     BaseForce base(clock_value(), smaller(0.5 * value_of(longest), 0.5 * STRETCH_TURN / t.omega), t);
     bool is_last = value_of(longest) <= 2.0 * base.middle;
-    // Only the start of this stretch depends on the changes; clock times have no derivatives.
+    // Only the start of this stretch depends on the initial state; clock times have no derivatives.
     T begin = m.clock.slip, tau = begin;
     T limit = constant<T>(is_last ? value_of(longest) : 2.0 * base.middle);
     auto seen = [&](const auto &steps, const T &h) {
@@ -244,7 +244,7 @@ template <class T, class Stops> class Run {
 
   // ---- Samples
 
-  // Computes the samples of a contact by a second run from its beginning, which stops at each sample.
+  // Computes the samples of a contact by a second integration from its start, which stops at each sample.
   void sample_contact(Motion<double> &shadow, double length, const BaseForce &base) {
     double reached = 0.0;
     keep_samples(record, clock_value(), length, [&](double later, double *sample) {

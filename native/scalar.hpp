@@ -1,6 +1,6 @@
-// Number types of a motion: `double`, or `Dual<double, M>`, a number with M derivatives. The same source
-// computes a motion and its tangent, so exponents, Floquet multipliers and Newton matrices need no separate
-// code. `Wide<T, N>` holds N numbers of type T in vector registers. `Complex<T>` is a phasor.
+// Number types of a motion: `double`, or `Dual<double, M>`, a number with M derivatives. The same templates
+// compute a motion and its derivatives, so Lyapunov exponents, Floquet multipliers and Newton matrices need
+// no separate code. `Wide<T, N>` is N numbers of type T in vector registers. `Complex<T>` is a phasor.
 #pragma once
 #include "elementary.hpp"
 #include "vector.hpp"
@@ -95,11 +95,11 @@ template <int M> INLINE Dual<double, M> square_root(const Dual<double, M> &x) {
   return root;
 }
 
-// Value without derivatives. All decisions (a touch, a step, the end of an iteration) use values only.
+// Returns the value without derivatives. All decisions (touch, step, end of an iteration) use only values.
 template <Plain A> INLINE A value_of(const A &x) { return x; }
 template <class A, int M> INLINE A value_of(const Dual<A, M> &x) { return x.value; }
 
-// A number without derivatives.
+// Returns a number with zero derivatives.
 template <class T> INLINE T constant(double value) {
   T number{};
   if constexpr (is_dual<T>) number.value = value;
@@ -107,14 +107,14 @@ template <class T> INLINE T constant(double value) {
   return number;
 }
 
-// The derivatives without the value; zero for a plain number.
+// Returns a number with the same derivatives and the value zero; zero for a plain number.
 template <class T> INLINE T slopes_only(T x) {
   if constexpr (is_dual<T>) x.value = 0.0;
   else x = 0.0;
   return x;
 }
 
-// ---- N numbers side by side
+// ---- N numbers in parallel
 
 template <class T, int N> struct WideTrait;
 template <int N> struct WideTrait<double, N> {
@@ -148,8 +148,8 @@ template <int M, int N> INLINE Dual<Vector<N>, M> gathered(const Dual<double, M>
   return all;
 }
 
-// Sum over k of x_k table[k], for K rows of N numbers. Even and odd rows are summed separately: two short
-// chains of dependent sums take half the time of one.
+// Returns the sum over k of x_k table[k], for K rows of N numbers. Even and odd rows are summed separately:
+// two short chains of dependent sums take half the time of one chain.
 template <int N, int K> INLINE Vector<N> times(const double (*table)[N], const Vector<K> &x) {
   Vector<N> even = x[0] * Vector<N>::load(table[0]), odd = x[1] * Vector<N>::load(table[1]);
   for (int k = 2; k < K; k += 2) {
@@ -189,10 +189,10 @@ INLINE Phasor quotient(const Phasor &x, const Phasor &y) {
   return (1.0 / (y.re * y.re + y.im * y.im)) * (x * conjugate(y));
 }
 INLINE double magnitude(const Phasor &x) { return square_root(x.re * x.re + x.im * x.im); }
-// Re(x y).
+// Returns Re(x y).
 template <class A> INLINE A real_of_product(const Complex<A> &x, const Phasor &y) { return x.re * y.re - x.im * y.im; }
 
-// exp(i angle), and exp(rate time); derivatives by the chain rule.
+// exp(i angle), and exp(rate time) with derivatives by the chain rule.
 INLINE Phasor turned_by(double angle) {
   auto [cosine, sine] = cosine_sine(angle);
   return {cosine, sine};

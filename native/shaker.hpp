@@ -1,11 +1,11 @@
 // Amplifier, coil, table and specimen under a voltage, step by step (decision 0006). Coil and table are exact
-// for voltage and force constant over a step. A cubic through the table's motion drives the specimen.
+// if voltage and force are constant over a step. A cubic through the table's motion drives the specimen.
 #pragma once
 #include "cubic.hpp"
 
 namespace vibench {
 
-// Mean output of the amplifier over a step with constant input, before clipping [V].
+// Returns the mean output of the amplifier over a step with constant input, before clipping [V].
 INLINE double amplified(double volts, LoadedShaker &s) {
   double below = s.low_decay < 1.0 ? volts + (s.low_cut - volts) * s.low_mean : 0.0;
   s.low_cut = volts + (s.low_cut - volts) * s.low_decay;
@@ -14,14 +14,14 @@ INLINE double amplified(double volts, LoadedShaker &s) {
   return s.gain * mean;
 }
 
-// Force of the rubber stops on the table [N]; they push, but never pull.
+// Returns the force of the rubber stops on the table [N]; they push, but never pull.
 INLINE double rubber_force(const LoadedShaker &s) {
   double side = s.base_displacement > 0.0 ? 1.0 : -1.0, pressed_in = side * s.base_displacement - s.stroke;
   if (!(pressed_in > 0.0)) return 0.0;
   return -side * larger(s.stop_stiffness * pressed_in + s.stop_damping * side * s.base_velocity, 0.0);
 }
 
-// Advances over steps `begin` to `stop` - 1; returns their number, or fewer if the specimen's motion failed.
+// Advances over steps `begin` to `stop` - 1. Returns their number, or fewer if the specimen's motion failed.
 template <class Run>
 inline int64_t shake(LoadedShaker &s, Run &run, const Motion<double> &specimen, const Body &body, int64_t begin,
                      int64_t stop) {
@@ -31,8 +31,8 @@ inline int64_t shake(LoadedShaker &s, Run &run, const Motion<double> &specimen, 
   for (int64_t n = begin; n < stop; n++) {
     double u0 = s.base_displacement, v0 = s.base_velocity, x0 = specimen.at[X];
     double reaction = of.k0 * (x0 - u0) + of.c0 * (specimen.at[VX] - v0);
-    // Mean over the step of the parabola through the last three values (Adams and Bashforth). With the value
-    // at the step's start the force would lag by half a step and feed energy into the table.
+    // Mean over the step of the parabola through the last three values (Adams and Bashforth). The value at
+    // the start of the step would lag by half a step and supply energy to the table.
     double (&before)[2] = s.reactions_before;
     double force = (23.0 * reaction - 16.0 * before[0] + 5.0 * before[1]) / 12.0, rubber = rubber_force(s);
     before[1] = before[0], before[0] = reaction;
@@ -83,7 +83,7 @@ template <class Act> inline int64_t with_shaker(LoadedShaker &s, const Act &act)
   return result;
 }
 
-// Advances over all steps, block by block; returns the number of steps, or fewer if the motion failed.
+// Advances over all steps, block by block. Returns the number of finished steps.
 inline int64_t move_shaker(LoadedShaker &s) {
   int64_t steps = s.drive.size, done = 0;
   for (int64_t k = 0; done < steps; k++) {

@@ -1,14 +1,14 @@
-// Weighted sums of samples: interpolation, decimation, and filters that continue from block to block.
+// Weighted sums of samples: interpolation, decimation, and filters with a state kept from block to block.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
 constexpr int INTERPOLATION_TAPS = 64;
-constexpr int INTERPOLATION_REACH = INTERPOLATION_TAPS / 2;  // samples to either side
+constexpr int INTERPOLATION_REACH = INTERPOLATION_TAPS / 2;  // number of samples on either side
 
-// Weighted sums of N ranges that begin `stride` apart, so that each weight is loaded once. The result of a
-// range does not depend on N. `count` is a multiple of eight.
+// Computes weighted sums of N ranges that start `stride` apart; each weight is loaded only once. The result
+// of a range does not depend on N. `count` is a multiple of eight.
 template <int N>
 INLINE void inner_products(double (&sums)[N], const double *weights, const double *values, int64_t stride,
                            int64_t count) {
@@ -26,7 +26,7 @@ INLINE double inner_product(const double *weights, const double *values, int64_t
   return sums[0];
 }
 
-// Weights of the taps at `fraction` of a sample after a sample, by Lagrange's cubic between the table's rows.
+// Computes the taps for a position `fraction` of a sample after a sample, by cubic Lagrange interpolation.
 inline void interpolation_weights(double *weights, const Numbers &table, double fraction) {
   int64_t phases = table.size / INTERPOLATION_TAPS - 3;
   double place = fraction * double(phases);
@@ -69,9 +69,9 @@ inline int64_t decimate(const Decimation &of) {
   constexpr int TOGETHER = 4;
   int64_t rows = of.table.size / of.reach, count = of.samples.size, last = of.means.size - of.reach;
   for (int64_t k = 0; k < count; k++) {
-    // Time is counted from sample 0, so that block sizes do not matter.
+    // Time is counted from sample 0, so results do not depend on the block size.
     double steps = (double(of.first + k) + 1.0) * of.ratio, at = steps + of.begin;
-    // A table of one row is made for the constant fraction of a step, so only whole steps remain.
+    // A table with one row is valid for one constant fraction of a step, so only whole steps remain.
     double whole = rows == 1 ? steps + whole_part(of.begin) : whole_part(at);
     double start = whole + double(of.origin), place = (at - whole) * double(rows - 1);
     if (!(start >= 0.0 && start <= double(last))) return REFUSED;

@@ -1,12 +1,12 @@
-// Data for the runs of one scene, computed once from the specimen, its linear motion and the drive.
+// Tables for the runs of one scene, computed once from the specimen, its linear motion and the drive.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
-constexpr int MODES = 6;          // most modes of a motion: all real; usually there are three conjugate pairs
-constexpr int PHASORS = MODES + 1;  // plus the drive
-constexpr int AHEAD = 16;         // grid steps per evaluation, and terms of a Taylor series
+constexpr int MODES = 6;          // largest number of modes, if all are real; usually three conjugate pairs
+constexpr int PHASORS = MODES + 1;  // modes and drive
+constexpr int AHEAD = 16;         // number of grid steps per evaluation, and of terms of a Taylor series
 constexpr double LONGEST_TURN = 0.25;  // fastest rate times the length of a grid step [rad]
 
 enum { REAL, IMAG };
@@ -15,7 +15,7 @@ enum { REAL, IMAG };
 struct LinearTables {
   int modes;
   double grid;               // grid step [s]
-  Phasor rates[PHASORS];     // l_j [1/s]
+  Phasor rates[PHASORS];     // rates l_j [1/s]
   double squares[PHASORS];   // |l_j|^2
   Phasor shapes[PHASORS][6];
   Phasor path[PHASORS];      // contribution of a unit phasor to p
@@ -25,22 +25,22 @@ struct LinearTables {
   double series[PHASORS][2][AHEAD];  // Taylor coefficients of exp(l_j t)
 };
 
-// Numbers of a motion in a collision: p, x, z, their rates, and the drive's phasor.
+// Indices of the state in a collision: p, x, z, their rates, and the drive's phasor. WIDE is their number.
 enum { P, AT_X, AT_Z, P_RATE, X_RATE, Z_RATE, COSINE, SINE, WIDE };
-constexpr int TERMS = 8;  // terms of a Taylor series over a collision
+constexpr int TERMS = 8;  // number of terms of a Taylor series over a collision
 
-// The motion without the contact force as a Taylor series of its matrix exponential, in units of 1 / fastest.
+// Taylor series of the matrix exponential, for the motion without contact force, in units of 1 / fastest.
 struct CollisionTables {
   double fastest;                   // largest rate of modes and drive [1/s]
-  double powers[TERMS][WIDE][WIDE];  // [m][j][i]: contribution of number j to number i, (A / fastest)^m / m!
-  double struck[TERMS][WIDE];        // contribution of a unit of contact force, likewise
-  double onto_p[WIDE][TERMS];        // contribution of number j to the m-th term of p
-  double onto_x[WIDE][TERMS];        // contribution of number j to the m-th term of x
+  double powers[TERMS][WIDE][WIDE];  // [m][j][i]: effect of component j on component i, (A / fastest)^m / m!
+  double struck[TERMS][WIDE];        // [m][i]: effect of a unit contact force on component i
+  double onto_p[WIDE][TERMS];        // [j][m]: effect of component j on the m-th term of p
+  double onto_x[WIDE][TERMS];        // [j][m]: effect of component j on the m-th term of x
   const CollisionShapes *shapes;
 };
 
-// Rows x and p of (i omega - A)^-1, for eq. 1 as s' = A s + b f with the stops' force f. They turn Fourier
-// integrals of s' and f into those of x and p.
+// Rows x and p of (i omega - A)^-1, for eq. 1 as s' = A s + b f with the stops' force f. They convert Fourier
+// integrals of s' and f into Fourier integrals of x and p.
 struct LineTables {
   Phasor across[6], path[6];
   Phasor struck_x, struck_p;  // [m s / (N s)]
@@ -57,14 +57,14 @@ struct Body {
 
 struct Tables : Body {
   Drive drive;
-  double omega;         // [rad/s]
+  double omega;         // drive frequency [rad/s]
   LinearTables flight;
   LinearTables held;
   LineTables lines;
   Phasor pulls[PHASORS];
   double let_go, rests;
   CollisionTables collision;
-  const PowerTables *power;  // stored after these tables, for a power law; else null
+  const PowerTables *power;  // tables for a power law, stored after these tables; otherwise null
 };
 
 INLINE double gap_at(const Specimen &specimen, double side) {
@@ -149,7 +149,7 @@ inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const 
     for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P], t.onto_x[j][m] = t.powers[m][j][AT_X];
 }
 
-// Sums over the modes, half of each plus half of its conjugate; this is also correct for real modes.
+// Sums half of each mode and half of its conjugate, which is also correct for real modes.
 inline void fill_line_tables(LineTables &lines, const LinearTables &t, const Specimen &s) {
   lines = {};
   Phasor drive = t.rates[t.modes], half{0.5, 0.0};

@@ -1,14 +1,14 @@
-// Growth of small changes of a motion, for exponents and multipliers. Between readings the changes are
-// integrated exactly, as dual numbers. At a reading they are made orthonormal in a metric, and the logarithms
-// of the removed factors are stored (Benettin et al., Meccanica 15 (1980) 9 and 21).
+// Growth of the tangent vectors of a motion, for Lyapunov exponents and Floquet multipliers. Between readings
+// they are integrated exactly, as dual numbers. At a reading they are made orthonormal in a metric, and the
+// logarithms of the removed factors are stored (Benettin et al., Meccanica 15 (1980) 9 and 21).
 #pragma once
 #include "run.hpp"
 
 namespace vibench {
 
-// ---- Conversion between rows of changes and dual numbers
+// ---- Conversion between rows of tangent vectors and dual numbers
 
-// The changes of a contact's w and r follow from the displacements: |p| = gap + w^2.
+// The derivatives of w and r in a contact follow from displacements and velocities, with |p| = gap + w^2.
 template <int M> inline Motion<Dual<double, M>> with_changes(const Motion<double> &plain, const Tangent &tangent) {
   Motion<Dual<double, M>> motion{};
   for (int i = 0; i < 6; i++) motion.at[i].value = plain.at[i];
@@ -36,11 +36,11 @@ template <int M> inline void keep_changes(Tangent &tangent, const Motion<Dual<do
   }
 }
 
-// ---- QR step of the exponents: modified Gram-Schmidt in two passes, which suffice (Giraud, Langou and
-// Rozloznik, Comput. Math. Appl. 50 (2005) 1069).
+// ---- QR step for the exponents: modified Gram-Schmidt. Two passes suffice (Giraud, Langou and Rozloznik,
+// Comput. Math. Appl. 50 (2005) 1069).
 
 constexpr int ORTHOGONAL_PASSES = 2;
-constexpr double DIRECTION_LOST = 1e-11;  // a row of which at most this part remains has no direction
+constexpr double DIRECTION_LOST = 1e-11;  // a row with at most this part of its length left has no direction
 
 using Metric = double[6][6];
 
@@ -64,8 +64,8 @@ inline double left_of(double (&rows)[6][6], int i, const Metric &metric) {
   return square_root(inner(rows[i], rows[i], metric));
 }
 
-// Makes rows orthonormal, and adds the logarithms of their divisors to `logarithms`. A row that is a linear
-// combination of earlier rows (an impact without rebound gives two) gets minus infinity and becomes an axis.
+// Makes rows orthonormal, and adds the logarithms of their divisors to `logarithms`. If a row is a linear
+// combination of earlier rows (an impact without rebound: two), it gets minus infinity and is set to an axis.
 inline void orthonormalise(double (&rows)[6][6], int count, const Metric &metric, double *logarithms) {
   for (int i = 0; i < count; i++) {
     double whole = square_root(inner(rows[i], rows[i], metric)), length = left_of(rows, i, metric);
@@ -85,7 +85,7 @@ inline void orthonormalise(double (&rows)[6][6], int count, const Metric &metric
 
 // ---- Readings
 
-// Takes all remaining readings up to `last`; `advance(until)` advances motion and changes.
+// Takes all remaining readings up to `last`; `advance(until)` advances the motion and its tangent vectors.
 template <class Advance>
 inline Outcome take_readings(const State &state, const Record &record, Tangent &tangent, Readings &readings,
                              int64_t last, const Advance &advance) {

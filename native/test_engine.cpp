@@ -1,8 +1,8 @@
-// Tests of the engine as a C++ program, which can run under the sanitizers of g++:
+// Tests of the engine in a C++ program, which can run with the sanitizers of g++:
 //
 //     g++ -std=c++20 -O1 -g -fsanitize=address,undefined native/test_engine.cpp -o test_engine && ./test_engine FILE ...
 //
-// tests/sim/engine/test_native_program.py writes a FILE: the bytes of Scene, CollisionShapes, PowerShapes.
+// tests/sim/engine/test_native_program.py writes each FILE: the bytes of Scene, CollisionShapes, PowerShapes.
 #include "api.cpp"
 
 #include <cmath>
@@ -19,7 +19,7 @@ void expect(bool holds, const char *what, double found) {
   failures++;
 }
 
-// Uniform in [low, high), from a linear congruential generator: the same numbers on every system.
+// Returns a uniform number in [low, high) from a linear congruential generator, the same on every system.
 double draw(double low, double high) {
   static uint64_t state = 1;
   state = state * 6364136223846793005u + 1442695040888963407u;
@@ -64,7 +64,7 @@ void test_products_keep_what_they_round_off() {
   }
 }
 
-// Uses parabolas with an exactly known peak on either side, and bounds larger than necessary.
+// Uses parabolas with an exactly known peak at either stop, and bounds larger than necessary.
 void test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   for (int n = 0; n < 20000; n++) {
@@ -101,7 +101,7 @@ void test_a_touch_is_the_one_that_the_careful_search_finds() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   const double lowest_gaps[] = {GAP, 0.3 * GAP, INFINITE};
   for (int n = 0; n < 20000; n++) {
-    // Rotating terms like those of a flight: a derivative is at most the fastest rate times the last one.
+    // Rotating terms as in a flight: each derivative is at most the fastest rate times the derivative before.
     double series[AHEAD] = {}, bound = 0.0, reach = GAP, lowest = lowest_gaps[n % 3], length = draw(0.05, 1) * LENGTH;
     for (int term = 0; term < 3; term++) {
       double rate = LONGEST_TURN / LENGTH * draw(0.05, 1), size = 2 * GAP * draw(0, 1), phase = draw(0, 2 * PI);
@@ -117,7 +117,7 @@ void test_a_touch_is_the_one_that_the_careful_search_finds() {
     Room room{lowest, GAP, bound, reach};
     double careful = first_contact(series, length, room), quick = first_touch(series, length, room);
     if (careful == NEVER || quick == NEVER) {
-      // At the very end of a stretch one search may find a touch that the other leaves to the next stretch.
+      // At the end of a stretch, one search may find a touch that the other finds in the next stretch.
       expect(careful == quick || std::fmax(careful, quick) > length * (1 - 1e-9), "both find a touch", careful - quick);
       continue;
     }
@@ -291,7 +291,7 @@ template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, doub
   }
 }
 
-// The fit covers no collision, so every contact is integrated by steps, as in a run at a strict tolerance.
+// The fit covers no collision, so every contact is integrated in steps, as in a run at a strict tolerance.
 void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
   constexpr int64_t COUNT = 11, PERIODS = 9;
   constexpr double TOLERANCE = 9e-8;  // at this tolerance no collision is solved as a whole

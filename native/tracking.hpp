@@ -1,5 +1,5 @@
-// One step of the motion in hidden-state estimation: exact in flight; near a stop, impulses of the contact
-// force and free motion alternate in substeps (docs/hidden-motion.md).
+// One step of the motion for hidden-state estimation. Far from the stops it is exact. Near a stop it consists
+// of substeps, in which impulses of the contact force and free motion alternate (docs/hidden-motion.md).
 #pragma once
 #include "structures.hpp"
 
@@ -10,15 +10,15 @@ constexpr int BASE_VELOCITY = 6;  // index of W, after X, Y, Z, VX, VY, VZ relat
 constexpr double HERTZ_EXPONENT = 1.5;
 constexpr double WATCHED_REACH = 2e-7;  // a step that comes this close to a stop is divided into substeps [m]
 
-enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // far from stops; near one, free at the end; in contact there
+enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // far from stops; near a stop, ends free; ends in contact
 
-// Matrix from the state, the recorded acceleration and its increase over a step to the state at the end.
+// Matrix from the state, the recorded acceleration and its increase over a step to the state at its end.
 typedef double StepFlow[TRACKED][TRACKED + 2];
 
-// A number of the state with its derivatives with respect to the state at the start of the step.
+// One component of the state with its derivatives with respect to the state at the start of the step.
 using StateAndJacobian = Dual<double, TRACKED>;
 
-// d to a power, for d > 0. The special cases for Hertz and spring stops take a tenth of the time.
+// Returns d^exponent for d > 0. The special cases for Hertz and linear stops take a tenth of the time.
 INLINE double power(double d, double exponent) {
   if (exponent == HERTZ_EXPONENT) return d * square_root(d);
   return exponent == 1.0 ? d : exponential(exponent * logarithm(d));
@@ -31,7 +31,7 @@ template <int M> INLINE Dual<double, M> power(const Dual<double, M> &d, double e
   return raised;
 }
 
-// Adds the impulse of the present stop force over `time` to the velocities; returns the impulse on m1 [N s].
+// Adds the impulse of the present stop force over `time` to the velocities. Returns the impulse on m1 [N s].
 template <class T> INLINE double kick(T *state, const TrackedStop &stop, double time) {
   T p = state[Y] - state[Z], rate = state[VY] - state[VZ];
   double side = value_of(p) > stop.upper_gap ? 1.0 : value_of(p) < -stop.lower_gap ? -1.0 : 0.0;
@@ -44,7 +44,7 @@ template <class T> INLINE double kick(T *state, const TrackedStop &stop, double 
   return value_of(impulse);
 }
 
-// Advances exactly, without stops; the base acceleration is `base` and increases linearly by `rise` [m/s^2].
+// Advances a state exactly, without stops. The base acceleration grows linearly by `rise` from `base`.
 template <class T> INLINE void flow_on(T *state, const StepFlow &flow, double base, double rise) {
   T moved[TRACKED];
   for (int i = 0; i < TRACKED; i++) {
@@ -61,7 +61,7 @@ struct StepModel {
   int64_t small_steps;
 };
 
-// Advances over substep `n` of a step; returns the impulse on m1 [N s].
+// Advances a state over substep `n` of a step, and returns the impulse on m1 [N s].
 template <class T> INLINE double small_step(T *state, const StepModel &m, double base, double rise, int64_t n) {
   double parts = double(m.small_steps), half = 0.5 * (m.step / parts);
   double impulse = kick(state, m.stop, half);
@@ -69,7 +69,7 @@ template <class T> INLINE double small_step(T *state, const StepModel &m, double
   return impulse + kick(state, m.stop, half);
 }
 
-// Whether a flight comes near a stop, by the values at its ends and the middle of the cubic between them.
+// Returns whether a flight comes near a stop: at its ends, or in the middle of the cubic between them.
 inline bool reaches_stop(const double *before, const double *after, const StepModel &m) {
   double p0 = before[Y] - before[Z], p1 = after[Y] - after[Z];
   double bend = 0.125 * m.step * ((before[VY] - before[VZ]) - (after[VY] - after[VZ]));
@@ -78,7 +78,7 @@ inline bool reaches_stop(const double *before, const double *after, const StepMo
   return high + WATCHED_REACH > m.stop.upper_gap || -low + WATCHED_REACH > m.stop.lower_gap;
 }
 
-// Advances a state by one sample, and computes the impulse on m1. T may include derivatives.
+// Advances a state by one sample, and computes the impulse on m1. The type T may include derivatives.
 template <class T>
 inline StepKind step_on(double *state, const StepModel &m, double base, double rise, double &impulse,
                         double (&jacobian)[TRACKED][TRACKED]) {
@@ -110,16 +110,16 @@ inline StepKind step_on(double *state, const StepModel &m, double base, double r
 
 // A row of `ContactSearch::contacts`.
 struct TrackedContact {
-  double touch;        // [samples]
+  double touch;        // time of the touch [samples]
   double duration;     // [s]
   double side;         // -1 or +1
-  double impulse;      // on m1, as a magnitude [N s]
-  double penetration;  // largest [m]
-  double before, after;  // speed of p towards and away from the stop [m/s]
+  double impulse;      // magnitude of the impulse on m1 [N s]
+  double penetration;  // largest penetration [m]
+  double before, after;  // approach and rebound speed of p [m/s]
 };
 constexpr int CONTACT_COLUMNS = sizeof(TrackedContact) / sizeof(double);
 
-// Simulates each contact from the last smoothed state in flight before it; returns the number of contacts.
+// Simulates each contact from the last smoothed state before it. Returns the number of contacts.
 inline int64_t follow_contacts(const ContactSearch &of) {
   const auto &flow = *reinterpret_cast<const StepFlow *>(of.small_flow.at);
   const auto &stop = *reinterpret_cast<const TrackedStop *>(of.stop.at);
@@ -159,7 +159,7 @@ inline int64_t follow_contacts(const ContactSearch &of) {
         now = {};
         is_over = n + 1 == of.small_steps || at + 1 >= samples;
       }
-      // A substep that ends in flight ends the search; the next contact starts from a smoothed state.
+      // A sample that ends without contact ends the search; the next contact starts from a smoothed state.
       is_over = is_over || now.side == 0.0;
     }
     ready = at + 1;

@@ -1,11 +1,11 @@
-// N doubles in parallel, in as many registers as necessary. Operations follow IEEE 754 in a fixed order,
-// without fused multiply-adds except `fused`, so results do not depend on the width of the registers.
+// N doubles in parallel, in as many registers as necessary. Operations follow IEEE 754 in a fixed order, with
+// fused multiply-adds only in `fused`. Results therefore do not depend on the width of the registers.
 #pragma once
 #include "numbers.hpp"
 
 namespace vibench {
 
-// Written out for each N, because g++ ignores the attribute if the size depends on a template argument.
+// Specialised for each N, because g++ ignores the attribute if the size depends on a template argument.
 template <int N> struct LanesTrait;
 template <> struct LanesTrait<8> {
   typedef double Lanes __attribute__((vector_size(64)));
@@ -40,7 +40,7 @@ template <int N> struct Vector {
 // One boolean for each of eight lanes.
 struct Mask {
 #if defined(__clang__)
-  typedef bool Flags __attribute__((ext_vector_type(8)));  // kept in a mask register if there is one
+  typedef bool Flags __attribute__((ext_vector_type(8)));  // stored in a mask register if the processor has one
   static INLINE Mask of(unsigned bits) { return {__builtin_bit_cast(Flags, uint8_t(bits))}; }
   INLINE unsigned bits() const { return __builtin_bit_cast(uint8_t, flags); }
 #else
@@ -71,7 +71,7 @@ INLINE Mask operator<(Vector<8> a, Vector<8> b) {
 #endif
 }
 
-// a where the mask is set, else b.
+// Returns `a` where the mask is set, otherwise `b`.
 INLINE Vector<8> select(Mask mask, Vector<8> a, Vector<8> b) {
 #if defined(__clang__)
   typedef int64_t Whole __attribute__((vector_size(64)));
@@ -83,7 +83,7 @@ INLINE Vector<8> select(Mask mask, Vector<8> a, Vector<8> b) {
 
 INLINE Vector<8> magnitude(Vector<8> x) { return select(x < 0.0, -x, x); }
 
-// a b + c, rounded once. The x86-64 baseline has no such instruction, so its last digits differ.
+// Returns a b + c, rounded once. The x86-64 baseline lacks this instruction, so its last digits differ.
 INLINE Vector<8> fused(Vector<8> a, Vector<8> b, Vector<8> c) {
 #if !defined(__FMA__) && !defined(__aarch64__)
   return a * b + c;
@@ -113,7 +113,7 @@ template <int N> INLINE Vector<N> magnitude(Vector<N> x) {
 #endif
 }
 
-// Eight successive lanes of `from` followed by `to`: from the last of `from` on; below, from its second on.
+// Eight successive lanes of `from` and `to`, starting at the last lane of `from`; below, at its second lane.
 INLINE Vector<8> lanes_before(Vector<8> from, Vector<8> to) {
   return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 7, 8, 9, 10, 11, 12, 13, 14));
 }
@@ -121,7 +121,7 @@ INLINE Vector<8> lanes_behind(Vector<8> from, Vector<8> to) {
   return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 1, 2, 3, 4, 5, 6, 7, 8));
 }
 
-// Sum of all lanes, by repeated halving.
+// Returns the sum of all lanes, by repeated halving.
 template <int N> INLINE double total(Vector<N> x) {
   double of[N];
   x.store(of);
@@ -136,7 +136,7 @@ template <int N> INLINE double largest(Vector<N> x) {
   return best;
 }
 
-// Number of leading lanes that lie between low and high.
+// Returns the number of leading lanes between `low` and `high`.
 INLINE int leading_between(Vector<16> x, double low, double high) {
   auto inside = (x.lanes > Vector<16>(low).lanes) & (x.lanes < Vector<16>(high).lanes);
 #if defined(__clang__)

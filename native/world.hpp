@@ -1,4 +1,4 @@
-// The analogue world of the virtual rig: sensor outputs of a motion, and the connections of a fast control loop.
+// Analogue part of the virtual rig: sensor outputs of a motion, and the connections of a fast control loop.
 #pragma once
 #include "controller.hpp"
 #include "shaker.hpp"
@@ -22,7 +22,7 @@ inline int64_t show(const Sensor &sensor) {
   return 0;
 }
 
-// Adds the controller's delayed volts to the drive, from `begin` to its next sample; returns `stop`.
+// Adds the controller's delayed output to the drive, from `begin` to its next sample. Returns `stop`.
 inline int64_t play_loop(LoopCables &loop) {
   int64_t each = loop.steps_per_sample, into = (loop.first + loop.begin) % each;
   double *late = loop.late.at, *drive = loop.drive.at + loop.begin;
@@ -40,8 +40,8 @@ inline int64_t play_loop(LoopCables &loop) {
   return loop.stop;
 }
 
-// Adds the sensor volts of the played steps to the controller's sums, and makes the next steps current.
-// Returns 1 if the host must act before the controller's next sample.
+// Adds the sensor voltages of the simulated steps to the controller's sums, and moves `begin` to the next
+// steps. Returns 1 if the host must act before the controller's next sample.
 inline int64_t hear_loop(LoopCables &loop) {
   if (loop.stop < loop.begin || loop.stop > loop.drive.size) return REFUSED;
   show(loop.base, loop.begin, loop.stop);
