@@ -15,7 +15,7 @@ struct HertzForce {
   template <class T> INLINE T operator()(const T &w, const T &) const { return stiffness * (w * w * w); }
 };
 // A linear spring in parallel with a Hertz contact, with the loss of Hunt and Crossley, J. Appl. Mech. 42
-// (1975) 440, eq. 8. Spring or Hertz contact may be zero.
+// (1975) 440, eq. 8. Either stiffness may be zero.
 struct YieldingForce {
   double spring, hertz, loss;  // [N/m], [N/m^1.5], [s/m]
   template <class T> INLINE T operator()(const T &w, const T &r) const {
