@@ -30,7 +30,7 @@ REACH = MARKOV_TERMS
 """Number of cells on each side that are reached by this response within these terms."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Effect of the force in one cell on the velocity of another within a window that is neglected, over the
+"""Largest neglected effect of a force in one cell on the velocity of another cell within a window, over the
 tolerance."""
 MOST_HALVINGS = 20
 KEPT = 2

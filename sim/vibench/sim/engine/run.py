@@ -263,7 +263,7 @@ class GrowthReadings:
 
     @property
     def made(self) -> int:
-        """Number of intervals so far."""
+        """Number of completed intervals."""
         return int(self.structure["made"])
 
     @property

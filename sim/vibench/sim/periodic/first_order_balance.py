@@ -6,7 +6,7 @@ squared magnitude is an equation with a few powers of |P|; all its zeros are fou
 
 `positive_zeros` finds all positive zeros of a sum of a few powers with any exponents. Companion matrices are
 not accurate enough for this: a polynomial of degree 201 with four terms has at most three positive zeros
-(Descartes), and they miss some. Instead, by Rolle's theorem, a sum of m powers divided by its lowest power is
+(Descartes), but they miss some. Instead, by Rolle's theorem, a sum of m powers over its lowest power is
 monotone between the zeros of its derivative, which has m - 1 powers. The sum is evaluated in t = ln u with
 every term divided by the largest, which avoids overflow.
 """
@@ -112,9 +112,9 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """False on the middle of three branches, which is not observed in experiments.
+    """Stability to amplitude changes; False on the middle of three branches, absent in experiments.
 
-    Other instabilities are not included; `vibench.sim.periodic` determines them.
+    Other instabilities are not included; Floquet multipliers show them (`vibench.sim.periodic.floquet`).
     """
 
 

@@ -107,9 +107,9 @@ def phase_resonance_branch(
     """Follow the phase resonance of a mode over the level of the base, from a level without contact.
 
     Return the branch over amplitude, with the frequency and the multipliers of each motion; it may turn back.
-    Raises ValueError without damping, unless the motion without contact has this phase exactly once in the
-    band, when no motion is found at the lower level or m1 reaches its stops there, or when `of` is not a word
-    of `PhaseReference`.
+    Raises ValueError when the specimen has no damping, the motion without contact does not have this phase
+    exactly once in the band, no motion is found at the lower level, m1 reaches its stops at this level, or
+    `of` is not a word of `PhaseReference`.
 
     Parameters
     ----------

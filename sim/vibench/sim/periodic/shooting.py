@@ -68,7 +68,7 @@ class PeriodMap:
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Map of simpler motions (half the period, or mirrored) among the fixed points; None if none."""
+        """Map for simpler fixed points (half the period, or mirrored); None if there can be none."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:

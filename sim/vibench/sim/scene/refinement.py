@@ -316,7 +316,7 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion, divided by ``size``; inf without one."""
+        """Return the distance of a state from a periodic motion over ``size``; inf if ``orbit`` is None."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size

@@ -42,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Return the argument between 0 and ``high`` at which a function has a value, by bisection."""
+    """Return the argument from 0 to ``high`` at which a decreasing function is ``value``, by bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)

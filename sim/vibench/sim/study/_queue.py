@@ -290,7 +290,7 @@ class Points(ABC):
 
     @abstractmethod
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the values of a prediction that are stored."""
+        """Return the values to store for a prediction."""
 
 
 def run_points(
