@@ -262,7 +262,7 @@ def test_unconfirmed_parameters_have_no_bounds(world_recording):
     assert "±" not in said
     assert motion.to_dict()["without_contact_model"]["gaps_sd_m"] in ([None, None], (None, None))
     # It was said to be too short, of two seconds.
-    assert "may be wrong" in motion.sentences[-1]
+    assert "may be described wrongly" in motion.sentences[-1]
     assert len(motion.sentences) < 10
 
 
@@ -286,10 +286,10 @@ def test_an_invalid_track_is_left_out_with_a_reason(world_recording, described_o
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
     motion = told(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
     assert motion.tracked.share_followed < 0.3
-    assert any("leave" in each.reason or "begun" in each.reason for each in motion.tracked.not_followed)
+    assert any("residual" in each.reason or "acquired" in each.reason for each in motion.tracked.not_followed)
     missing = sum(each.stop - each.first for each in motion.tracked.not_followed)
     assert missing == np.count_nonzero(np.isnan(motion.tracked.p))
-    assert "Not followed for" in " ".join(motion.sentences)
+    assert "Not tracked for" in " ".join(motion.sentences)
 
 
 @pytest.mark.thorough
@@ -310,7 +310,7 @@ def test_requests_without_a_result_are_refused_in_a_sentence(world_recording):
         told(recorded, specimen=rigid)
     with pytest.raises(InvalidRequest, match=r"from 1 s to 0\.5 s"):
         told(recorded, start_s=1.0, stop_s=0.5)
-    with pytest.raises(NotEnoughData, match="too little"):
+    with pytest.raises(NotEnoughData, match="too short"):
         told(recorded, start_s=0.5, stop_s=0.501)
     slow = world_recording(260.0, 1.5, seed=41, rate_hz=5120.0, duration_s=0.6)
     with pytest.raises(UnusableData, match=r"5120 Hz.*higher rate"):

@@ -300,7 +300,7 @@ def free_numbers(
     count = round(_FIT_STRETCH_S * motion.sample_rate_hz)
     places = [each for each in firsts if each + count < motion.samples]
     if not places:
-        raise NotEnoughData(f"{_FIT_STRETCH_S} s of colliding motion are needed to find m1 in")
+        raise NotEnoughData(f"{_FIT_STRETCH_S} s of motion with collisions are needed to determine m1")
     current = described
     prior = np.array([PRIOR_SD[each] for each in FITTED])
     for share in _SHARES:

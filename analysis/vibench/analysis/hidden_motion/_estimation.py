@@ -33,8 +33,8 @@ _WANDER = 0.02
 REBUILT_S = 0.05
 """Interval after which the tables are updated to the current parameters [s]."""
 _LOST = (
-    f"each track was lost within {REBUILT_S:g} s of the search for parameters, so the values taken as "
-    "described (m0, m2, k1, kind of contact) may be wrong"
+    f"during the search for parameters, each track was lost within {REBUILT_S:g} s, so values that are not "
+    "searched (m0, m2, k1, kind of contact) may be described wrongly"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
 """Pairs: length of tracked motion [s], and the factor on the velocity variance until then."""
@@ -129,7 +129,7 @@ class _Search:
                 looked, at = at.sample, None
                 why = why or _LOST
         if not self._followed:
-            return why or "the motion was too short to begin a track in"
+            return why or "the motion was too short to begin a track"
         return Estimate(
             self._current(),
             self._wanted,
@@ -192,8 +192,8 @@ class _Search:
         worst = int(np.argmax(np.abs(self._values - self._nominal) / self._prior_sd))
         what = self._wanted[worst].value
         return (
-            f"{what} ran to {self._values[worst]:.3g}, far from the {self._nominal[worst]:.3g} described, so "
-            "the specimen's other numbers do not fit this recording"
+            f"the search for {what} ended at {self._values[worst]:.3g}, far from the described "
+            f"{self._nominal[worst]:.3g}, so other parameters of the specimen do not fit this recording"
         )
 
 
@@ -221,10 +221,10 @@ def search_start(
         gaps = _gaps_by_law(fitted, free.impacts)
     if not any(gaps):
         count = free.impacts.samples.size
-        seen = f"{count} impacts that were found determine no gap" if count else "no impacts were found"
+        seen = f"the {count} impacts found do not determine a gap" if count else "no impacts were found"
         return fitted, (
-            f"{seen} without a contact model, so m1 hardly reached its stops in this motion or stayed at one "
-            "of them, or the specimen's linear numbers are wrong; fit them to weak noise first"
+            f"{seen} without a contact model, so m1 hardly reached its stops, or stayed at one of them, or "
+            "the linear parameters of the specimen are wrong; fit them to weak noise first"
         )
     sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
     known: dict[Hidden, FreeGap] = {

@@ -219,10 +219,10 @@ def _restarts(
     if 2 * len(good) <= len(stretches) and len(stretches) > 1:
         return (
             refused
-            or f"only {len(good)} of {len(stretches)} restarts over parts of the motion held their track"
+            or f"only {len(good)} of {len(stretches)} searches in parts of the motion kept their track"
         )
     if not good:
-        return refused or "the track was lost again and again while the parameters were looked for"
+        return refused or "the track was lost repeatedly during the search for parameters"
     return good
 
 
@@ -293,7 +293,7 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
 def _parameter(
     what: Hidden, value: float, half: float, described: float, *, is_known: bool
 ) -> FoundParameter:
-    why = "" if is_known else "this motion does not determine it better than the description"
+    why = "" if is_known else "this motion gives no narrower bounds than the description"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 

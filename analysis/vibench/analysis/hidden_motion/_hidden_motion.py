@@ -71,8 +71,8 @@ class MassCheck:
         verdict = {True: "confirms", False: "refutes", None: "neither confirms nor refutes"}[self.confirms]
         return (
             f"The measured {self.channel} {verdict} the track: "
-            f"{100 * self.unexplained:.2g} % of it remain, {100 * self.expected:.2g} % are expected, and its "
-            f"scale is {self.scale:.3f}."
+            f"{100 * self.unexplained:.2g} % of it are not explained ({100 * self.expected:.2g} % are "
+            f"expected), and its scale is {self.scale:.3f}."
         )
 
 
@@ -344,8 +344,8 @@ def hidden_motion_in_samples(
     acceleration, velocity = (np.asarray(each, dtype=np.float64) for each in (base_acceleration, m0_velocity))
     if acceleration.shape != velocity.shape or acceleration.ndim != 1:
         raise InvalidRequest(
-            f"{acceleration.shape} samples of the base and {velocity.shape} of m0 were given; give as many "
-            "of each, in one dimension"
+            f"arrays of shape {acceleration.shape} for the base and {velocity.shape} for m0 were given; give "
+            "one-dimensional arrays of equal length"
         )
     motion = motion_in_samples(acceleration, velocity, sample_rate_hz)
     described = tracked_specimen(specimen)
@@ -397,7 +397,7 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
     last_s = end_s if stop_s is None else stop_s
     if not 0.0 <= start_s < last_s:
         raise InvalidRequest(
-            f"a stretch from {start_s:g} s to {last_s:g} s is none; the recording lasts {end_s:.3g} s"
+            f"from {start_s:g} s to {last_s:g} s of {end_s:.3g} s was requested; give a start and a later end"
         )
     return round(start_s * rate), min(round(last_s * rate), recording.samples)
 
@@ -438,14 +438,14 @@ def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> st
     """Return the reason why the parameters do not fit the specimen; empty if they fit."""
     for each in checks:
         if each.confirms is False:
-            return f"{each.channel} refutes a track with the numbers that were found"
+            return f"{each.channel} refutes a track with the found parameters"
     is_tracked = ~np.isnan(tracked.p)
     held = float(np.mean(is_tracked[int(np.argmax(is_tracked)) :]))
     if held < _LEAST_HELD:
-        return f"a track with the numbers that were found held in {100 * held:.3g} % of the motion only"
+        return f"tracking with the found parameters worked in only {100 * held:.3g} % of the motion"
     if not tracked.innovation_level <= _HIGHEST_LEVEL:
         return (
-            f"the motion tracked with the numbers that were found leaves {tracked.innovation_level:.3g} "
+            f"tracking with the found parameters leaves a residual of {tracked.innovation_level:.3g} "
             "times the noise"
         )
     return ""
@@ -474,7 +474,7 @@ def _free_sentence(motion: HiddenMotion) -> str:
             text += f", {side} gap {MICRO * gap.value_m:.3g} µm"
     if not any(motion.free_gaps):
         return f"{text}; too few to determine a gap."
-    no_bounds = "without bounds, since no track confirms the specimen's parameters that were used"
+    no_bounds = "without bounds, because no track confirms the parameters of the specimen"
     return f"{text}." if motion.is_confirmed else f"{text}, {no_bounds}."
 
 
@@ -493,7 +493,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     yield from (each.sentence for each in motion.mass_checks)
     for reason in dict.fromkeys(each.reason for each in tracked.not_followed):
         total = sum(each.stop - each.first for each in tracked.not_followed if each.reason == reason)
-        yield f"Not followed for {total / rate:.3g} s: {reason}."
+        yield f"Not tracked for {total / rate:.3g} s: {reason}."
     yield _free_sentence(motion)
     untold: dict[str, list[str]] = {}
     for parameter in motion.parameters:

@@ -83,7 +83,7 @@ def hidden_view(request: HiddenViewRequest) -> HiddenView:
         motion.tracked.p[shown],
         motion.free.p[shown],
         (-lower, upper),
-        f"p tracked in {100 * followed:.3g} % of this stretch, with the specimen's numbers {request.numbers}"
+        f"p tracked in {100 * followed:.3g} % of this part, with parameters of the specimen {request.numbers}"
         + "".join(f"; {name} {value}" for name, value, _ in parameter_rows(motion)[:_NUMBERS_SHOWN])
         + (f"; elsewhere {why}" if followed < 1.0 and why else ""),
     )

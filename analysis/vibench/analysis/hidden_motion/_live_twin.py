@@ -272,7 +272,7 @@ class LiveTwin:
         self._states = np.empty((0, STATES))
         self._at: FilterState | None = None
         self._model: MotionModel | None = None
-        self._state, self._why = LiveState.WAITING, "too little was measured to begin"
+        self._state, self._why = LiveState.WAITING, "too few samples to begin so far"
         self._looked = self._pause = 0
         self._find_at = sample + round(_FIND_S * self._rate)
         self._wait = round(_FIND_S * self._rate)
@@ -401,7 +401,7 @@ class LiveTwin:
         if kept < count:
             kept = reliable_samples(run, self._rate)
             self._at, self._is_out = None, True
-            self._state, self._why = LiveState.LOST, "the motion does not fit the specimen's numbers"
+            self._state, self._why = LiveState.LOST, "the motion does not fit the specimen model"
             self._wait_longer()
         self._states[begin : begin + kept] = run.states[:kept]
         self._squares.append(_clipped_innovations(run))
@@ -425,8 +425,8 @@ class LiveTwin:
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             sentences.append(
-                f"The specimen is not what it was, at {time_s:.1f} s: what is measured no longer fits its "
-                f"numbers (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
+                f"The specimen has changed at {time_s:.1f} s: the measured motion no longer fits its "
+                f"parameters (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )
             # Drop a running search, because it uses samples from before the change.

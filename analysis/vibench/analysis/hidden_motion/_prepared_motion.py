@@ -157,15 +157,15 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
 def _require_rate(sample_rate_hz: float) -> None:
     if not sample_rate_hz >= LOWEST_RATE_HZ:
         raise UnusableData(
-            f"the motion was sampled at {sample_rate_hz:g} Hz, and impacts are visible only from "
-            f"{LOWEST_RATE_HZ:g} Hz on; measure at a higher rate to follow the hidden motion"
+            f"the motion was sampled at {sample_rate_hz:g} Hz, but impacts are visible only from "
+            f"{LOWEST_RATE_HZ:g} Hz on; measure at a higher rate to track the hidden motion"
         )
 
 
 def _require_length(samples: int, sample_rate_hz: float) -> None:
     if samples < _SEGMENT:
         raise NotEnoughData(
-            f"{max(samples, 0) / sample_rate_hz:.3g} s are too little to follow the hidden motion in; "
+            f"{max(samples, 0) / sample_rate_hz:.3g} s are too short to track the hidden motion; "
             f"{_SEGMENT / sample_rate_hz:.2g} s are needed"
         )
 
@@ -177,8 +177,8 @@ def _lost_samples(acceleration: Reals, velocity: Reals) -> int:
 def _require_finite(lost: int) -> None:
     if lost:
         raise UnusableData(
-            f"{lost} samples were lost or are not finite, and a motion cannot be followed across a hole; "
-            "choose a stretch without one, or measure again"
+            f"{lost} samples were lost or are not finite, but motion can be tracked only without gaps in "
+            "the samples; choose a part without lost samples, or measure again"
         )
 
 
@@ -188,7 +188,7 @@ def require_channels(name: str, roles: Collection[str]) -> None:
     if missing:
         raise UnusableData(
             f"{name} has no channel {' and no channel '.join(missing)}; hidden motion needs {BASE} and "
-            f"{RESPONSE}, whose noise is white: measure m0 with a vibrometer"
+            f"{RESPONSE} with white noise: measure m0 with a vibrometer"
         )
 
 

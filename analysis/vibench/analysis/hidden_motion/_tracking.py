@@ -72,16 +72,16 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
     """Start a track in the middle third of the 60 ms after a sample; return the reason if this fails."""
     count = min(round(ACQUISITION_S * motion.sample_rate_hz), motion.samples - 1 - first)
     if count < round(ACQUISITION_S * motion.sample_rate_hz):
-        return f"fewer than {1e3 * ACQUISITION_S:.0f} ms of motion were left to begin a track with"
+        return f"fewer than {1e3 * ACQUISITION_S:.0f} ms of motion were left to begin a track"
     found = latent_motion(model, motion, first, count)
     if not found.misfit < _WORST_MISFIT:
         return (
-            f"the specimen's equations leave over {_WORST_MISFIT:g} times what the channels' noise explains, "
-            "even with an unknown contact force"
+            f"the residual of the specimen's equations is over {_WORST_MISFIT:g} times the noise of the "
+            "channels, even with a free contact force"
         )
     begin = _calmest(model, found.smoothed, found.is_open, motion.sample_rate_hz)
     if begin is None:
-        return "no flight between two impacts was determined well enough to begin a track"
+        return "no motion between two impacts was determined well enough to begin a track"
     ahead = smooth(model.without_stops, found.run.samples(begin), found.force_variance[begin:])
     return FilterState(ahead.first, ahead.states[0].copy(), _ACQUIRED_EXCESS * ahead.first_covariance)
 
@@ -125,7 +125,7 @@ def follow(
                 pieces = _pieces(model, motion, start) if is_caught_up else iter(())
                 piece = next(pieces, None)
                 if began > done:
-                    why = "a track was being begun" if piece else "a track was lost as soon as it was begun"
+                    why = "a track was being acquired" if piece else "a track was lost at its beginning"
                     yield NotFollowed(done, began, why)
                     done = began
                 while piece:
@@ -138,7 +138,7 @@ def follow(
         looked = last if looked < last < following else following
         on_sample(done)
     if done < motion.samples:
-        yield NotFollowed(done, motion.samples, "too little was left to begin a track with")
+        yield NotFollowed(done, motion.samples, "too few samples were left to begin a track")
 
 
 def _advance_to(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:

@@ -48,7 +48,7 @@ def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
         case RigidStops() | PowerLaw():
             raise InvalidRequest(
                 f"stops of the kind {specimen.contact.kind!r} cannot be tracked: the filter needs a "
-                "force that depends on how far a stop is pressed in; describe the contact as hertz, "
+                "contact force that depends on the penetration; describe the contact as hertz, "
                 "hunt_crossley:LOSS, linear_gap or linear"
             )
         case _:
