@@ -141,13 +141,13 @@ def without_plan(file):
         (newer, "format version 99; this vibench reads version 1. Update"),
         (
             renamed,
-            "no channel shows the motion of m0: the recording has drive_voltage, base_acceleration, laser",
+            "no channel measures the motion of m0: the recording has drive_voltage, base_acceleration, laser",
         ),
         (
             without_scale,
             "physical_per_volt of the channel 'm0_velocity': input should be a finite number; it is 'nan'",
         ),
-        (without_plan, "the plan in changed.h5 is not one this version of vibench can read"),
+        (without_plan, "this version of vibench cannot read the plan in changed.h5"),
     ],
 )
 def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, change, said):
@@ -157,17 +157,17 @@ def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, chan
 def test_dead_clipped_and_lost_channels_are_named_in_a_sentence(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
-    assert "m0_velocity holds the same value throughout" in sentence(dead)
+    assert "all samples of m0_velocity have the same value" in sentence(dead)
     still = synthetic.Motion(base.displacement_m, 0 * base.acceleration)
     deaf = synthetic.write_recording(tmp_path, plan, still, velocity, parts, name="deaf")
-    assert "base_acceleration holds the same value throughout" in sentence(deaf)
+    assert "all samples of base_acceleration have the same value" in sentence(deaf)
     clipped = np.clip(1e4 * velocity, -1.0, 1.0)
     cut = synthetic.write_recording(tmp_path, plan, base, clipped, parts, name="clipped")
-    assert "m0_velocity lay at its full scale of 1 m s-1 for" in sentence(cut)
+    assert "m0_velocity was at its full scale of 1 m s-1 for" in sentence(cut)
     lost = synthetic.write_recording(
         tmp_path, plan, base, velocity, parts, name="lost", hole=(0, velocity.size)
     )
-    assert "holds no samples" in sentence(lost)
+    assert "contains no samples" in sentence(lost)
 
 
 def test_a_sine_at_full_scale_is_analysed(tmp_path):

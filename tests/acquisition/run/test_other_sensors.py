@@ -271,7 +271,7 @@ def test_a_force_response_of_a_sine_is_refused(tmp_path):
     assert other_responses([path]) == {}
     with pytest.raises(UnusableData, match="base_force has results of noise only"):
         analyse(path, response="base_force")
-    with pytest.raises(UnusableData, match=r"drive_voltage is not a channel that shows .* a mass or a force"):
+    with pytest.raises(UnusableData, match=r"drive_voltage does not measure .* a mass or a force"):
         analyse(path, response="drive_voltage")
 
 

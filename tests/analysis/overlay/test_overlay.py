@@ -61,7 +61,7 @@ def test_disagreements_with_the_twin_are_stated_first(sweep_file):
     odd = replace(fine[0], name="odd", measured=1.01 * one)
     found = replace(overlay, ensemble=(*fine, odd)).agreement
     assert found[0] == "1 of 4 quantities disagree with the twin: odd"
-    assert found[1].startswith("odd 1.01 is not the twin's")
+    assert found[1].startswith("odd 1.01 differs from the twin's")
     assert len(found) == 5
     assert replace(overlay, ensemble=tuple(fine)).agreement[0].startswith("fine a")
 

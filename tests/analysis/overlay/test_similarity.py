@@ -93,7 +93,7 @@ def test_similarity_interpolates_and_never_extrapolates():
 @pytest.mark.parametrize(
     ("frequencies", "responses", "amplitude_m", "complaint"),
     [
-        ([1.0, 2.0], [1.0], 1e-6, "equally long"),
+        ([1.0, 2.0], [1.0], 1e-6, "equal length"),
         ([2.0, 1.0], [1.0, 1.0], 1e-6, "ascend"),
         ([1.0], [1.0], 0.0, "positive"),
     ],

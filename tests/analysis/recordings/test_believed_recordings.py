@@ -45,7 +45,7 @@ def test_a_small_file_that_declares_a_huge_data_size_is_refused(dwell_file, tmp_
     packed_wave(path)
     with (
         open_recording(path) as recording,
-        pytest.raises(UnusableData, match="no converter gives what can be"),
+        pytest.raises(UnusableData, match="data of a converter do not allow"),
     ):
         analyse(recording)
 

@@ -54,7 +54,7 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     ``c * n // columns``, as in `column_starts`.
     """
     if columns < 1:
-        raise InvalidRequest(f"{columns} columns were requested; a picture has 1 or more")
+        raise InvalidRequest(f"{columns} columns were requested; a picture needs 1 or more")
     count = samples.shape[-1]
     if count <= columns:
         return samples, samples
@@ -249,7 +249,7 @@ class RecordingOverview:
         if not (begin < end and columns >= 1 and roles):
             raise InvalidRequest(
                 f"samples {start} to {stop} of {len(roles)} channels in {columns} columns were requested; "
-                f"{self.recording.path.name} has samples 0 to {self.recording.samples}"
+                f"give at least one of each; {self.recording.path.name} has {self.recording.samples} samples"
             )
         wanted = (end - begin) / columns
         if wanted < BIN_SAMPLES:

@@ -34,7 +34,7 @@ class Ring:
     def __init__(self, channels: int, capacity: int) -> None:
         if channels < 1 or capacity < 1:
             raise InvalidRequest(
-                f"a ring of {channels} channels and {capacity} samples was requested; both are 1 or more"
+                f"a ring of {channels} channels and {capacity} samples was requested; give 1 or more of each"
             )
         self._capacity = capacity
         self._values: Values = np.full((channels, 2 * capacity), np.nan, dtype=np.float32)

@@ -71,7 +71,7 @@ def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Rea
     half = max(2, int(0.5 * frequency_hz * drive.size / sample_rate_hz))
     if half < _LEAST_LINE:
         raise NotEnoughData(
-            f"{drive.size / sample_rate_hz:.3g} s hold too few periods of {frequency_hz:.3g} Hz; look at more"
+            f"{drive.size / sample_rate_hz:.3g} s contain too few periods of {frequency_hz:.3g} Hz; show more"
         )
     spectrum = fft.rfft((drive - np.mean(drive)) * _hann(drive.size))
     middle = round(frequency_hz * drive.size / sample_rate_hz)

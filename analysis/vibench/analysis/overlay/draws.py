@@ -96,8 +96,8 @@ _MEDIAN_SD = 1.44
 _HANN_LINES = 1.5
 """Lines of a Hann-windowed spectrum per statistically independent line."""
 UNKNOWN_NOISE = (
-    "The noise of the amplifier is unknown, because neither its voltage nor the silence of a bench check was "
-    "recorded; limits of a weak motion may be too narrow"
+    "The noise of the amplifier is unknown, because neither its voltage nor a silence in a bench check was "
+    "recorded; bands of simulated weak motion may be too narrow"
 )
 
 
@@ -547,7 +547,7 @@ def stretch_draws(
     """
     if VELOCITY not in recording.roles:
         raise UnusableData(
-            f"statistics of irregular motion need the white noise of the channel {VELOCITY}, and the "
+            f"statistics of irregular motion need the channel {VELOCITY}, whose noise is white; this "
             f"recording has {', '.join(recording.roles)}; measure with a vibrometer"
         )
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)

@@ -70,9 +70,9 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
     if shaker is None:
         if rig is None:
             raise UnusableData(
-                "what the recording says of its bench describes no shaker, so that its voltage moves no "
-                "simulated table; record with a whole bench configuration, or analyse it together with weak "
-                "noise of the same rig, to which a shaker can be fitted"
+                "the bench in the recording describes no shaker, so the recorded voltage cannot be "
+                "simulated; record with a complete bench configuration, or analyse the recording together "
+                "with weak noise of the same rig, to which a shaker can be fitted"
             )
         shaker = shaker_of(rig)
     base, m0 = (recording.channel(each) for each in (BASE, response))
@@ -126,7 +126,7 @@ def recorded_voltage(recording: Recording, rig: DrivenRig, start: int = 0, stop:
     lost = int(np.count_nonzero(np.isnan(volts)))
     if lost:
         raise UnusableData(
-            f"{lost} samples of the {rig.driven.value.removeprefix('recorded ')} were lost, and a motion "
-            "cannot be followed across a hole; the measured result stands without a simulation of it"
+            f"{lost} samples of the {rig.driven.value.removeprefix('recorded ')} were lost, so the motion "
+            "cannot be simulated; the measured result remains valid"
         )
     return volts

@@ -162,7 +162,7 @@ class EnsembleCurve(Labelled):
             return f"{self.name}: too few draws of the measured kind of motion to compare"
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
-            agrees = "agrees with" if self.agrees else "is not"
+            agrees = "agrees with" if self.agrees else "differs from"
             # If the band alone does not show the verdict, state the limit.
             limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
             return (
@@ -376,9 +376,9 @@ class EscapeRate:
         """Rate and bounds in words."""
         low, high = self.bounds_per_s
         return (
-            f"The end of {self.what} is a draw of chance: it came in {self.ends} of {self.runs} runs, the "
-            f"measured one among them, at a rate of {self.per_s:.2g} per second ({low:.2g} to {high:.2g}) "
-            f"once the first had ended"
+            f"The end of {self.what} is random: it came in {self.ends} of {self.runs} runs, including the "
+            f"measured one; after the first end, the rate was {self.per_s:.2g} per second ({low:.2g} to "
+            f"{high:.2g})"
         )
 
 

@@ -81,8 +81,8 @@ def fit_shaker(
     lines = int(np.sum(known))
     if lines < FEWEST_LINES:
         raise UnusableData(
-            f"{analysis.facts.name} has {lines} lines at which the base follows the voltage; a shaker needs "
-            f"{FEWEST_LINES}"
+            f"{analysis.facts.name} has {lines} lines at which the base follows the voltage; a fit of the "
+            f"shaker needs {FEWEST_LINES}"
         )
     frequency_hz = found.frequency_hz[known]
     s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
@@ -100,8 +100,8 @@ def fit_shaker(
     chi2 = float(2 * best.cost / degrees)
     if chi2 > LARGEST_CHI2:
         raise UnusableData(
-            f"no shaker explains how the base of {analysis.facts.name} follows the voltage (chi² {chi2:.3g} "
-            f"per degree of freedom, at most {LARGEST_CHI2:g} is allowed): it may collide; give weaker noise"
+            f"no shaker explains the base motion under the voltage in {analysis.facts.name} (chi² {chi2:.3g} "
+            f"per degree of freedom, at most {LARGEST_CHI2:g}): masses may collide; choose weaker noise"
         )
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * max(chi2, 1.0)
     return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)

@@ -42,11 +42,11 @@ class SimilarityCurve:
     def __post_init__(self) -> None:
         if self.frequency_hz.ndim != 1 or self.frequency_hz.shape != self.response.shape:
             raise InvalidRequest(
-                f"a curve has {self.frequency_hz.shape} frequencies and {self.response.shape} responses; "
-                "give one row of each, equally long"
+                f"frequencies of shape {self.frequency_hz.shape} and responses of {self.response.shape} were "
+                "given; give one-dimensional arrays of equal length"
             )
         if not np.all(np.diff(self.frequency_hz) > 0):
-            raise InvalidRequest("the frequencies of a curve do not ascend; sort them, and keep each once")
+            raise InvalidRequest("the frequencies of a curve do not ascend; sort them, and remove duplicates")
         if not 0.0 < self.amplitude_m < np.inf:
             raise InvalidRequest(
                 f"a drive amplitude of {self.amplitude_m} m is not allowed; give a positive one"
@@ -60,8 +60,8 @@ class SimilarityCurve:
         low, high = self.frequency_hz[0], self.frequency_hz[-1]
         if frequency_hz[0] < low or frequency_hz[-1] > high:
             raise InvalidRequest(
-                f"{frequency_hz[0]:g} to {frequency_hz[-1]:g} Hz was requested, but the curve holds only "
-                f"{low:g} to {high:g} Hz; compare within it"
+                f"{frequency_hz[0]:g} to {frequency_hz[-1]:g} Hz was requested, but the curve covers only "
+                f"{low:g} to {high:g} Hz; compare within this range"
             )
         between = np.interp(np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.response))
         return SimilarityCurve(frequency_hz, np.exp(between), self.amplitude_m)
@@ -130,7 +130,7 @@ def similarity(
     """
     if not np.array_equal(reference.frequency_hz, model.frequency_hz):
         raise InvalidRequest(
-            "the two curves have different frequencies; bring one to the other's with Curve.at"
+            "the two curves have different frequencies; interpolate one at those of the other with Curve.at"
         )
     if not threshold > 0.0:
         raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive one, such as 0.1")

@@ -47,8 +47,8 @@ def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reco
     lost = int(np.count_nonzero(np.isnan(acceleration)))
     if lost:
         raise UnusableData(
-            f"{lost} samples of the base's acceleration were lost, and a displacement cannot be followed "
-            "across a hole; the measured result stands without a simulation of it"
+            f"{lost} samples of the base's acceleration were lost, so the base displacement is unknown and "
+            "the motion cannot be simulated; the measured result remains valid"
         )
     rate = recording.sample_rate_hz
     low_hz, high_hz = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
@@ -192,7 +192,7 @@ def shaken(
         path = follow_samples(specimen, part, accuracy, state, first=before, last=before + last - first)
         if not path.reached_end:
             raise UnusableData(
-                f"the simulation under the recorded base motion became meaningless after "
+                f"the simulation under the recorded base motion failed after "
                 f"{(first + len(path.states)) / sample_rate_hz:.3g} s: the base moves too much"
             )
         velocity[first : last + 1] = path.states[:, _VX]

@@ -49,9 +49,9 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     powers = [isinstance(law, PowerLaw) for law in laws]
     shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
     longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
-    on_top = "; the exponent about doubles that" if request.exponent is Exponent.COMPUTED else ""
+    on_top = "; about twice as long with the exponent" if request.exponent is Exponent.COMPUTED else ""
     if request.budget_s > 0.0:
-        on_top += f"; a point sensitive to its start takes up to {request.budget_s:g} s of a core more"
+        on_top += f"; a point sensitive to its start takes up to {request.budget_s:g} core seconds more"
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
     shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
     return (
@@ -60,12 +60,12 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
             f"{shortest} without impacts to {longest} in chaos{on_top}."
         ),
         (
-            f"A second simulates {level.free:.0f} s without impacts, {level.periodic:.0f} s of impacts that "
-            f"repeat, {level.chaos:.0f} s of chaos, {level.power:.0f} s of a power law."
+            f"One core second simulates {level.free:.0f} s without impacts, {level.periodic:.0f} s of "
+            f"periodic impacts, {level.chaos:.0f} s of chaos, {level.power:.0f} s of a power law."
         ),
         (
-            f"Error of a periodic state {level.state_error:.0e}, of Response I against reference {error}; "
-            f"in chaos Response I scatters by {CHAOS_SCATTER:.0%} at every level."
+            f"Error of a periodic state: {level.state_error:.0e}; of Response I, relative to reference: "
+            f"{error}. In chaos, Response I scatters by {CHAOS_SCATTER:.0%} at every accuracy."
         ),
         f"Measured on {MACHINE}.",
     )

@@ -81,7 +81,7 @@ class MapRequest(SpecimenChoice):
         cells = self.columns * self.rows * (1 + self.random_starts)
         if cells > MOST_CELLS:
             raise ValueError(
-                f"{cells} points are too many for a window: at most {MOST_CELLS}; see vibench map"
+                f"{cells} points are too many for the window (at most {MOST_CELLS}); use vibench map"
             )
         self.plan  # noqa: B018 - making it is the check
         return self
@@ -335,7 +335,7 @@ class SimulationRequest(SpecimenChoice):
         if points > MOST_POINTS:
             raise ValueError(
                 f"{points} points were requested; at most {MOST_POINTS} are simulated here: "
-                "take a larger step, or a study file"
+                "choose a larger step, or use a study file"
             )
         self.study  # noqa: B018 - making it is the check
         return self

@@ -59,7 +59,7 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
     if recording.samples == 0:
         why = f": {recording.reason}" if recording.reason else ""
         raise NotEnoughData(
-            f"{recording.path.name} holds no samples ({recording.state.value}{why}); "
+            f"{recording.path.name} contains no samples ({recording.state.value}{why}); "
             "there is nothing to analyse"
         )
     length = max(1, -(-recording.samples // DEFAULT_BINS))
@@ -196,12 +196,12 @@ def _faults(level: ChannelLevel) -> Iterator[str]:
     role = level.header.role
     if level.span == 0:
         yield (
-            f"{role} holds the same value throughout, so its sensor or its cable gave nothing; "
-            "check it and measure again"
+            f"all samples of {role} have the same value, so its sensor or its cable gave no signal; "
+            "check both and measure again"
         )
     elif level.share_at_full_scale > _CLIPPED_SHARE:
         yield (
-            f"{role} lay at its full scale of {level.full_scale:.3g} {level.header.unit} for "
-            f"{100 * level.share_at_full_scale:.0f} % of the time, so its waveform is cut off throughout; "
+            f"{role} was at its full scale of {level.full_scale:.3g} {level.header.unit} for "
+            f"{100 * level.share_at_full_scale:.0f} % of the time, so its waveform is clipped; "
             "choose a larger range or a smaller drive and measure again"
         )

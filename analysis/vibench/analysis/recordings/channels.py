@@ -248,7 +248,7 @@ def read_whole(channels: Channels, stretch: Stretch) -> Reals:
     lost = int(np.count_nonzero(np.isnan(data[0])))
     if lost:
         raise UnusableData(
-            f"{lost} of {stretch.samples} samples were lost inside this stretch, and its motion cannot be "
-            "followed across a hole; measure again"
+            f"{lost} of {stretch.samples} samples were lost in this part, so its motion cannot be analysed; "
+            "measure again"
         )
     return data

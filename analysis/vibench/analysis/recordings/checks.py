@@ -103,10 +103,10 @@ def _seal(facts: RecordingFacts) -> Check:
 def _stretches(facts: RecordingFacts) -> Check:
     text = f"{facts.whole_stretches} of {facts.planned_stretches} planned parts were recorded whole"
     if facts.whole_stretches > facts.planned_stretches:
-        text = f"{facts.whole_stretches} parts were recorded whole; feedback decided how many"
+        text = f"{facts.whole_stretches} parts were recorded whole; feedback determined their number"
     whole = facts.whole_stretches >= facts.planned_stretches
     if not whole and facts.measurement.until is not None and facts.state is RecordingState.COMPLETE:
-        return Check("Parts", Verdict.PASSED, f"{text}; then results were known well enough")
+        return Check("Parts", Verdict.PASSED, f"{text}; then the results were accurate enough")
     return Check("Parts", Verdict.PASSED if whole else Verdict.WARNING, text)
 
 
@@ -132,7 +132,7 @@ def _overloads(facts: RecordingFacts) -> Check:
     what = "peaks may be cut, so Response I is a lower bound and Response II may be wrong"
     if facts.dropouts and facts.response in facts.overload_s:
         what = (
-            "the vibrometer lost its light for longer than is bridged, or peaks were cut: look at the "
+            "the vibrometer lost its light for longer than can be bridged, or peaks were cut: check the "
             "velocity there, and do not trust Response I"
         )
     return Check("Overloads", Verdict.WARNING, f"near full scale: {', '.join(parts)}; {what}")
@@ -142,9 +142,9 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
     if facts.dropouts:
         times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
         text = (
-            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in all; the motion was "
-            "bridged there from both sides, which misses what impacts did there. Refocus the laser, or stick "
-            "on reflective tape"
+            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in total; the motion there "
+            "was interpolated, which misses effects of impacts. Refocus the laser, or apply "
+            "reflective tape"
         )
         often = facts.dropout_s > _OFTEN_DARK * facts.duration_s
         yield Check("Drop-outs", Verdict.WARNING if often else Verdict.NOTE, text)
@@ -153,7 +153,7 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
 def _lost_samples_check(facts: RecordingFacts) -> Check:
     if facts.lost_samples == 0:
         return Check("Lost samples", Verdict.PASSED, "none")
-    text = f"{facts.lost_samples} samples were lost; what touches them is left out"
+    text = f"{facts.lost_samples} samples were lost; segments that contain them are left out"
     return Check("Lost samples", Verdict.WARNING, text)
 
 
@@ -162,7 +162,7 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
     reached_v = facts.level(DRIVE).peak
     text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"
     if reached_v < _least_peak_v(facts):
-        text += "; the drive was quieter than its plan: levels are those recorded, not those planned"
+        text += "; the drive was weaker than planned: results refer to the recorded levels"
         yield Check("Drive level", Verdict.WARNING, text)
         return
     is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
@@ -190,7 +190,7 @@ def _least_peak_v(facts: RecordingFacts) -> float:
 
 def _late(facts: RecordingFacts) -> Iterator[Check]:
     if facts.late:
-        text = f"{facts.late[0]}; {len(facts.late)} such {'moment' if len(facts.late) == 1 else 'moments'}"
+        text = f"{facts.late[0]}; {len(facts.late)} such {'event' if len(facts.late) == 1 else 'events'}"
         yield Check("Timing of the drive", Verdict.WARNING, text)
 
 
@@ -219,20 +219,20 @@ def _calibrations(facts: RecordingFacts) -> Check:
     measured = date.fromisoformat(facts.started_utc[:10])
     dated = [each.header for each in facts.channels if each.header.calibration_date]
     if not dated or not valid_days:
-        return Check("Calibration", Verdict.NOTE, "the recording names no calibration dates")
+        return Check("Calibration", Verdict.NOTE, "the recording contains no calibration dates")
     ages = {each.role: (measured - date.fromisoformat(each.calibration_date)).days for each in dated}
     later = [f"{each.role} ({each.calibration_date})" for each in dated if ages[each.role] < 0]
     if later:
-        text = f"dated after the measurement, on {measured}: {', '.join(later)}; look at the certificates"
+        text = f"dated after the measurement on {measured}: {', '.join(later)}; check the certificates"
         return Check("Calibration", Verdict.WARNING, text)
     stale = [f"{role} ({days} days)" for role, days in ages.items() if days > valid_days]
     if stale:
-        text = f"run out on the day of the measurement: {', '.join(stale)}; {valid_days} days are allowed"
+        text = f"expired on the day of the measurement: {', '.join(stale)}; {valid_days} days are allowed"
         return Check("Calibration", Verdict.WARNING, text)
     return Check("Calibration", Verdict.PASSED, f"all channels within {valid_days} days")
 
 
 def _bench_check(facts: RecordingFacts) -> Check:
     if not facts.check:
-        return Check("Bench check", Verdict.NOTE, "the recording holds no check of the bench")
+        return Check("Bench check", Verdict.NOTE, "the recording contains no check of the bench")
     return Check("Bench check", Verdict.PASSED, facts.check)

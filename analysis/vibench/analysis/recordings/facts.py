@@ -48,9 +48,9 @@ def require_measured_size(recording: Recording) -> None:
     """
     if recording.samples * BYTES_A_SAMPLE > MOST_BYTES and recording.packing > LARGEST_PACKING:
         raise UnusableData(
-            f"{recording.path.name} declares {recording.samples} samples, and holds them in one part of "
-            f"{recording.packing:.0f}: no converter gives what can be packed so. Nothing was read; if it was "
-            "computed and is meant so, read it with h5py, or export some seconds of it (--from, --until)"
+            f"{recording.path.name} declares {recording.samples} samples, compressed {recording.packing:.0f} "
+            "times, which data of a converter do not allow. Nothing was read; if the data were computed, "
+            "read them with h5py, or export some seconds (--from, --until)"
         )
 
 
@@ -68,7 +68,7 @@ def require_intact(recording: Recording) -> SealCheck:
     found = recording.check_seal(SealDepth.WHOLE)
     if found.state is SealState.DAMAGED:
         raise UnusableData(
-            f"{recording.path.name} is damaged ({found.sentence}), so no number of it can be trusted; "
+            f"{recording.path.name} is damaged ({found.sentence}), so its data cannot be trusted; "
             "restore it from a copy, or measure again"
         )
     return found
@@ -188,7 +188,7 @@ def _require_band(recording: Recording, measurement: Measurement, response: str)
     low_hz = measurement.excitation.band_hz[0]
     if response.endswith(ACCELERATION) and low_hz < LOWEST_INTEGRATED_HZ:
         raise UnusableData(
-            f"{recording.path.name}: the plan reaches down to {low_hz:g} Hz, and {response} is integrated "
+            f"{recording.path.name}: the plan starts at {low_hz:g} Hz, but {response} can be integrated only "
             f"from {LOWEST_INTEGRATED_HZ:g} Hz on; measure a velocity or displacement"
         )
 
@@ -209,7 +209,7 @@ def plan_of(recording: Recording) -> Measurement:
             raise UnusableData(f"{recording.path.name}: {fault_in_words(first)}") from error
         place = ".".join(str(part) for part in first["loc"])
         raise UnusableData(
-            f"the plan in {recording.path.name} is not one this version of vibench can read "
+            f"this version of vibench cannot read the plan in {recording.path.name} "
             f"({place or 'plan'}: {first['msg']}); read the samples with h5py, or update vibench"
         ) from error
 
@@ -236,8 +236,8 @@ def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
     except ValidationError as error:
         first = error.errors()[0]
         raise UnusableData(
-            f"the specimen that the recording describes is not allowed ({'.'.join(map(str, first['loc']))}: "
-            f"{first['msg']}); its samples can be read with h5py"
+            f"the specimen described in the recording is not valid ({'.'.join(map(str, first['loc']))}: "
+            f"{first['msg']}); the samples can be read with h5py"
         ) from error
 
 
@@ -291,6 +291,6 @@ def _require_bench(recording: Recording) -> None:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise UnusableData(
-            f"what {recording.path.name} says of its bench cannot be read ({place}: {first['msg']}); "
+            f"the bench description in {recording.path.name} cannot be read ({place}: {first['msg']}); "
             "read the samples with h5py, or update vibench"
         ) from error

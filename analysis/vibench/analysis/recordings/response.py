@@ -103,12 +103,12 @@ class ResponseChannel:
         shown = (*response_roles(self.recording), *force_roles(self.recording))
         if self.response is not None and self.response not in shown:
             raise UnusableData(
-                f"{self.response} is not a channel that shows the motion of a mass or a force; the recording "
-                f"has {', '.join(shown) or 'none'}"
+                f"channel {self.response} does not measure the motion of a mass or a force; such channels of "
+                f"the recording: {', '.join(shown) or 'none'}"
             )
         if found is None:
             raise UnusableData(
-                f"no channel shows the motion of m0: the recording has {', '.join(self.recording.roles)}; "
+                f"no channel measures the motion of m0: the recording has {', '.join(self.recording.roles)}; "
                 f"an analysis needs one of {', '.join(RESPONSE_ROLES)}"
             )
         self.role, self.quantity = found, _quantity(found)

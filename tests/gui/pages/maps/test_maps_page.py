@@ -98,7 +98,7 @@ def test_a_recorded_level_is_drawn_on_the_map_as_a_line(page):
 def test_too_large_a_map_is_refused_with_an_explanation(page):
     page.form.form.show_content({**SMALL, "columns": 900, "rows": 900})
     assert not page._begin.isEnabled()
-    assert "810000 points are too many for a window" in page.form.complaint
+    assert "810000 points are too many for the window" in page.form.complaint
 
 
 def test_the_page_follows_the_dark_theme(page):
