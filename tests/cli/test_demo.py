@@ -166,7 +166,7 @@ def test_the_demo_report_begins_with_the_three_findings_of_the_paper(demo, resul
         for name in ("noise_weak", "noise_strong")
     )
     assert f"At 0.05 Vpp there are three resonances, {linear} Hz." in page.findings
-    assert f"At 10 Vpp they are gone and two others appear at {terminal} Hz." in page.findings
+    assert f"At 10 Vpp they disappear, and two new ones appear at {terminal} Hz." in page.findings
     assert results["dwell_moderate"]["measured"]["motion"]["kind"] == "chaotic"
     levels = {"dwell_weak": "0.05", "dwell_moderate": "1.5", "dwell_strong": "10"}
     kinds = {name: results[name]["measured"]["motion"]["kind"] for name in levels}

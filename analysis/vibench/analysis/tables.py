@@ -125,7 +125,7 @@ def _document(value: Any) -> Any:
             keys = getattr(value, "DOCUMENT", "") or " ".join(each.name for each in fields(value))
             return plain(columns(value, keys))
         case _:
-            raise TypeError(f"{type(value).__name__} has no place in a document; turn it into numbers first")
+            raise TypeError(f"{type(value).__name__} cannot be stored in a document; convert it to numbers")
 
 
 def _cells(values: ArrayLike) -> tuple[float | str, ...]:

@@ -58,10 +58,10 @@ def test_a_report_overlays_branches_and_states_level_differences(diagram, steppe
     assert sum(len(each.get_xdata()) for each in measured) == len(
         results.results[0].analysis.response.frequency_hz
     )
-    assert "moved 1 to 1 times as far" in drawn.caption
+    assert "is 1 to 1 times that of" in drawn.caption
     half = BranchRequest(amplitude_m=1.0, start=diagram.request.start, stop=diagram.request.stop)
     (other,) = draw_branches(results, [BranchDiagram(half, diagram.lines, 1.0)])
-    assert "moved 1 to 1 times" not in other.caption
+    assert "is 1 to 1 times" not in other.caption
     page = write_report(results, tmp_path / "report.html", diagrams=[diagram]).read_text("utf-8")
     assert "Branches: hertz, recorded level, shooting" in page
 

@@ -115,7 +115,7 @@ def test_a_folder_without_a_scan_is_refused(folder, tmp_path):
     run = CliRunner().invoke(app, ["export", str(folder), "--to", "csv"])
     assert "The folder of a scan is exported by --to uff --spectra" in str(run.exception)
     run = CliRunner().invoke(app, ["export", str(tmp_path), "--to", "uff", "--spectra"])
-    assert "holds no recording" in str(run.exception)
+    assert "contains no recording" in str(run.exception)
 
 
 def test_a_single_scan_point_is_exported_with_its_node(folder, tmp_path):
@@ -130,7 +130,7 @@ def test_a_single_scan_point_is_exported_with_its_node(folder, tmp_path):
 
 def test_comparisons_and_fits_use_only_scan_points_on_m0(folder, results):
     with pytest.raises(
-        UnusableData, match=r"noise-m2.h5 is a point of a scan on m2, and comparisons show m0"
+        UnusableData, match=r"noise-m2.h5 is a point of a scan on m2, but comparisons show m0"
     ):
         compare_recording(folder / "noise-m2.h5", FrequencyResponseRequest(), Simulation.LEFT_OUT)
     others = replace(

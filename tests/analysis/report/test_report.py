@@ -67,7 +67,7 @@ def test_a_report_contains_the_numbers_of_its_results(page, campaign):
         for budget in budgets_of(dwell):
             assert budget.text.strip("()").split(")")[0] in page.text
     assert "not stated" in page.text
-    assert "Uncertainty, and what it is made of" in page.text
+    assert "Contributions to the uncertainty" in page.text
 
 
 def test_a_report_begins_with_findings_figure_and_table_before_cards(page, campaign):
@@ -89,9 +89,9 @@ def test_a_report_is_short_with_all_folds_closed_and_its_captions_have_three_lin
 
 def test_folded_sections_contain_statistics_checks_and_settings(page, campaign):
     facts = (
-        "Uncertainty, and what it is made of", "Resonances of the transmission", "Checks", "How it ended",
+        "Contributions to the uncertainty", "Resonances of the transmission", "Checks", "How it ended",
         "impacts per second", "median difference", "independent averages", "Estimator",
-        "coherence", "Where the masses collide in a sweep", "Dwells: responses over the last seconds",
+        "coherence", "Frequencies with collisions in a sweep", "Dwells: responses over the last seconds",
         "noise bias of I",
         "Dwells: lines of the displacement", "Channels", "sensitivity", "Versions that made the recordings",
         "half cosine", "samples/s", "crest factor", "of its range", "Phase portraits", "Orders of a sweep",
@@ -161,13 +161,13 @@ def test_a_report_of_one_recording_uses_the_singular(dwell_file, tmp_path):
     path = write_report(results, tmp_path / "one.html")
     page = Page(path.read_text(encoding="utf-8"))
     assert "Report of 1 recording. This recording comes from simulated instruments." in page.text
-    assert "simulation takes the damping" not in page.text
+    assert "simulation assumes damping" not in page.text
 
 
 def test_an_empty_report_is_refused(tmp_path):
     with pytest.raises(NotEnoughData, match="give the paths"):
         analyse_files([], "empty")
-    with pytest.raises(NotEnoughData, match="holds no recording"):
+    with pytest.raises(NotEnoughData, match="contains no recording"):
         recordings_in(tmp_path)
 
 

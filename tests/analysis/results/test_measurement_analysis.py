@@ -141,7 +141,7 @@ def test_a_drive_at_another_frequency_than_the_plan_is_reported():
     assert frequency_check(np.array([100.005, 299.99]), planned_hz).verdict is Verdict.PASSED
     told = frequency_check(np.array([100.0, 260.0]), planned_hz)
     assert told.verdict is Verdict.WARNING
-    assert "at 260 Hz, which the plan does not have; nearest is 300 Hz" in told.text
+    assert "at 260 Hz, which is not in the plan (nearest planned frequency: 300 Hz" in told.text
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def test_recorded_steps_are_counted_by_kind_of_motion():
     said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
     assert said == [
         "Of 4 recorded motions, by kind: period 3: 2, no period: 1.",
-        "The base level was out of tolerance in 1 of them.",
+        "The base level was out of tolerance in 1 of 4 recorded motions.",
     ]
 
 

@@ -94,7 +94,7 @@ def test_a_subharmonic_resonance_is_named_and_drawn_by_its_amplitude():
     [
         (101.0, "by +1.000 ± 0.085 Hz: the mode hardens."),
         (99.0, "by -1.000 ± 0.085 Hz: the mode softens."),
-        (100.05, "neither softening nor hardening is seen."),
+        (100.05, "neither softening nor hardening is significant."),
     ],
 )
 def test_softening_or_hardening_is_stated_only_beyond_the_uncertainty(strong_hz, said):

@@ -212,7 +212,7 @@ def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, 
             assert part.relative is None or 0.0 <= part.relative < np.inf
         assert "nan" not in budget.sentence.partition("(k =")[2]
     if sd < 0:
-        with pytest.raises(ValueError, match="never negative"):
+        with pytest.raises(ValueError, match="not negative"):
             Contribution(Cause.NOISE, sd, "a bias, by mistake")
 
 

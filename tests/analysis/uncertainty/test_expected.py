@@ -100,7 +100,7 @@ def test_response_i_of_a_weak_dwell_has_no_expected_uncertainty():
     """A recording of it has 0.7 % where the sensors' noise, averaged over the window, makes 0.002 %."""
     first, second = expected_uncertainty(dwell(260, 0.05), RIG)
     assert first.after(5.0) is None
-    assert "Response I: not known beforehand, for noise in the motion raises" in first.sentence
+    assert "Response I: not known beforehand, because noise in the motion raises" in first.sentence
     assert 1e-6 < second.after(5.0) < 1e-3
 
 
@@ -160,7 +160,7 @@ def test_a_start_dependent_motion_has_no_expected_uncertainty():
     first, second = expected_uncertainty(dwell(430, 2.0), RIG)
     for each in (first, second):
         assert each.after(each.time_s) is None
-        assert "this drive has several motions" in each.sentence
+        assert "this drive allows several motions" in each.sentence
 
 
 @pytest.mark.thorough

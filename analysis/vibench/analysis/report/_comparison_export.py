@@ -60,7 +60,7 @@ def write_comparison(
         kind = ExportKind(path.suffix.removeprefix(".").lower())
     except ValueError as unknown:
         allowed = ", ".join(f".{each.value}" for each in ExportKind)
-        raise InvalidRequest(f"{path.name!r} was given; its ending must be one of {allowed}") from unknown
+        raise InvalidRequest(f"{path.name!r} was given; its suffix must be one of {allowed}") from unknown
     target = first_free_path(path)
     match kind:
         case ExportKind.HTML:
@@ -76,7 +76,7 @@ def write_comparison(
 
 def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
     if not recordings:
-        raise InvalidRequest("a report of no recordings was requested; add a recording to the comparison")
+        raise InvalidRequest("a report without recordings was requested; add one to the comparison")
     kept = [kept_result(each) for each in recordings]
     failures = tuple(failure for _, failed in kept for failure in failed)
     results = counted_once([result for result, _ in kept])
@@ -86,7 +86,7 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
 def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:
     """Return all curves in one table; each heading names a curve and a unit."""
     if not curves:
-        raise InvalidRequest("numbers of no curves were requested; choose one or more")
+        raise InvalidRequest("a table without curves was requested; choose one or more curves")
     columns: list[tuple[str, tuple[float | str, ...]]] = []
     for each in curves:
         columns += [

@@ -58,9 +58,9 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
     yield from feedback_sentences(result.analysis.facts.feedback)
     if result.overlay is not None:
         yield (
-            f"The simulation under the {result.overlay.run.driven.value} lies "
-            f"{result.overlay.difference.median_abs_db:.2g} dB away (median) and strikes "
-            f"{result.overlay.run.impact_rate_hz:.0f} times per second{agreement_text(result.overlay)}."
+            f"Simulated under the {result.overlay.run.driven.value}: median difference "
+            f"{result.overlay.difference.median_abs_db:.2g} dB, "
+            f"{result.overlay.run.impact_rate_hz:.0f} impacts per second{agreement_text(result.overlay)}."
         )
     remarks = [each.remark for each in result.analysis.response.resonances if each.remark]
     if remarks:
@@ -110,10 +110,9 @@ def limits(results: CampaignResults) -> Iterator[str]:
     """Yield sentences on the limits of these results."""
     if any(each.is_simulated for each in results.facts):
         yield (
-            "The instruments were simulated: the samples are what the simulated generator's output does to "
-            "the simulated amplifier, shaker, specimen, vibrometer and converter. The same model is laid "
-            "over the measurement: agreement shows that the whole chain from generator to figure is right, "
-            "not that the model is."
+            "The instruments were simulated: the samples result from a simulated generator, amplifier, "
+            "shaker, specimen, vibrometer and converter. The overlaid simulation uses the same model: "
+            "agreement shows that the processing from generator to figure is correct, not that the model is."
         )
     runs = [each.overlay.run for each in results.results if each.overlay is not None]
     if runs:
@@ -122,38 +121,36 @@ def limits(results: CampaignResults) -> Iterator[str]:
         gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
         lows_hz = [each.base_band_hz[0] for each in runs if each.base_band_hz is not None]
         yield (
-            f"The simulation takes the damping as c = {damping:.3g} s · k and a gap of "
-            f"{gaps} µm. The paper does not state the damping; other values give "
-            "other collision regions."
+            f"The simulation assumes damping of c = {damping:.3g} s · k and a gap of "
+            f"{gaps} µm. The paper does not state the damping; with other values, "
+            "collision regions differ."
         )
         if lows_hz:
             yield (
                 f"The recorded base acceleration was integrated above {min(lows_hz):.3g} Hz (a quarter of "
-                "the lowest frequency played); slower motion of the base is in no curve simulated "
-                "under it, and the recorded base does not yield to the blows of a specimen that moves "
-                "otherwise."
+                "the lowest frequency played). Simulations under it lack slower motion of the base, and "
+                "simulated impacts do not move the recorded base."
             )
         if any(each.driven.by_voltage for each in runs):
             yield (
-                "Draws under the recorded voltage differ by their starts, the channels' noise and the "
-                f"tolerance of the converter's clock ({1e6 * CLOCK_TOLERANCE:.0f} ppm), and by the "
-                "uncertainty of a shaker that was fitted; calibrations and the specimen's numbers are "
-                "taken as exact. A limit on |z| is exceeded by chance in one of a hundred agreeing "
-                "quantities."
+                "Draws under the recorded voltage vary the start, the noise of the channels, the clock of "
+                f"the converter ({1e6 * CLOCK_TOLERANCE:.0f} ppm) and the parameters of a fitted shaker, "
+                "within their uncertainty. Calibrations and the parameters of the specimen are taken as "
+                "exact. Of 100 agreeing quantities, one exceeds the limit of |z| by chance."
             )
         yield (
-            f"Curves under sines start from rest and run for {PREDICTION_S:g} s, the last {WINDOW_S:g} s "
-            "observed. Where two states are stable, a sweep or noise may be in the other one."
+            f"Curves under sines are simulated from rest for {PREDICTION_S:g} s and evaluated over the last "
+            f"{WINDOW_S:g} s. Where two states are stable, a sweep or noise may be in the other state."
         )
     if results.dwells or results.sweeps:
         yield (
-            "In chaotic motion two equal experiments differ: Response I is one draw from a scatter of some "
-            "ten per cent or more, and time signals are comparable in their statistics only."
+            "In chaotic motion, two equal experiments differ: Response I scatters by about ten per cent or "
+            "more, and only the statistics of time signals can be compared."
         )
     if results.noise:
         yield (
-            "With collisions the transmission under noise is the best linear approximation at that level, "
-            "not a property of the specimen; bounds hold its scatter over realisations, 95 % line by line."
+            "With collisions, the transmission under noise is the best linear approximation at that level, "
+            "not a property of the specimen. Bounds contain its scatter over realisations (95 % per line)."
         )
 
 

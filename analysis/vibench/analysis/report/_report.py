@@ -82,14 +82,14 @@ def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
     new = [each.frequency_hz for each in after if nearest_resonance(each.frequency_hz, before) is None]
     kept = [each.frequency_hz for each in after if each.frequency_hz not in new]
     if len(gone) == len(before) > 1:
-        others = "another appears" if len(new) == 1 else f"{_number(len(new))} others appear"
-        yield f"At {_level(strong)} they are gone and {others} at {_list_hz(new)} Hz."
+        others = "a new one appears" if len(new) == 1 else f"{_number(len(new))} new ones appear"
+        yield f"At {_level(strong)} they disappear, and {others} at {_list_hz(new)} Hz."
         return
     parts = [
         f"{_list_hz(some)} Hz {one if len(some) == 1 else several}"
         for some, one, several in (
             (kept, "remains", "remain"),
-            (gone, "is gone", "are gone"),
+            (gone, "disappears", "disappear"),
             (new, "is new", "are new"),
         )
         if some
@@ -227,11 +227,11 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
         sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
-    text = f"At {level_m_per_s2:g} m/s² no periodic motion was locked on;"
+    text = f"At {level_m_per_s2:g} m/s² the control did not lock on a periodic motion;"
     if not sizes:
-        return f"{text} none of these branches has one there."
+        return f"{text} the branches contain none there."
     multipliers = ", ".join(f"{each:.3g}" for each in sizes)
-    return f"{text} the largest multiplier of the model's is {multipliers}."
+    return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
 
 
 def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
@@ -244,9 +244,9 @@ def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tupl
     ]
     name = result.analysis.facts.name
     if not ratios:
-        return f"{name} was driven outside of these frequencies."
+        return f"The drive of {name} was outside of these frequencies."
     low, high = np.min(ratios), np.max(ratios)
-    return f"The base of {name} moved {low:.2g} to {high:.2g} times as far as that of the branches."
+    return f"The base amplitude of {name} is {low:.2g} to {high:.2g} times that of the branches."
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:

@@ -39,8 +39,8 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
             "paper [Hz]",
         ),
         tuple(row for each in noise for row in _resonance_rows(each)),
-        "± is two standard deviations of the lines' scatter alone. Simulated: one draw under the recorded"
-        " voltage or base motion, the same estimator. Model: undamped natural frequency, without contact "
+        "± is two standard deviations, from the scatter of lines only. Simulated: one draw under the recorded"
+        " voltage or base motion, same estimator. Model: undamped natural frequency, without contact "
         "or (terminal) with m1 stuck to m2. Paper: Gong et al. 2025, section 5.",
     )
 
@@ -48,7 +48,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
 def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
     """Return a table of the contribution of each cause to the uncertainty of each quantity."""
     return ReportTable(
-        "Uncertainty, and what it is made of",
+        "Contributions to the uncertainty",
         ("recording", "quantity", "value", *(each.value for each in Cause)),
         tuple(
             (each.analysis.facts.name, budget.quantity, budget.text, *(_share(budget, c) for c in Cause))
@@ -56,8 +56,8 @@ def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
             for budget in budgets_of(each)
         ),
         f"± is the expanded uncertainty, k = {COVERAGE:g}, of all that is stated, combined as in JCGM "
-        "100:2008; each column is a standard uncertainty over the value. What the hardware configuration "
-        "does not state is in no ±. Chance: what another run of the same motion would give otherwise.",
+        "100:2008; each column is a standard uncertainty over the value. Contributions that the hardware "
+        "configuration does not state are not included. Chance: difference between repeated runs.",
     )
 
 
@@ -109,13 +109,13 @@ def _nearest(frequency_hz: float, among: Sequence[tuple[float, str]], form: str)
 def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
     """Return a table of the collision regions in each sweep: measured, simulated and published."""
     return ReportTable(
-        "Where the masses collide in a sweep",
+        "Frequencies with collisions in a sweep",
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
         tuple(row for each in sweeps for row in _collision_rows(each)),
-        "Bounds hold the edge: between the last interval that is clearly the one and the first that is "
-        "clearly the other. "
-        "An end has none: collisions live on by chance, and another run ends "
-        "elsewhere. Which state a sweep stays in depends on its direction and on how it began.",
+        "Bounds of a beginning lie between the last interval clearly without collisions and the first "
+        "clearly with collisions. "
+        "An end has no bounds: it is random, and differs between runs. "
+        "The state in which a sweep remains depends on its direction and on its start.",
     )
 
 
@@ -167,11 +167,11 @@ def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
             "impacts per s (sim.)",
         ),
         tuple(_dwell_row(each) for each in dwells),
-        "Response I: largest |x| over the window, over A0; in chaos one draw from a scatter. Response II:"
-        " component at the drive frequency, over A0. ± is expanded (k = 2); the table of uncertainty says"
-        " of what. Simulated: median and 95 % band of the draws under the recorded voltage, or the one "
-        "run under the recorded base motion; z: place of the measured value among the draws, beyond 2.6 "
-        "in one of a hundred cases.",
+        "Response I: largest |x| in the window, over A0; in chaos, a random value. Response II:"
+        " component at the drive frequency, over A0. ± is the expanded uncertainty (k = 2); the table of"
+        " uncertainty shows its parts. Simulated: median and 95 % band of the draws under the recorded "
+        "voltage, or one run under the recorded base motion; z: standardised difference from the draws; "
+        "|z| exceeds 2.6 in one of 100 agreeing cases.",
     )
 
 
@@ -243,6 +243,6 @@ def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
         "Dwells: lines of the displacement, and its bands at the terminal resonances",
         ("dwell", "what", "frequency [Hz]", "displacement [µm]", "re drive line [dB]", "simulated [dB]"),
         tuple(rows),
-        "Lines below two standard deviations are left out. Chaos fills bands, not lines: a band's figure is "
-        "its rms over the rms of the line at the drive frequency.",
+        "Lines below two standard deviations are left out. Chaos fills bands, not lines: the level of a band "
+        "is its rms over the rms of the line at the drive frequency.",
     )

@@ -343,7 +343,7 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
     """
     found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
     if not found:
-        raise NotEnoughData(f"{folder} holds no recording (.h5 or .h5.part); give a folder that does")
+        raise NotEnoughData(f"{folder} contains no recording (.h5, .h5.part); give a folder with recordings")
     return tuple(sorted(found, key=lambda path: (_start_time(path), path.name)))
 
 

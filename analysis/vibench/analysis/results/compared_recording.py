@@ -60,7 +60,7 @@ def compare_recording(
     name = facts.name
     if facts.mass != "m0":
         raise UnusableData(
-            f"{path.name} is a point of a scan on {facts.mass}, and comparisons show m0; choose a recording "
+            f"{path.name} is a point of a scan on {facts.mass}, but comparisons show m0; choose a recording "
             "of m0"
         )
     return ComparedRecording(

@@ -57,7 +57,7 @@ def analyse(
         plan = facts.measurement.excitation
         if channels.is_force and ANALYSES[plan.kind].family != NOISE_FAMILY:
             raise UnusableData(
-                f"{facts.response} has results of noise only, the apparent mass; analyse a motion, "
+                f"{facts.response} has results only under noise (the apparent mass); analyse a motion, "
                 "or measure noise"
             )
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
@@ -67,7 +67,7 @@ def analyse(
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
     except CONTRADICTIONS as error:
         raise UnusableData(
-            f"{recording.path.name} cannot be analysed: its samples and tables are not what its plan says "
+            f"{recording.path.name} cannot be analysed: its samples and tables contradict its plan "
             f"({type(error).__name__}: {error}); read them with h5py"
         ) from error
     return found

@@ -82,8 +82,8 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
     scans = list(scans_of([each for each in found if isinstance(each, NoiseAnalysis)]))
     if not scans:
         raise NotEnoughData(
-            "no recording here is noise at a point of a scan; measure a campaign with [[scan]], or give one "
-            "recording"
+            "none of these recordings is noise at a point of a scan; measure a campaign with [[scan]], or "
+            "give one recording"
         )
     names = [each.name for each in scans]
     for number, scan in enumerate(scans):
@@ -164,7 +164,7 @@ def _played_parts(excerpt: Excerpt) -> _Played:
         chosen_s = max((stop - start for _, start, stop in inside), default=0) / rate
         raise NotEnoughData(
             f"densities need {max(segment, _FEWEST_SAMPLES) / rate:.3g} s of uninterrupted excitation, "
-            f"and {max(chosen_s, 0.0):.3g} s were chosen; choose a longer excerpt"
+            f"but {max(chosen_s, 0.0):.3g} s were chosen; choose a longer excerpt"
         )
     stretches = tuple(replace(excerpt, start=start, stop=stop) for _, start, stop in used)
     return _Played(stretches, tuple(dict.fromkeys(label for label, _, _ in used)), segment)

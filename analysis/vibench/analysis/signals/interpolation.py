@@ -110,7 +110,7 @@ class Decimator:
 
     def __init__(self, channels: int, factor: int) -> None:
         if factor < 1:
-            raise InvalidRequest(f"a decimation factor of {factor} was requested; allowed are 1 and more")
+            raise InvalidRequest(f"a decimation factor of {factor} was requested; give 1 or more")
         self._factor = factor
         taps = _taps(factor)
         self._half = (taps.size - 1) // 2

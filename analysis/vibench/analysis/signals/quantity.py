@@ -96,7 +96,7 @@ def converted_signal(
     """
     if not 0 < low_hz < high_hz <= sample_rate_hz / 2:
         raise InvalidRequest(
-            f"the band is {low_hz:g} to {high_hz:g} Hz; it must lie above 0 and end at or below "
+            f"the band is {low_hz:g} to {high_hz:g} Hz; it must start above 0 and end at or below "
             f"{sample_rate_hz / 2:g} Hz, half the sample rate"
         )
     edge = min(disturbed_samples(sample_rate_hz, low_hz), samples.size // 2)

@@ -57,7 +57,7 @@ def window_by_name(window: Window | str) -> Window:
 def hop_samples(segment_samples: int, overlap: float) -> int:
     """Return the distance between the starts of segments; ``overlap`` is a fraction in [0, 1)."""
     if not 0 <= overlap < 1:
-        raise InvalidRequest(f"overlap is {overlap:g}; it is a fraction, from 0 to below 1")
+        raise InvalidRequest(f"overlap is {overlap:g}; it must be a fraction, from 0 to below 1")
     return segment_samples - int(overlap * segment_samples)
 
 

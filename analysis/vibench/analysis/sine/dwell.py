@@ -120,8 +120,8 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
     return Background(
         np.nan,
         np.nan,
-        f"{100 * rest.rms_m / motion_m:.2g} % of the motion does not repeat, which may be noise or motion, "
-        "and no silence was recorded before it; measure with the check of the bench",
+        f"{100 * rest.rms_m / motion_m:.2g} % of the motion does not repeat, which may be noise or motion: "
+        "no silence was recorded before the test to tell them apart; measure with the check of the bench",
     )
 
 
@@ -403,12 +403,12 @@ def _window(samples: int, edge: int, sample_rate_hz: float, window_s: float) -> 
     length = round(window_s * sample_rate_hz)
     stop = samples - edge
     if length < 1:
-        raise InvalidRequest(f"window_s is {window_s:g}; it is more than 0")
+        raise InvalidRequest(f"window_s is {window_s:g}; it must be more than 0")
     if stop - length < edge:
         have_s = max(0, stop - edge) / sample_rate_hz
         raise NotEnoughData(
-            f"a window of {window_s:g} s was requested, but without the ends that integration disturbs "
-            f"{have_s:.3g} s are left; ask for less or record longer"
+            f"a window of {window_s:g} s was requested, but only {have_s:.3g} s remain without the ends, "
+            f"which integration disturbs; request a shorter window or record longer"
         )
     return slice(stop - length, stop)
 
@@ -426,8 +426,8 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
     if np.mean(clear) < LEAST_CLEAR:
         raise UnusableData(
             f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the "
-            "window is clear "
-            f"of drop-outs, and {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
+            "window is without "
+            f"drop-outs, but {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
         )
     return clear
 

@@ -106,7 +106,7 @@ def stroboscope(
     )
     if turns.size == 0:
         raise NotEnoughData(
-            f"the record of {drive.size / sample_rate_hz:g} s is too short for a drive period away from its "
+            f"the record of {drive.size / sample_rate_hz:g} s contains no drive period outside its disturbed "
             "ends; record longer"
         )
     positions = (turns - offset) / per_sample + delay
@@ -145,13 +145,13 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     # The few points of a short burst look like noise, and its maximum may lie outside the window.
     rise = _largest_rise(response, is_clear, verdict.evidence.periods)
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
-        why = f"|x| rises {100 * rise:.2g} % above its usual maximum in a burst; find its cause, dwell again"
+        why = f"a burst raises |x| {100 * rise:.2g} % above its usual maximum; find its cause, dwell again"
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
     # Bridged drop-outs can make a repeating motion look irregular, not the reverse.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         why = (
-            f"drop-outs of the vibrometer affect {100 * (1 - clear):.0f} % of the dwell, and may make it "
-            f"look {verdict.kind.value}; refocus the laser"
+            f"drop-outs of the vibrometer affect {100 * (1 - clear):.0f} % of the dwell, and may make the "
+            f"motion look {verdict.kind.value}; refocus the laser"
         )
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why)
     return DwellMotion(section, verdict)
@@ -314,8 +314,8 @@ def measured_dwell(
     clear_s = stretch.samples / rate - _DWELL_EDGE_PERIODS / dwell.frequency_hz
     if clear_s < _SHORTEST_WINDOW_PERIODS / dwell.frequency_hz:
         raise NotEnoughData(
-            f"{stretch.samples / rate:.3g} s of the dwell were recorded; without the ends that integration "
-            f"disturbs too little is left at {dwell.frequency_hz:g} Hz: measure longer"
+            f"{stretch.samples / rate:.3g} s of the dwell were recorded; without the ends, which integration "
+            f"disturbs, too little remains at {dwell.frequency_hz:g} Hz: measure longer"
         )
     return dwell_response(
         drive,

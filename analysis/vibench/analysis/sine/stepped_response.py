@@ -169,10 +169,10 @@ def settled_check(response: SteppedResponse) -> Check:
     """Warn of steps whose response still changed during the record."""
     changing_hz = response.frequency_hz[np.isnan(response.slow_change)]
     if not changing_hz.size:
-        return Check("Steps settled", Verdict.PASSED, "no response changed steadily during its step")
+        return Check("Steps settled", Verdict.PASSED, "no response drifted during its step")
     text = (
         f"{changing_hz.size} of {response.frequency_hz.size} responses still changed during their steps, "
-        f"first at {changing_hz[0]:.6g} Hz, and their bounds are not stated; increase the settling time"
+        f"first at {changing_hz[0]:.6g} Hz, so they have no bounds; increase the settling time"
     )
     return Check("Steps settled", Verdict.WARNING, text)
 
@@ -233,7 +233,7 @@ def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
         yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
     outside = sum(each.level is Held.OUTSIDE for each in steps)
     if outside:
-        yield f"The base level was out of tolerance in {outside} of them."
+        yield f"The base level was out of tolerance in {outside} of {len(steps)} recorded motions."
 
 
 def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
@@ -244,8 +244,8 @@ def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
     rms = sqrt(fmean(each.base_rms**2 for each in kept))
     requested = sqrt(fmean(each.asked_rms**2 for each in kept))
     yield (
-        f"The base moved with {rms:.3g} m/s² rms, requested was {requested:.3g}; "
-        f"{fmean(each.within for each in kept):.1%} of the lines were within the tolerance, the worst "
+        f"Base acceleration: {rms:.3g} m/s² rms ({requested:.3g} requested); "
+        f"{fmean(each.within for each in kept):.1%} of the lines were within the tolerance; worst line: "
         f"{worst.worst_db:+.1f} dB at {worst.worst_hz:g} Hz; kurtosis "
         f"{fmean(each.kurtosis for each in kept):.2f}."
     )
@@ -347,5 +347,5 @@ def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
     what = "the phase resonance" if first.is_fundamental else "the drive at phase resonance"
     between = f"From {first.base_m_per_s2:.3g} to {last.base_m_per_s2:.3g} m/s² {what} moves"
     if abs(shift_hz) <= u_hz:
-        return f"{between} {moved}: neither softening nor hardening is seen."
+        return f"{between} {moved}: neither softening nor hardening is significant."
     return f"{between} {moved}: the mode {'hardens' if shift_hz > 0 else 'softens'}."

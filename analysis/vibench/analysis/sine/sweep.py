@@ -62,8 +62,8 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
     """
     if drive.size < _LEAST_CYCLES * sample_rate_hz / low_hz:
         raise NotEnoughData(
-            f"the drive holds {drive.size * low_hz / sample_rate_hz:.1f} cycles at {low_hz:g} Hz; "
-            f"its phase needs at least {_LEAST_CYCLES}"
+            f"the drive contains {drive.size * low_hz / sample_rate_hz:.1f} cycles at {low_hz:g} Hz; "
+            f"its phase needs at least {_LEAST_CYCLES} cycles"
         )
     edge = min(int(_EDGE_CYCLES * sample_rate_hz / low_hz), drive.size // 8)
     padded = fft.next_fast_len(drive.size + edge)
@@ -73,7 +73,7 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
     kept = 2 * spectrum * band
     if not np.sum(np.abs(kept) ** 2) / 2 > _LEAST_SHARE * power:
         raise UnusableData(
-            f"the drive channel holds no sine between {low_hz:g} and {high_hz:g} Hz; "
+            f"the drive channel contains no sine between {low_hz:g} and {high_hz:g} Hz; "
             "check the channel and the frequencies"
         )
     analytic = fft.ifft(kept, overwrite_x=True)[: drive.size]
@@ -246,7 +246,7 @@ class SweepSums:
     ) -> None:
         if not 0 < low_hz < high_hz < sample_rate_hz / 4:
             raise InvalidRequest(
-                f"the sweep is said to span {low_hz:g} to {high_hz:g} Hz; give them in ascending order, "
+                f"a sweep from {low_hz:g} to {high_hz:g} Hz was stated; give ascending frequencies "
                 f"above 0 and below {sample_rate_hz / 4:g} Hz, a quarter of the sample rate"
             )
         self._factor = decimation_factor(sample_rate_hz, _SAMPLES_PER_CYCLE * high_hz)

@@ -52,8 +52,8 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
         more = self.response.steady_over_swept - 1
         if np.isnan(more) or self.collisions.regions:
             return text
-        beside = f"{100 * abs(more):.2g} % {'above' if more > 0 else 'below'} the largest of this sweep"
-        return f"{text}; the largest steady Response II of the described linear specimen lies {beside}"
+        beside = f"{100 * abs(more):.2g} % {'above' if more > 0 else 'below'} that in this sweep"
+        return f"{text}; the largest steady Response II of the described linear specimen is {beside}"
 
 
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
@@ -93,7 +93,7 @@ def played_check(response: SweepResponse, sweep: Sweep) -> Check:
         return Check("Sweep as planned", Verdict.PASSED, "the drive followed the plan")
     text = (
         f"the drive was at {found_hz:.4g} Hz where {planned_hz:.4g} Hz were planned, {abs(behind_s):.2g} s "
-        f"{'behind' if behind_s > 0 else 'ahead'}; frequencies below are the played ones"
+        f"{'behind' if behind_s > 0 else 'ahead'}; results refer to the recorded frequencies"
     )
     return Check("Sweep as planned", Verdict.WARNING, text)
 
@@ -165,8 +165,8 @@ def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], Non
             if np.isnan(block).any():
                 lost_s = (first - stretch.start) / rate
                 raise NotEnoughData(
-                    f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
-                    "across a hole; measure again"
+                    f"samples were lost after {lost_s:.3g} s of the sweep, so its phase cannot be tracked; "
+                    "measure again"
                 )
             add(block, channels.bridged(first, min(first + _BLOCK, end)))
             show(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
@@ -179,7 +179,7 @@ def _corrected(found: M, channels: Channels, first_s: float) -> M:
         raise UnusableData(
             f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of "
             "the sweep's "
-            f"intervals are without a drop-out, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
+            f"intervals are without drop-outs, but {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
             "and measure again"
         )
     sensors = channels.response_gain(found.frequency_hz)
@@ -204,7 +204,7 @@ def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:
     if off[worst] <= _SAME:
         return Check("Drive frequency", Verdict.PASSED, "as planned")
     text = (
-        f"the drive was at {found_hz[worst]:.6g} Hz, which the plan does not have; nearest is "
-        f"{nearest[worst]:.6g} Hz. Results are for the played frequencies"
+        f"the drive was at {found_hz[worst]:.6g} Hz, which is not in the plan (nearest planned frequency: "
+        f"{nearest[worst]:.6g} Hz). Results refer to the recorded frequencies"
     )
     return Check("Drive frequency", Verdict.WARNING, text)

@@ -353,8 +353,8 @@ class SpectrogramSums:
         self._length = round(segment_s * sample_rate_hz)
         if not (0 < highest_hz <= sample_rate_hz / 2 and self._length >= 2):
             raise InvalidRequest(
-                f"rows up to {highest_hz:g} Hz by segments of {segment_s:g} s were requested at "
-                f"{sample_rate_hz:g} samples a second; give a frequency up to half of that, and two samples"
+                f"a spectrogram up to {highest_hz:g} Hz with segments of {segment_s:g} s was requested at "
+                f"{sample_rate_hz:g} samples/s; give at most half that rate, and 2 samples or more"
             )
         if samples < self._length:
             raise NotEnoughData(

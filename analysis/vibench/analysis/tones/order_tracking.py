@@ -53,7 +53,7 @@ class TrackedOrders(Labelled):
     def order(self, number: float) -> Complexes:
         """Return the complex amplitudes of one order, shape (intervals,)."""
         if number not in self.orders:
-            raise InvalidRequest(f"order {number:g} was not tracked; tracked are {self.orders}")
+            raise InvalidRequest(f"order {number:g} was not tracked; tracked orders: {self.orders}")
         chosen: Complexes = self.value[self.orders.index(number)]
         return chosen
 
@@ -101,7 +101,7 @@ def tracked_together(
     needed = cycles_needed(orders)
     if turns < needed:
         raise InvalidRequest(
-            f"an interval of {interval_samples} samples holds {turns:.1f} drive cycles; orders "
+            f"an interval of {interval_samples} samples contains {turns:.1f} drive cycles; orders "
             f"{2 / needed:g} apart need at least {needed:g}: use longer intervals or fewer orders"
         )
     used = count * interval_samples
@@ -151,8 +151,8 @@ def _fit(signals: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Compl
         inverse = np.linalg.inv(normal)
     except np.linalg.LinAlgError as singular:
         raise UnusableData(
-            "the drive phase stands still in an interval, so orders cannot be told apart there; "
-            "cut the record to where the drive runs"
+            "the drive phase is constant in an interval, so orders cannot be separated there; "
+            "leave out the parts without drive"
         ) from singular
     solution = inverse @ (basis @ signals)
     residual = signals - basis.transpose(0, 2, 1) @ solution

@@ -54,14 +54,14 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
     """
     if spectrum.window is not Window.HANN:
         raise InvalidRequest(
-            f"only peaks of Hann spectra can be located; this one is {spectrum.window.value}"
+            f"only peaks of Hann spectra can be located; this spectrum has window {spectrum.window.value}"
         )
     amplitude = spectrum.amplitude
     first = max(2, int(np.ceil(low_hz / spectrum.spacing_hz)))
     last = min(amplitude.size - 3, int(np.floor(high_hz / spectrum.spacing_hz)))
     if last < first:
         raise InvalidRequest(
-            f"no line lies between {low_hz:g} and {high_hz:g} Hz; they are {spectrum.spacing_hz:g} Hz apart"
+            f"no line lies between {low_hz:g} and {high_hz:g} Hz; lines are {spectrum.spacing_hz:g} Hz apart"
         )
     found = scipy.signal.find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
     found = found[(found >= first) & (found <= last)]

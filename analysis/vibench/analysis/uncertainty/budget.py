@@ -54,8 +54,8 @@ class Contribution:
     def __post_init__(self) -> None:
         if self.relative is not None and not 0.0 <= self.relative < np.inf:
             raise ValueError(
-                f"{self.source}: a standard uncertainty of {self.relative:g} was given; it is finite and "
-                "never negative: give a root mean square, or None"
+                f"{self.source}: a standard uncertainty of {self.relative:g} was given; it must be finite "
+                "and not negative: give a root mean square, or None"
             )
 
 
@@ -117,7 +117,7 @@ class Budget(Labelled):
         checked up to nine times, at intervals that grow by the square root of two.
         """
         parts = tuple(
-            replace(each, relative=WIDENING * each.relative, source=f"{each.source}, its end chosen by it")
+            replace(each, relative=WIDENING * each.relative, source=f"{each.source}, which ended the record")
             if each.cause in (Cause.NOISE, Cause.CHANCE) and each.relative is not None
             else each
             for each in self.contributions

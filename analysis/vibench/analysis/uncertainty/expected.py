@@ -178,9 +178,9 @@ class Expected(Labelled):
     @property
     def _how(self) -> str:
         if self.scatter is None:
-            return f"not known beforehand, for {self._hindrance}"
+            return f"not known beforehand, because {self._hindrance}"
         if self.scatter == 0.0:
-            return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, whatever the time; k = 2)"
+            return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, at any duration; k = 2)"
         text = ", ".join(
             f"{100 * half:.2g} % after {time_s:.3g} s" + (" as planned" if time_s == self.time_s else "")
             for time_s, half in self.curve
@@ -196,7 +196,7 @@ class Expected(Labelled):
             case Cause.NOISE, _:
                 return "the sensors' noise is not stated"
             case Cause.CHANCE, name if name in {RESPONSE_I, RESPONSE_II}:
-                return "this drive has several motions, and how it is begun decides which one is measured"
+                return "this drive allows several motions, and the start decides which of them is measured"
             case _:
                 return "the masses may collide under this noise"
 
@@ -327,10 +327,10 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
         expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
     except ValidationError:  # imported, or written by another version
         expected_s = None
-    forecast = "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
+    forecast = "no time was predicted" if expected_s is None else f"{expected_s:.3g} s were predicted"
     last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
     reached = sum(each.is_reached for each in notes)
-    text = f"{last}{reached} of {len(notes)} stretches known well enough, {time_s:.4g} s in all; {forecast}"
+    text = f"{last}{reached} of {len(notes)} parts known well enough, {time_s:.4g} s in total; {forecast}"
     yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 
@@ -519,8 +519,8 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
     mine = [each for each in campaign.measurements if needs[each.name] is not None]
     if not mine:
         raise ConfigurationError(
-            f"{campaign.name} has no measurement with until whose time can be predicted, so no time can be "
-            "distributed. Nothing was played; add until to a measurement, or leave --within out"
+            f"{campaign.name} has no measurement with until whose time can be predicted, so there is nothing "
+            "to distribute. Nothing was played; add until to a measurement, or leave --within out"
         )
     places = campaign.places
     variable_s = sum(places * each.repeats * _cost(each) * recorded_s(each) for each in mine)
@@ -529,12 +529,12 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
     if available_s < fixed_s + needed_s:
         left_s = available_s - fixed_s
         most = (
-            f"in this time bounds would be {sqrt(needed_s / left_s):.2g} times as wide as wished"
+            f"in this time, bounds would be {sqrt(needed_s / left_s):.2g} times as wide as requested"
             if left_s > 0
-            else "ramps, settling and what has no wish take longer"
+            else "ramps, settling and measurements without targets take longer"
         )
         raise ConfigurationError(
-            f"{available_s:g} s are too short for {campaign.name}, whose wishes need about "
+            f"{available_s:g} s are too short for the targets of {campaign.name}, which need about "
             f"{fixed_s + needed_s:.0f} s: {most}. Nothing was played; give more time or wider bounds"
         )
     factor = (available_s - fixed_s) / needed_s
