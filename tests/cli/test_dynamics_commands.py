@@ -146,7 +146,7 @@ def test_an_invalid_zero_is_quoted_as_typed(command):
             ("spectrum", "--amplitude", "1e-6:2e-6:1e-6", "--frequency", "60:70:1"),
             "give one of them as one number",
         ),
-        (("spectrum", *POINT, "--duration", "0.1"), "ask for 32 or more"),
+        (("spectrum", *POINT, "--duration", "0.1"), "request 32 or more"),
     ],
 )
 def test_invalid_options_are_refused_in_one_sentence(arguments, said):

@@ -83,14 +83,14 @@ def test_a_basin_map_explains_a_missing_boundary_exponent(answered, tmp_path, te
 @pytest.mark.parametrize(
     ("text", "more", "said"),
     [
-        (MAP, ("--show", "beauty"), "'beauty'; there are response_i"),
+        (MAP, ("--show", "beauty"), "'beauty'; give one of response_i"),
         (MAP, ("--kicks", "5"), "only the start varies"),
-        (MAP, ("--show", "lyapunov"), "this one observes response; give observe = ["),
+        (MAP, ("--show", "lyapunov"), "this map has observe = response; give observe = ["),
         (DIAGRAM.replace("120", "200"), (), "frequency_hz: a"),
         (DIAGRAM.replace("3 }", "1 }"), (), "map.toml: frequency_hz.points = 1: input should be greater"),
         (DIAGRAM.replace("2e-5", "-2e-5"), (), "map.toml: amplitude_m = -2e-05: input should be greater"),
         (DIAGRAM.replace('"down"', '"left"'), (), "chain.1 = 'left': input should be 'up' or 'down'"),
-        ("frequency_hz = 100", (), "map.toml: a map goes over one or two ranges"),
+        ("frequency_hz = 100", (), "map.toml: a map needs one or two ranges"),
         (MAP + "gap = 3\n", (), "gap"),
     ],
 )

@@ -292,7 +292,7 @@ REFUSED = [
     (lambda: Harmonic(math.nan, 1e-6), "Drive frequency nan Hz is not allowed"),
     (lambda: steady_response(gong2025(), Harmonic(100.0, 0.0)), "A drive of amplitude 0 m has no response"),
     (lambda: steady_response(gong2025(), DRIVE, duration_s=math.inf), "Duration inf s is not allowed"),
-    (lambda: steady_response(gong2025(), Harmonic(0.01, 1e-6)), "it must hold one drive period, 100.0 s"),
+    (lambda: steady_response(gong2025(), Harmonic(0.01, 1e-6)), "it must contain one drive period, 100.0 s"),
     (lambda: steady_response(gong2025(), DRIVE, window_s=31.0), r"Window 31\.0 s is not allowed"),
     (lambda: integrate(gong2025(), DRIVE, math.nan), "Duration nan s is not allowed"),
     (lambda: integrate(gong2025(), DRIVE, 1.0, sample_rate_hz=0.0), r"Sample rate 0\.0 Hz is not allowed"),

@@ -27,7 +27,7 @@ FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
 """Optional dependencies (extras) that only developers need."""
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = {
-    STATE_VARIABLE: "folder for locks, bench checks and learnt costs; by default the user's own",
+    STATE_VARIABLE: "folder for locks, bench checks and measured run times; by default the user's own",
     LOCK_VARIABLE: "folder of the locks that all users of a computer share; by default /tmp",
     TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
     KEY_VARIABLE: "key file for signing the seals of recordings",

@@ -296,6 +296,6 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
         averaged = sum(point.target.starts for point in lost if point.target is not None)
         return f"{text} The result there is a mean over {averaged} starts in total." if averaged else text
     return (
-        f"{text} At these points, {starts} starts were simulated, {followed_s:.0f} s in total; "
+        f"{text} Simulated there: {starts} starts, {followed_s:.0f} s in total; "
         f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
     )

@@ -159,7 +159,7 @@ class Pool:
         for worker in tuple(self.workers):
             self._take(worker)
             if worker.job is not None and monotonic() > worker.job.end_s:
-                reason = f"it took more than {worker.job.longest_s / 60:.0f} minutes and was given up"
+                reason = f"the job took more than {worker.job.longest_s / 60:.0f} minutes and was stopped"
                 self._lose(worker, TimeoutError(reason))
         self._hand_out()
 
@@ -220,7 +220,7 @@ def _call_back(job: Job, kind: str, value: Any) -> None:
         case "answer", _:
             job.on_answer(value)
         case _, MemoryError():
-            job.on_error(MemoryError(f"it needs more than {MOST_BYTES >> 30} GB of memory; ask for less"))
+            job.on_error(MemoryError(f"it needs over {MOST_BYTES >> 30} GB of memory; reduce the request"))
         case _:
             job.on_error(value)
 
@@ -270,7 +270,7 @@ class Worker:
                     self.messages.put(self._connection.recv())
                     self._arrived.set()
         finally:
-            reason = "the process that worked on it has ended: it was killed, or memory was short"
+            reason = "the process of this job has ended: it was killed, or memory ran out"
             self.messages.put(("end", ChildProcessError(reason)))
             self._arrived.set()
 

@@ -93,9 +93,9 @@ def test_common_first_mistakes_in_a_campaign_are_refused_in_toml_terms(tmp_path,
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("few = []\n", "few = []: give 1 or more of them, not 0"),
-        ("few = [1.0, 2.0, 3.0]\n", "few = [1.0, 2.0, 3.0]: give 2 of them or fewer, not 3"),
-        ("pair = [1.0, 2.0, 3.0]\n", "pair = [1.0, 2.0, 3.0]: give 2 of them or fewer, not 3"),
+        ("few = []\n", "few = []: give 1 or more entries, not 0"),
+        ("few = [1.0, 2.0, 3.0]\n", "few = [1.0, 2.0, 3.0]: give 2 entries or fewer, not 3"),
+        ("pair = [1.0, 2.0, 3.0]\n", "pair = [1.0, 2.0, 3.0]: give 2 entries or fewer, not 3"),
         ('label = ""\n', "label = '': give text of 1 or more letters"),
         ('label = "abcd"\n', "label = 'abcd': give 3 letters or fewer"),
         ("number = 2.5\n", "number = 2.5: give a whole number"),

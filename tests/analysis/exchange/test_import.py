@@ -667,7 +667,7 @@ def test_external_links_are_read_only_if_allowed(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["v"] = signals()[0]
         file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
-    with pytest.raises(UnusableData, match=r"/elsewhere points into another file \(b.h5\).*--allow-external"):
+    with pytest.raises(UnusableData, match=r"/elsewhere refers to another file \(b.h5\).*--allow-external"):
         opened_source(tmp_path / "a.h5").__enter__()
     with allow_external_data(), opened_source(tmp_path / "a.h5") as source:
         assert [each.name for each in source.channels] == ["/v"]

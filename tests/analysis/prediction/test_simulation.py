@@ -26,7 +26,7 @@ LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 
     [
         ({"model": "rubber"}, "not known"),
         ({"compared_with": "power:x"}, "not known"),
-        ({"start_hz": 200.0, "stop_hz": 100.0}, "start must not lie above stop"),
+        ({"start_hz": 200.0, "stop_hz": 100.0}, "start must not be above stop"),
         ({"step_hz": 0.001}, "at most 20000"),
         ({"window_s": 50.0}, "Window 50.0 s is not allowed"),
         ({"gap_m": -1.0}, "greater than 0"),

@@ -47,5 +47,5 @@ def test_a_duration_without_an_error_is_refused_in_one_sentence(duration_s):
 
 
 def test_an_exponent_of_too_many_windows_is_refused():
-    with pytest.raises(ValueError, match=r"of 1 cells are not allowed: they take .* shorten the run"):
+    with pytest.raises(ValueError, match=r"of 1 cells are not allowed: they need .* Shorten the run"):
         chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=1e9)

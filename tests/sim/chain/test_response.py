@@ -108,7 +108,7 @@ def test_an_incomplete_run_has_no_response():
 @pytest.mark.parametrize(("drive", "duration_s"), [(PERIODIC, 1e12), (Harmonic(1e10, 1e-6), 2.0)])
 def test_a_run_of_too_many_windows_is_refused(drive, duration_s):
     with pytest.raises(
-        ValueError, match=r"^[\de+]+ s of 2 cells are not allowed: they take .* shorten the run"
+        ValueError, match=r"^[\de+]+ s of 2 cells are not allowed: they need .* Shorten the run"
     ):
         chain_response(chain_of(gong2025(), 2), drive, duration_s=duration_s, window_s=1.0)
 

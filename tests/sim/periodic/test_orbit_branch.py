@@ -94,5 +94,5 @@ def test_an_isolated_branch_closes_beside_another_branch():
 
 def test_a_branch_between_equal_ends_is_refused():
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
-    with pytest.raises(ValueError, match="two different ends"):
+    with pytest.raises(ValueError, match="two different positive ends"):
         periodic_branch(orbit, Parameter.FREQUENCY, 130.0)

@@ -64,9 +64,7 @@ def test_a_plan_states_cost_uncertainty_and_source(ledger):
     assert "too few such runs" in plan_scene(scene).explain()
     for _ in range(FEWEST):
         learn_cost(scene, 1e-3)
-    assert (
-        "0.001 s within a factor of 1.5, as 3 such runs took on this machine" in plan_scene(scene).explain()
-    )
+    assert "0.001 s within a factor of 1.5, from 3 such runs on this machine" in plan_scene(scene).explain()
 
 
 def test_computing_times_of_larger_budgets_are_learnt_separately(ledger):

@@ -147,7 +147,7 @@ def test_the_error_of_a_prediction_in_a_transient_includes_the_transient():
 
 def test_a_computing_time_shorter_than_one_drive_period_is_refused():
     scene = Scene(gong2025(), Harmonic(1e-3, 1e-2), target=Target(time_s=1e-3))
-    with pytest.raises(ValueError, match=r"takes longer to follow; give more time\.$"):
+    with pytest.raises(ValueError, match=r"takes longer to compute; give more time\.$"):
         solve_scene(scene)
 
 

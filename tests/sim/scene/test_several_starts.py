@@ -168,7 +168,7 @@ def test_number_and_seed_of_random_starts_can_be_chosen():
     assert stated.memory is StartMemory.LOST
     assert many.motions[0].response_i == pytest.approx(stated.response_i, rel=1e-5)
     assert solve_ensemble(scene("hertz", 200.0, 1e-6)) is None
-    with pytest.raises(ValueError, match="2 starts is not allowed: ask for 4 or more"):
+    with pytest.raises(ValueError, match="2 starts is not allowed: give 4 or more"):
         solve_ensemble(fast, starts=2)
 
 

@@ -205,7 +205,7 @@ def test_a_non_finite_motion_is_an_error_with_its_time():
     table = shaken()
     drive = np.zeros(100)
     drive[40] = np.nan
-    with pytest.raises(MotionFailed, match="40 steps into a stretch of 100"):
+    with pytest.raises(MotionFailed, match="after 40 of 100 steps"):
         table.move(drive, np.zeros(100))
 
 

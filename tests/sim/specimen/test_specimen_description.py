@@ -132,7 +132,7 @@ def test_a_description_round_trips_through_its_text(tmp_path):
         (("6e-3, 2e-3, 2e-3", "6e-3, 2e-3"), "masses_kg"),
         (("6e-3,", "-6e-3,"), "masses_kg.0 = -0.006"),
         (("2e4,", '"stiff",'), "stiffnesses_n_per_m.0 = 'stiff'"),
-        (("[30e-6, inf]", "[inf, inf]"), "one side finite"),
+        (("[30e-6, inf]", "[inf, inf]"), "finite at one stop"),
         (("linear_gap:1e5", "rubber"), "rubber"),
         (("hertz_stiffness = 4.9e9", ""), "hertz_stiffness is missing"),
         (("name =", "damping_time_s = 1e-5\nname ="), "both are given"),
@@ -166,7 +166,7 @@ def test_a_broken_specimen_file_is_refused_by_name(tmp_path, change, said):
 
 def test_specimen_files_based_on_each_other_are_refused(tmp_path):
     written(tmp_path, 'name = "a"\nmodel = "b.toml"\n', "a.toml")
-    with pytest.raises(UnknownSpecimenError, match="comes back to it"):
+    with pytest.raises(UnknownSpecimenError, match="is based on itself"):
         load_specimen(written(tmp_path, 'name = "b"\nmodel = "a.toml"\n', "b.toml"))
 
 

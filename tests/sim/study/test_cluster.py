@@ -127,7 +127,7 @@ def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
             running.kill()
 
     executor = ClusterExecutor(address, patience_s=SHORT_S)
-    with FileStore.created(path, longer) as store, pytest.raises(ClusterLost, match=r"is gone.*resume"):
+    with FileStore.created(path, longer) as store, pytest.raises(ClusterLost, match=r"is lost.*resume"):
         run_study(longer, executor, store, watch)
     executor.close()
     kept = np.count_nonzero(open_study(path).arrays[STATE])
@@ -168,7 +168,7 @@ def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
     with (
         scheduler(tmp_path) as (_, address),
         worker(address, tmp_path, environment),
-        pytest.raises(ClusterLost, match=r"has other software, whose answers may differ.*sim_sources"),
+        pytest.raises(ClusterLost, match=r"has other software, so results may differ.*sim_sources"),
     ):
         ClusterExecutor(address)
 

@@ -25,7 +25,7 @@ def test_a_range_has_one_value_more_than_steps_despite_rounding(start, steps, st
 
 @pytest.mark.parametrize("numbers", [(2.0, 1.0, 0.1), (1.0, 2.0, 0.0), (1.0, 2.0, -1.0), (1.0, np.inf, 1.0)])
 def test_an_empty_range_is_refused(numbers):
-    with pytest.raises(ValueError, match="start must not lie above stop, and the step must be positive"):
+    with pytest.raises(ValueError, match="start must not be above stop, and the step must be positive"):
         frequency_range(*numbers)
 
 

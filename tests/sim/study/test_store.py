@@ -171,7 +171,10 @@ def test_stored_scene_identities_match_the_scenes(small, tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"accuracy": "quick"}, "holds another study: accuracy is standard there and quick here"),
+        (
+            {"accuracy": "quick"},
+            "contains another study: accuracy is standard in the file and quick in the request",
+        ),
         ({"amplitudes_m": [5e-6, 21e-6]}, "is 2e-05 at place 2 there and 2.1e-05 at place 2 here"),
         ({"amplitudes_m": [5e-6]}, "amplitudes_m is 2e-05 at place 2 there and 5e-06 here"),
         ({"duration_s": 0.3, "window_s": 0.2}, "duration_s is 0.2 there and 0.3 here, window_s is 0.1"),
@@ -184,7 +187,7 @@ def test_another_study_is_refused_with_the_differences(small, tmp_path, change, 
     other = Study.model_validate({**small.model_dump(), **change})
     with pytest.raises(StudyError, match=said) as refused:
         solve_study(other, path, ExistingStudy.RESUME)
-    assert "ask for the same study, or" in str(refused.value)
+    assert "request the same study, or" in str(refused.value)
     assert path.read_bytes() == before
 
 

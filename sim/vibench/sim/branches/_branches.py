@@ -282,7 +282,7 @@ def least_growth_time_s(loop_time_s: float) -> float:
         Latency from motion to drive [s].
     """
     if not 0.0 < loop_time_s < math.inf:
-        raise ValueError(f"A loop time of {loop_time_s} s is not allowed: positive and finite.")
+        raise ValueError(f"A loop time of {loop_time_s} s is not allowed: give a positive, finite time.")
     return UPDATES_TO_HOLD * loop_time_s
 
 

@@ -51,12 +51,12 @@ class MotionSearch:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
             raise ValueError(
                 f"A search at {self.places} places from {self.starts} starts over {self.settling_periods} "
-                "periods is not allowed: 2 places or more, no negative number, at least twice the longest "
-                "motion."
+                "periods is not allowed: give 2 places or more, 0 starts or more, and at least twice the "
+                "periods of the longest motion."
             )
         if self.most_periods < 1 or self.most_branches < 1:
             raise ValueError(
-                f"Motions of {self.most_periods} periods, {self.most_branches} branches: at least 1 of each."
+                f"{self.most_periods} periods and {self.most_branches} branches: give at least 1 of each."
             )
 
 

@@ -32,7 +32,7 @@ class Chain(Strict):
         for place, cell in enumerate(self.cells, start=1):
             if cell.contact.stops.restitution is not None:
                 raise ValueError(
-                    f"Cell {place} has rigid stops, which a chain cannot follow: take stops that yield, "
+                    f"Cell {place} has rigid stops, which a chain cannot simulate: give compliant stops, "
                     "such as hunt_crossley:0.5."
                 )
 

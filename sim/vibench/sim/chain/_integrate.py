@@ -241,9 +241,9 @@ def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
     work = duration_s / window_s * chain.size
     if work > MOST_CELL_WINDOWS:
         raise ValueError(
-            f"{duration_s:g} s of {chain.size} cells are not allowed: they take {work:.2g} windows of "
-            f"{window_s:.2g} s, one for each cell, and {MOST_CELL_WINDOWS:.0e} are the most; shorten the "
-            "run, or lower the highest frequency of drive and cells."
+            f"{duration_s:g} s of {chain.size} cells are not allowed: they need {work:.2g} windows of "
+            f"{window_s:.2g} s, counted for each cell; at most {MOST_CELL_WINDOWS:.0e} are allowed. "
+            "Shorten the run, or lower the highest frequency of drive and cells."
         )
 
 

@@ -84,7 +84,7 @@ def chain_lyapunov_exponent(
     if intervals < FEWEST_INTERVALS:
         raise ValueError(
             f"Duration {duration_s} s is not allowed for an exponent at {drive.frequency_hz} Hz: "
-            f"it must be finite and hold {FEWEST_INTERVALS} intervals of {interval_s} s."
+            f"it must be finite and contain {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
     tables = chain_tables(chain, drive, accuracy)
     # The limit applies to both motions together.

@@ -106,7 +106,7 @@ def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit
     if took_s * period_s / tried_s > limit_s:
         raise ValueError(
             f"A time of {limit_s:g} s is not allowed for this chain: one drive period of {period_s:g} s "
-            "takes longer to follow; give more time."
+            "takes longer to compute; give more time."
         )
 
 

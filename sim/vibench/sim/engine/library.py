@@ -134,7 +134,7 @@ class Engine:
             size = self._library.vibench_size_of(index)
             if size != of.itemsize:
                 raise EngineError(
-                    f"{self.path} uses {size} bytes for a {name}, Python {of.itemsize}: run {REBUILD}."
+                    f"{self.path} uses {size} bytes for {name}, Python uses {of.itemsize}: run {REBUILD}."
                 )
         return types
 
@@ -278,7 +278,7 @@ def library_path() -> Path:
     if found is not None:
         return found
     if current is None:
-        msg = f"{FOLDER} holds no native engine for {families or 'this processor'}: install vibench again."
+        msg = f"{FOLDER} has no native engine for {families or 'this processor'}: install vibench again."
     else:
         msg = f"The native engine is older than its sources: run pip install ziglang && {REBUILD}."
     raise EngineError(msg)

@@ -320,7 +320,7 @@ def check_known_answer(engine: Engine) -> None:
     off = np.abs(run.motion - KNOWN_MOTION) / np.repeat([1e-4, 0.1], 3)
     if outcome is not Outcome.REACHED_END or not math.isfinite(off.max()) or off.max() > KNOWN_TO:
         raise EngineError(
-            f"{engine.path} fails its self-test by {off.max():.1e}: rebuild it, or report this."
+            f"{engine.path} fails its self-test by {off.max():.1e}: rebuild the file, or report this."
         )
 
 
@@ -407,7 +407,7 @@ class CubicRun(_Run):
     def _run(self, drive: Structure, record: RunRecord) -> Outcome:
         code = self._engine.run_cubics(self._tables, self._state, drive, self._tolerance, record.structure)
         if code < 0:
-            raise ValueError("The native engine refuses these intervals: their ends must lie within them.")
+            raise ValueError("The native engine refuses the run: start and end must be in its intervals.")
         return Outcome(code)
 
 

@@ -80,7 +80,7 @@ class Precision:
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
-            raise ValueError(f"Precision {self} is not allowed: zero or positive numbers.")
+            raise ValueError(f"Precision {self} is not allowed: give zero or positive numbers.")
 
     def is_reached_by(self, exponents: Floats) -> bool:
         """Return whether the mean of local exponents, shape (n,), has this precision."""
@@ -190,14 +190,14 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
     """Return the number of settling intervals; raise ValueError if too few intervals follow them."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         raise ValueError(
-            f"Duration {duration_s} s after settling for {settle_s} s is not allowed: positive, and finite."
+            f"Duration {duration_s} s after settling for {settle_s} s is not allowed: give finite times > 0."
         )
     skipped = max(ALIGNING, math.ceil(settle_s / interval.length_s - ALMOST))
     left = interval.count_in(settle_s + duration_s) - skipped
     if left < FEWEST_INTERVALS:
         raise ValueError(
-            f"Duration {duration_s} s holds {max(left, 0)} intervals of {interval.length_s} s: "
-            f"ask for {FEWEST_INTERVALS} or more, by a longer duration or a shorter interval."
+            f"Duration {duration_s} s contains {max(left, 0)} intervals of {interval.length_s} s: "
+            f"request {FEWEST_INTERVALS} or more, by a longer duration or a shorter interval."
         )
     return skipped
 

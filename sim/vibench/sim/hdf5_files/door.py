@@ -90,7 +90,7 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
         if reason := system_error(error):
             raise OSError(errno.EIO, reason) from error
         if isinstance(error, UNREADABLE) and not isinstance(error, UnsafeHdf5):
-            raise UnsafeHdf5(f"its inside cannot be read ({error})") from error
+            raise UnsafeHdf5(f"its contents cannot be read ({error})") from error
         raise
     return file
 
@@ -109,10 +109,10 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
         if not isinstance(item, h5py.Group):
             continue
         if depth == DEEPEST:
-            raise UnsafeHdf5(f"its groups lie more than {DEEPEST} deep in one another")
-        links += len(item)  # count links, because many links may lead to one object
+            raise UnsafeHdf5(f"its groups are nested more than {DEEPEST} levels deep")
+        links += len(item)  # counted first, because many links may lead to one object
         if links > MOST_OBJECTS:
-            raise UnsafeHdf5(f"it holds more than {MOST_OBJECTS} objects")
+            raise UnsafeHdf5(f"it contains more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):
             if not _leads_to_own_object(item, name):
                 continue
@@ -133,7 +133,7 @@ def _leads_to_own_object(group: h5py.Group, name: str) -> bool:
 
 
 def _pointing_out(place: str, where: str) -> str:
-    return f"{place} points into another file ({where}); read it with --allow-external if you trust this file"
+    return f"{place} refers to another file ({where}); read it with --allow-external if you trust this file"
 
 
 def _address(item: h5py.HLObject) -> tuple[int, int]:
@@ -169,7 +169,7 @@ def _require_dataset(dataset: h5py.Dataset, size_bytes: int) -> None:
             begin, stored = dataset.id.get_offset(), dataset.id.get_storage_size()
             if begin is not None and begin + stored > size_bytes:
                 raise UnsafeHdf5(
-                    f"{dataset.name} ends at byte {begin + stored}, and the file has {size_bytes}"
+                    f"{dataset.name} ends at byte {begin + stored}, but the file has {size_bytes}"
                 )
             _require_size(dataset, stored, 1)
         case _:
@@ -186,11 +186,11 @@ def _require_chunks(dataset: h5py.Dataset, settings: h5py.h5p.PropDCID, size_byt
         raise UnsafeHdf5(f"{dataset.name} has chunks of {chunk_bytes} bytes")
     stored = dataset.id.get_storage_size()
     if stored > size_bytes:
-        raise UnsafeHdf5(f"{dataset.name} claims {stored} bytes, and the file has {size_bytes}")
+        raise UnsafeHdf5(f"{dataset.name} claims {stored} bytes, but the file has {size_bytes}")
     _require_size(dataset, stored, LARGEST_RATIO if settings.get_nfilters() else 1, chunk_bytes)
 
 
 def _require_size(dataset: h5py.Dataset, stored: int, ratio: int, spare_bytes: int = 0) -> None:
     declared = math.prod(dataset.shape or ()) * dataset.dtype.itemsize
     if declared > ratio * stored + spare_bytes + UNSTORED_BYTES:
-        raise UnsafeHdf5(f"{dataset.name} declares {declared} bytes, of which {stored} are stored")
+        raise UnsafeHdf5(f"{dataset.name} declares {declared} bytes, but stores only {stored}")

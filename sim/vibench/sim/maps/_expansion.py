@@ -61,8 +61,8 @@ class MapPoints(Points):
         of_start = [each.field for each in plan.varied if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(
-                f"random_starts = {plan.random_starts} would be the same states at every {of_start[-1]}, "
-                "which varies the start; leave them out, or give ranges of drive or specimen alone."
+                f"random_starts = {plan.random_starts} was given with a range of {of_start[-1]}, which sets "
+                "the start; leave out random_starts, or give ranges of drive or specimen alone."
             )
         super().__init__(plan.grid, plan.chain, map_solver(plan))
         self.plan = plan
@@ -218,12 +218,12 @@ class MapEstimate:
     def sentence(self) -> str:
         """Estimate as text."""
         return (
-            f"{self.points} points at most, {self.coarse_points} of them in the first picture; all are "
-            f"planned as {self.work_s:.2g} s of one core, as {self.known_from}. With "
-            f"{self.workers} worker(s): the first picture after {self.first_s:.2g} s, everything after "
+            f"{self.points} points at most, {self.coarse_points} of them in the first picture. Estimated "
+            f"work: {self.work_s:.2g} s on one core, from {self.known_from}. With "
+            f"{self.workers} worker(s): the first picture after {self.first_s:.2g} s, all points after "
             f"{self.all_s:.2g} s, or {self.most_s:.2g} s if no motion repeats; "
-            f"more than {self.most_useful_workers} workers would wait. The file takes "
-            f"{self.file_bytes / 1e6:.1f} MB. Motions are followed {self.followed}."
+            f"more than {self.most_useful_workers} workers do not help. The file takes "
+            f"{self.file_bytes / 1e6:.1f} MB. Motions are computed {self.followed}."
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -261,8 +261,8 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
         coarse_work_s=first_s,
         workers=(os.cpu_count() or 1) if workers is None else max(1, workers),
         file_bytes=count * row_bytes,
-        followed="eight at a time, in lanes"
+        followed="in SIMD batches of eight"
         if isinstance(map_solver(plan), InBatches)
         else "one after the other",
-        known_from="such points took here lately" if plan.target is None else "a few of them took in a pilot",
+        known_from="recent points of this kind" if plan.target is None else "a pilot run of a few points",
     )

@@ -193,7 +193,7 @@ class Range(FrozenModel):
         if not is_ascending:
             raise ValueError(
                 f"{self.points} points from {self.start!r} to {self.stop!r} are not different numbers; give "
-                "fewer points, or ends that lie less close together and less far apart"
+                "fewer points, or ends that are neither so close together nor so far apart"
             )
         return self
 
@@ -301,21 +301,21 @@ class Map(GridPlan):
         if len(names) not in (1, 2):
             have = "none" if not names else ", ".join(names)
             raise ValueError(
-                f"a map goes over one or two ranges, and {have} of its fields is one; give start, stop and "
-                f"points for one or two of {', '.join(each.field for each in QUANTITIES)}"
+                f"a map needs one or two ranges, but the fields with a range are: {have}; give start, stop "
+                f"and points for one or two of {', '.join(each.field for each in QUANTITIES)}"
             )
         if len(set(self.chain)) != len(self.chain):
-            raise ValueError(f"chain = {', '.join(self.chain)} names a direction twice; give each once")
+            raise ValueError(f"chain = {', '.join(self.chain)} has a direction twice; give each once")
         if self.chain and any(each in START for each in self.varied):
-            raise ValueError(f"a chain takes its starts from its neighbours, and {names[0]} varies the start")
+            raise ValueError(f"chain starts at neighbouring points, but {names[0]} sets the start; omit one")
         if self.coarse is not None and self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse = {self.coarse} is not a power of 2; give 2, 4, 8, 16, 32 or 64")
         if self.window_periods >= self.periods:
             raise ValueError(
-                f"window_periods = {self.window_periods} does not fit {self.periods} periods; give fewer"
+                f"window_periods = {self.window_periods} is not below periods = {self.periods}; give fewer"
             )
         if self.grid.size > MOST_POINTS:
-            raise ValueError(f"{self.grid.size} points were requested; a map holds at most {MOST_POINTS}")
+            raise ValueError(f"{self.grid.size} points were requested; a map has at most {MOST_POINTS}")
         for corner in (0, self.grid.size - 1):
             self.scene(self.grid.place(corner))
         for quantity in self.varied:
@@ -334,8 +334,8 @@ class Map(GridPlan):
         law = low.contact.kind
         if low == high or (law == "linear" and quantity.field == "gap_m"):
             raise ValueError(
-                f"{quantity.field} varies, and under the contact law {law!r} it changes nothing; vary "
-                "another quantity, or give another model"
+                f"{quantity.field} varies, but has no effect with the contact law {law!r}; vary another "
+                "quantity, or give another model"
             )
 
     @property

@@ -195,7 +195,7 @@ def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | 
     if sample_rate_hz is not None and duration_s * sample_rate_hz > MOST_SAMPLES:
         raise ValueError(
             f"{duration_s * sample_rate_hz:.3g} samples are not allowed: {MOST_SAMPLES:.1g} at most; "
-            "lower the sample rate or cut the run."
+            "lower the sample rate or shorten the run."
         )
 
 

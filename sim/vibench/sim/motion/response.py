@@ -133,6 +133,6 @@ def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
     if periods < 1:
         raise ValueError(
             f"Window {window_s} s is not allowed at {drive.frequency_hz} Hz: "
-            f"it must hold one drive period, {1.0 / drive.frequency_hz} s."
+            f"it must contain one drive period, {1.0 / drive.frequency_hz} s."
         )
     return periods

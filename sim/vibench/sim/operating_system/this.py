@@ -167,7 +167,7 @@ def state_folder() -> Path:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:  # for example, a file has that name
         refused = PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
-        refused.add_note(f"{VARIABLE} names another folder for locks, bench checks and learnt costs")
+        refused.add_note(f"{VARIABLE} sets another folder for locks, bench checks, measured run times")
         raise refused from error
     return folder
 

@@ -52,7 +52,7 @@ class BalanceOptions:
         if not (1 <= self.fewest <= self.most and 0.0 < self.tolerance < math.inf):
             raise ValueError(
                 f"From {self.fewest} to {self.most} harmonics at tolerance {self.tolerance} is not allowed: "
-                "at least 1, ascending, and positive."
+                "give at least 1 harmonic, ascending numbers, and a positive tolerance."
             )
 
 

@@ -41,7 +41,7 @@ class FrequencyPath:
         if len(self.amplitudes_m) != given or given == 1 != len(self.amplitudes_m) or not ascending:
             raise ValueError(
                 f"{len(self.amplitudes_m)} amplitudes at {len(self.frequencies_hz)} frequencies are not "
-                "allowed: one amplitude alone, or one for each of two or more ascending frequencies."
+                "allowed: give one amplitude, or one for each of two or more ascending frequencies."
             )
         for amplitude in self.amplitudes_m:
             _refuse_unless_positive("amplitude", amplitude, "m")
@@ -148,7 +148,7 @@ def range_scale(low: float, high: float, value: float) -> float:
     """Return the parameter change that counts as one unit of length in a range [Hz, or m]."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
         raise ValueError(
-            f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
+            f"A branch from {low} to {high} through {value} is not allowed: give 0 < low <= value <= high."
         )
     return (high - low) / RANGE_LENGTH
 

@@ -52,7 +52,7 @@ class LinearStructure:
         square = all(table.shape == (size, size) for table in (self.mass, self.damping, self.stiffness))
         if not square or self.entry_stiffness.shape != (size,) or self.entry_damping.shape != (size,):
             raise ValueError(
-                f"The matrices and entries of this structure do not fit its direction of {size} places."
+                f"The direction of this structure has {size} entries; its matrices have another size."
             )
 
     @property

@@ -126,7 +126,7 @@ def periodic_branch(
     path = FrequencyPath((drive.amplitude_m,)) if is_frequency else AmplitudePath(drive.frequency_hz)
     value = parameter_value(path, drive)
     if not 0.0 < stop < math.inf or stop == value:
-        raise ValueError(f"A branch from {value} to {stop} is not allowed: positive, and two different ends.")
+        raise ValueError(f"A branch from {value} to {stop} is not allowed: give two different positive ends.")
     scale = abs(stop - value) / RANGE_LENGTH
     family, start = _family_at(orbit, path, value, scale)
     here, there = value / scale, stop / scale

@@ -135,7 +135,7 @@ def phase_resonance_branch(
     answer = base_transmissibility(specimen, frequency_hz)[0]
     if not 0.0 < low_m < high_m or low_m * abs(answer[3]) >= min(specimen.gaps_m):
         raise ValueError(
-            f"Levels {low_m:g} to {high_m:g} m are not allowed: ascending, and the lower one below "
+            f"Levels {low_m:g} to {high_m:g} m are not allowed: give ascending levels, the lower below "
             f"{min(specimen.gaps_m) / abs(answer[3]):.3g} m, where m1 reaches its stops."
         )
     phasors = -1j * low_m * answer[:3]
@@ -147,7 +147,7 @@ def phase_resonance_branch(
         # A power law acts at every p, so the motion may be far from the linear one.
         raise ValueError(
             f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
-            "beginning with the linear one: give a lower level to begin with, or a wider band."
+            "starting from the linear motion: give a lower first level, or a wider band."
         )
     far = LENGTH_PER_DECADE * math.log10(high_m / low_m)
     return follow(family, start, 1.0, (-1e-9, far), steps)

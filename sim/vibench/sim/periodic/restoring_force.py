@@ -29,7 +29,7 @@ class PowerSpring:
         for exponent, force in self.terms:
             if exponent < 1 or exponent % 2 == 0 or not math.isfinite(force):
                 raise ValueError(
-                    f"The term ({exponent}, {force} N) is not allowed: odd exponent, finite force."
+                    f"The term ({exponent}, {force} N) needs an odd exponent and a finite force."
                 )
 
     @property
@@ -79,11 +79,11 @@ class GapSpring:
         if not (self.stiffness_coefficient > 0.0 and self.exponent >= 1.0 and self.loss >= 0.0):
             raise ValueError(
                 f"A stop of stiffness {self.stiffness_coefficient}, exponent {self.exponent} and loss "
-                f"{self.loss} s/m is not allowed: positive, at least 1, zero or more."
+                f"{self.loss} s/m is not allowed: they must be positive, at least 1, and zero or more."
             )
         if not (self.upper > 0.0 and self.lower > 0.0 and math.isfinite(min(self.upper, self.lower))):
             raise ValueError(
-                f"Stops at {self.upper} and -{self.lower} m are not allowed: positive, one of them finite."
+                f"Stops at {self.upper} and -{self.lower} m: give positive distances, at least one finite."
             )
 
     @property
@@ -144,7 +144,7 @@ def spring_of(specimen: Specimen) -> RestoringForce:
             return LINEAR
         case RigidStops():
             raise ValueError(
-                "Rigid stops have no finite contact force: follow the motion in time instead, or use Hertz."
+                "Rigid stops have no finite contact force: integrate in time instead, or give Hertz stops."
             )
         case law:
             return GapSpring(*law.stops.term, upper, lower, law.stops.loss, law.stops.spring_beside)

@@ -55,10 +55,10 @@ class PeriodMap:
 
     def __post_init__(self) -> None:
         if self.periods < 1:
-            raise ValueError(f"A motion of {self.periods} periods is not allowed: 1 or more.")
+            raise ValueError(f"A motion of {self.periods} periods is not allowed: give 1 or more.")
         if self.shape is OrbitShape.MIRRORED and self.periods % 2 == 0:
             raise ValueError(
-                f"A mirrored motion of {self.periods} periods cannot be: an odd number, or a repeated one."
+                f"A mirrored motion cannot have {self.periods} periods: give an odd number, or REPEATED."
             )
 
     @property

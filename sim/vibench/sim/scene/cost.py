@@ -76,7 +76,7 @@ class Expected:
     def __str__(self) -> str:
         """Return the estimate as text."""
         learnt = (
-            f"as {self.runs} such runs took on this machine"
+            f"from {self.runs} such runs on this machine"
             if self.runs >= FEWEST
             else "from too few such runs on this machine"
         )

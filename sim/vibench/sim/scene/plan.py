@@ -288,7 +288,7 @@ def _refined(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
     return (
         "A second start, a millionth of the gap away, is computed with a stricter tolerance.",
         "If the motion approaches a stable periodic motion, Newton's iteration completes it.",
-        f"Otherwise it is observed over {duration.window_s:g} s and compared with the second start.",
+        f"Otherwise, both motions are observed over {duration.window_s:g} s and compared.",
         "If both diverge, the motion depends sensitively on its start: the result is a mean over starts.",
         "Starts are added until the error or the time is reached.",
     )
@@ -311,9 +311,9 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
             return f"The motion is computed for {duration_s:g} s; the last {window} are observed."
         case AutomaticDuration(longest_s=longest_s):
             return (
-                "The motion is computed until it repeats, and observed over one of its periods; "
-                f"if it never repeats, over {window}; "
-                f"for at most {longest_s:g} s or {MOST_STATES} drive periods."
+                "The motion is computed until it repeats, "
+                f"for at most {longest_s:g} s or {MOST_STATES} drive periods. "
+                f"It is observed over one of its periods, or over {window} if it never repeats."
             )
 
 

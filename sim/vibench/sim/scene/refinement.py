@@ -204,7 +204,7 @@ class _Refinement:
         if not self._has_answered:
             msg = (
                 f"A time of {self._clock.limit_s:g} s is not allowed for this scene: one drive period of "
-                f"{1.0 / self._frequency_hz:g} s takes longer to follow; give more time."
+                f"{1.0 / self._frequency_hz:g} s takes longer to compute; give more time."
             )
             raise ValueError(msg)
 

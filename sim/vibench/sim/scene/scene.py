@@ -170,7 +170,7 @@ class Scene(Strict):
         if self.duration.window_s * self.drive.frequency_hz < 1.0 - WHOLE:
             msg = (
                 f"Window {self.duration.window_s} s is not allowed at {self.drive.frequency_hz} Hz: "
-                f"it must hold one drive period, {1.0 / self.drive.frequency_hz} s."
+                f"it must contain one drive period, {1.0 / self.drive.frequency_hz} s."
             )
             raise ValueError(msg)
 
@@ -186,9 +186,9 @@ class Scene(Strict):
         }
         for name, is_given in given.items():
             if is_given:
-                msg = f"A target and its own {name} are not allowed together: leave out one of the two."
+                msg = f"A target sets the {name} itself; both were given: leave out one of them."
                 raise ValueError(msg)
         observed = [each for each in self.observe if each in (Observable.LYAPUNOV, Observable.SPECTRUM)]
         if observed:
-            msg = f"A target is not allowed with {observed[0]}: ask for {observed[0]} without it."
+            msg = f"A target is not allowed with {observed[0]}: request {observed[0]} without a target."
             raise ValueError(msg)

@@ -78,8 +78,8 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     """
     if not (0.0 <= count <= trials < math.inf and trials > 0.0 and 0.0 < unsure < 1.0):
         msg = (
-            f"{count} of {trials} trials, unsure to {unsure}, are not allowed: "
-            "give one trial or more, at most as many counted, and a probability between 0 and 1."
+            f"{count} of {trials} trials with probability {unsure} are not allowed: "
+            "give 1 trial or more, a count from 0 to all trials, and a probability between 0 and 1."
         )
         raise ValueError(msg)
     deviations = normal_quantile(0.5 * unsure)

@@ -209,7 +209,7 @@ def solve_ensemble(
     Motions of all starts. None if the motion has a closed form or was lost, or if the budget is too small.
     """
     if starts < TOO_FEW:
-        msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
+        msg = f"An ensemble of {starts} starts is not allowed: give {TOO_FEW} or more."
         raise ValueError(msg)
     method, motion = _plan(scene)
     if method is Method.CLOSED_FORM:

@@ -49,8 +49,8 @@ class Amplifier:
             raise ValueError(f"A gain of {self.gain} is not allowed: it must be finite and not zero.")
         if not 0.0 <= self.low_cut_hz < self.high_cut_hz:
             raise ValueError(
-                f"A band from {self.low_cut_hz} to {self.high_cut_hz} Hz is not allowed: it must begin at "
-                "0 Hz or above, and end above its beginning."
+                f"A band from {self.low_cut_hz} to {self.high_cut_hz} Hz is not allowed: the lower end must "
+                "be 0 Hz or above, and below the upper end."
             )
         for name in ("clip_v", "current_limit_a"):
             if not getattr(self, name) > 0.0:
@@ -285,8 +285,8 @@ class LoadedShaker:
         """Raise MotionFailed if only ``good`` of ``count`` steps were completed."""
         if good < count:
             raise MotionFailed(
-                f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "
-                "or a contact made no progress. Lower the drive, or check it for values that are not numbers"
+                f"The specimen's motion was lost after {good} of {count} steps: it is not finite, or a "
+                "contact made no progress. Lower the drive, or check that all its values are numbers"
             )
 
 

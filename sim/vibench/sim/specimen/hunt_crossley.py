@@ -42,5 +42,5 @@ def _parse(detail: str, reference: Reference) -> HuntCrossley:
 
 
 HUNT_CROSSLEY = LawWord(
-    "hunt_crossley:s/m", "hertz with a loss that grows with the speed", "hunt_crossley:2", _parse
+    "hunt_crossley:s/m", "Hertz contact with a loss that grows with the speed", "hunt_crossley:2", _parse
 )

@@ -43,13 +43,13 @@ class PowerLaw(Strict):
         if not self.terms:
             raise ValueError("A power law without terms is not allowed: give one exponent or more.")
         if len(self.terms) > MOST_TERMS:
-            raise ValueError(f"A power law of {len(self.terms)} terms is not allowed: at most {MOST_TERMS}.")
+            raise ValueError(f"A power law of {len(self.terms)} terms: give at most {MOST_TERMS} terms.")
         previous = 0
         for exponent, force in self.terms:
             if exponent % 2 == 0 or not max(previous, 1) < exponent <= HIGHEST_EXPONENT:
                 raise ValueError(
                     f"Exponents {[n for n, _ in self.terms]} are not allowed: "
-                    f"odd, ascending, from 3 to {HIGHEST_EXPONENT}."
+                    f"give odd, ascending numbers from 3 to {HIGHEST_EXPONENT}."
                 )
             require_positive(f"Force of p^{exponent} at the reference", force, "N")
             previous = exponent
@@ -84,7 +84,7 @@ def fit_power_law(
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
     if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):
         raise ValueError(
-            f"Shares {parts} of exponents {list(exponents)} are not allowed: one each, adding up to 1."
+            f"Shares {parts} of exponents {list(exponents)}: give one for each exponent, adding up to 1."
         )
     require_positive("Indentation of the fit", indentation_m, "m")
     force = contact_stiffness * indentation_m**HERTZ_EXPONENT

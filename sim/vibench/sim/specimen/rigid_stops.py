@@ -28,4 +28,4 @@ def _parse(detail: str, _reference: Reference) -> RigidStops:
     return RigidStops(number_in(detail))
 
 
-RIGID = LawWord("rigid:0..1", "stops that do not yield, with a restitution", "rigid:0.8", _parse)
+RIGID = LawWord("rigid:0..1", "rigid stops with a coefficient of restitution", "rigid:0.8", _parse)

@@ -62,8 +62,8 @@ class Specimen(Strict):
         if not (lower > 0.0 and upper > 0.0 and min(lower, upper) < math.inf):
             raise ValueError(
                 f"Gap {self.gap_m if self.lower_gap_m is None else self.gaps_m} m is not allowed: "
-                "it must be positive, and one side finite; "
-                'for no stops at all give the contact "linear".'
+                "it must be positive, and finite at one stop or both; "
+                'without stops, give the contact "linear".'
             )
 
     @property

@@ -203,7 +203,7 @@ class SpecimenDescription(_Described):
             keys = [key for key in pair if getattr(self, key) is not None]
             if len(keys) != 1:
                 have = "both are" if keys else "neither is"
-                raise ValueError(f"{' and '.join(pair)} say the same, and {have} given; give one of them")
+                raise ValueError(f"{' and '.join(pair)} are alternatives; {have} given; give one of them")
         unknown = sorted(self.sources.keys() - type(self).model_fields.keys())
         if unknown:
             raise ValueError(f"sources names {unknown[0]!r}, which is not a key of a specimen")
@@ -311,7 +311,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
     if BASE not in table:
         return table
     if depth > DEEPEST:
-        raise ValueError(f"a specimen starts from {table[BASE]!r}, which comes back to it; name another one")
+        raise ValueError(f"a specimen is based on {table[BASE]!r}, which is based on itself; give another")
     specimen = str(table.pop(BASE))
     known = _shipped_texts()
     if specimen in known:
@@ -338,8 +338,8 @@ def _of_this_version(path: Path) -> dict[str, Any]:
     written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
         raise ValueError(
-            f"{path}: {FORMAT} = {reprlib.repr(written)} is not a version that this vibench reads, "
-            f"{VERSION}; a later vibench wrote it: install that one"
+            f"{path}: {FORMAT} = {reprlib.repr(written)} is not version {VERSION}, which this vibench "
+            "reads; the file is from a later vibench: install that version"
         )
     return table
 
@@ -398,7 +398,7 @@ def _complaint(specimen: str, error: ValidationError) -> str:
         case "missing":
             fault = f"{key} is missing"
         case "extra_forbidden":
-            fault = f"{first['loc'][-1]} is not a key of a specimen; there are {', '.join(sorted(_KEYS))}"
+            fault = f"{first['loc'][-1]} is not a key of a specimen; allowed are {', '.join(sorted(_KEYS))}"
         case _ if key:
             fault = f"{key} = {reprlib.repr(first['input'])}: {message}"
         case _:

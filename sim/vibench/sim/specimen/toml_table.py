@@ -41,8 +41,8 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "dict_type": _TABLE,
     "model_type": _TABLE,
     "model_attributes_type": _TABLE,
-    "too_short": "give {min_length} or more of them, not {actual_length}",
-    "too_long": "give {max_length} of them or fewer, not {actual_length}",
+    "too_short": "give {min_length} or more entries, not {actual_length}",
+    "too_long": "give {max_length} entries or fewer, not {actual_length}",
     "string_type": "give text, in quotes",
     "string_too_short": "give text of {min_length} or more letters",
     "string_too_long": "give {max_length} letters or fewer",
@@ -54,7 +54,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "datetime_from_date_parsing": _TIME,
     "timezone_aware": _TIME,
     "bool_type": "give true or false",
-    "union_tag_not_found": "{discriminator} is missing: it says what this is",
+    "union_tag_not_found": "{discriminator} is missing: it selects the kind of this table",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
 """Replacements, by type of error, for messages of pydantic in terms of Python."""

@@ -134,8 +134,8 @@ class ClusterExecutor:
         if self._client.status in (RUNNING, CONNECTING):
             return bool(self._client.status == RUNNING)
         raise ClusterLost(
-            f"The cluster at {self._address} is gone. What was computed before is kept;"
-            " start it again and resume."
+            f"The connection to the cluster at {self._address} is lost. Computed points are kept;"
+            " start the cluster again and resume."
         )
 
     def _count_threads(self) -> int:
@@ -164,7 +164,7 @@ def _require_workers(client: Client, address: str, patience_s: float) -> None:
     except OSError as error:
         raise ClusterLost(
             f"The cluster at {address} has no worker after {patience_s:g} s;"
-            f" start some with `dask worker {address}`."
+            f" start workers with `dask worker {address}`."
         ) from error
     try:
         found = client.run(software)
@@ -179,6 +179,6 @@ def _require_workers(client: Client, address: str, patience_s: float) -> None:
 
 def _other_software(address: str, made_by: str) -> str:
     return (
-        f"A worker of {address} has other software, whose answers may differ: {made_by} there,"
+        f"A worker of {address} has other software, so results may differ: {made_by} there,"
         f" {software()} here. Install the same versions on every machine, and restart the workers."
     )

@@ -51,7 +51,7 @@ def sole_writer(path: Path) -> OpenFile:
             file.close()
             raise StudyError(
                 f"{path} is being written by another run, or another program has it open;"
-                " let that end, or close it, and try again."
+                " wait until the run has ended, or close the program, and try again."
             ) from error
         return file
 
@@ -112,7 +112,7 @@ def _require_room(path: Path, plan: layout.GridPlan) -> None:
     if free_bytes < needed_bytes:
         raise StudyError(
             f"{path} needs {needed_bytes / 1e6:.0f} MB for {plan.grid.size} points; the disk has"
-            f" {free_bytes / 1e6:.0f} MB. Make room, or choose another folder or a smaller {plan.called}."
+            f" {free_bytes / 1e6:.0f} MB. Free space, or choose another folder or a smaller {plan.called}."
         )
 
 
@@ -281,8 +281,8 @@ class FileStore:
 
     def _refused(self, error: OSError) -> StudyError:
         return StudyError(
-            f"The disk refused {self._path}: {error.strerror}. What was kept before is safe;"
-            " make room or repair the disk, and resume."
+            f"{self._path} could not be written: {error.strerror}. Earlier results are safe;"
+            " free disk space or repair the disk, and resume."
         )
 
 
@@ -290,9 +290,9 @@ def _require_same(path: Path, kept: layout.GridPlan, requested: layout.GridPlan)
     differing = requested.differences(kept)
     if differing:
         raise StudyError(
-            f"{path} holds another {requested.called}: "
+            f"{path} contains another {requested.called}: "
             f"{', '.join(_difference(name, kept, requested) for name in differing)}."
-            f" Nothing was changed; ask for the same {requested.called}, or choose another file."
+            f" Nothing was changed; request the same {requested.called}, or choose another file."
         )
 
 
@@ -312,13 +312,13 @@ def _difference(name: str, kept: layout.GridPlan, requested: layout.GridPlan) ->
             there, here = (_item(values, index) for values in (some, others))
         case _:
             pass
-    return f"{name} is {_short(there)} there and {_short(here)} here"
+    return f"{name} is {_short(there)} in the file and {_short(here)} in the request"
 
 
 def _item(values: list[object], index: int) -> str:
     if len(values) == 1:
         return str(values[0])
-    return f"{values[index]} at place {index + 1}" if index < len(values) else f"{len(values)} values"
+    return f"{values[index]} at position {index + 1}" if index < len(values) else f"{len(values)} values"
 
 
 def _short(value: object) -> str:

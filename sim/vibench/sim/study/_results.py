@@ -128,7 +128,7 @@ def _require_ours(path: Path, file: "h5py.File", kind: type[GridPlan]) -> None:
     found = file.attrs.get("format")
     if not (isinstance(found, bytes) and found.decode() == kind.format):
         raise StudyError(
-            f"{path} is HDF5, but no {kind.called}'s file; give the path of a {kind.called}'s file."
+            f"{path} is HDF5, but not the file of a {kind.called}; give the path of a {kind.called}'s file."
         )
     version = int(file.attrs["format_version"])
     if version != layout.FORMAT_VERSION:
@@ -144,7 +144,7 @@ def _plan(path: Path, file: "h5py.File", kind: type[Plan]) -> Plan:
         return kind.model_validate_json(text)
     except ValidationError as error:
         raise StudyError(
-            f"{path} was written by another vibench, whose {kind.called} differs: {error}"
+            f"{path} has a {kind.called} of another vibench version, which cannot be read: {error}"
         ) from error
 
 
@@ -289,7 +289,7 @@ def _index(axis: StudyAxis, value: Value) -> int:
             return index
     shown = ", ".join(str(each) for each in axis.values[:SHOWN_VALUES])
     more = ", …" if len(axis.values) > SHOWN_VALUES else ""
-    raise InvalidStudy(f"{value!r} is no {axis.name} here; there are {shown}{more}.")
+    raise InvalidStudy(f"{value!r} is not a value of {axis.name}; there are {shown}{more}.")
 
 
 def _is_same(here: Value, requested: Value) -> bool:

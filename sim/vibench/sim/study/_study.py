@@ -39,7 +39,7 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
     if not (0.0 < step < math.inf and math.isfinite(start) and math.isfinite(stop) and start <= stop):
         raise ValueError(
             f"a range from {start:g} to {stop:g} in steps of {step:g} is not allowed:"
-            " start must not lie above stop, and the step must be positive"
+            " start must not be above stop, and the step must be positive"
         )
     steps = (stop - start) / step
     if steps >= LONGEST:
@@ -59,7 +59,7 @@ def expand_ranges(given: object) -> object:
             try:
                 return frequency_range(float(start), float(stop), float(step))
             except OverflowError as error:
-                raise ValueError("a range has a number of over 300 digits; give a frequency") from error
+                raise ValueError("a number of the range has over 300 digits; give a smaller one") from error
         case list() | tuple():
             return _flatten(given)
         case _:
@@ -75,7 +75,7 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
             case one:
                 values.append(one)
         if len(values) > LONGEST:
-            raise ValueError(f"ranges of more than {LONGEST} values together are too long; widen their steps")
+            raise ValueError(f"ranges have more than {LONGEST} values in total; give larger steps")
     if all(isinstance(value, (int, float)) for value in values):
         return sorted(set(values))  # type: ignore[type-var]
     return values
@@ -205,7 +205,7 @@ class Study(GridPlan):
         for name, labels in (("models", self.models), ("starts", self.start_labels)):
             twice = sorted({label for label in labels if labels.count(label) > 1})
             if twice:
-                raise ValueError(f"{name} names {twice[0]!r} twice; give each once")
+                raise ValueError(f"{name} contains {twice[0]!r} twice; give each entry once")
         return self
 
     @model_validator(mode="after")
