@@ -14,8 +14,8 @@ from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineA
 
 def _undrawn(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[SteppedResponse]]:
     raise UnusableData(
-        "the motions of a branch were held by a fast loop, and under the recorded voltage alone the model "
-        "leaves them; nothing was simulated, compare them with the model's branch"
+        "the branch was not simulated: a fast loop held its motions, and the model leaves them under the "
+        "recorded voltage alone; compare the motions with the branch of the model"
     )
 
 

@@ -68,7 +68,7 @@ class BranchContinuation(AbstractFeedback):
         if not self.low_hz <= self.start_hz <= self.high_hz or self.low_hz == self.high_hz:
             raise ValueError(
                 f"start_hz = {self.start_hz:g} is not between low_hz = {self.low_hz:g} and high_hz = "
-                f"{self.high_hz:g}; give the three in this order: low, start, high"
+                f"{self.high_hz:g}; give low_hz <= start_hz <= high_hz, and low_hz below high_hz"
             )
         return self
 

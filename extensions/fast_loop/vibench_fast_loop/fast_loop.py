@@ -83,7 +83,7 @@ def fast_loop(rig: Rig) -> FastLoop:
     controller = rig.controller
     if controller is None:
         raise ConfigurationError(
-            "a branch is followed by a real-time controller, and this bench has none. Nothing was played; "
+            "following a branch needs a real-time controller, but this bench has none. Nothing was played; "
             "add [controller] to the hardware configuration"
         )
     timing = LoopTiming(controller.rate_hz, controller.latency_s)
@@ -99,7 +99,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     they are unknown. Nothing has been played then.
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
-    unknown = "whether the fast loop holds the branch is not known: "
+    unknown = "it is not known whether the fast loop holds the branch: "
     if isinstance(fast.plant.specimen.contact, RigidStops):
         raise LimitExceeded(
             f"{unknown}rigid stops have no finite contact force. Nothing was played; choose another "
@@ -118,17 +118,17 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     if hold is None:
         raise LimitExceeded(
             f"{unknown}the model finds no motion that repeats every period at start_hz = {plan.start_hz:g} "
-            f"under {level_m:.3g} m. Nothing was played; begin at another frequency, level, or begin_from"
+            f"with base amplitude {level_m:.3g} m. Nothing was played; change start_hz, level or begin_from"
         )
-    held = "not even its first motion"
+    held = "not even the first motion"
     if hold.held_hz is not None:
-        behind = f", behind {hold.folds} fold{'s' * (hold.folds > 1)}" if hold.folds else ""
-        held = f"it from {plan.start_hz:.5g} to {hold.held_hz:.5g} Hz{behind}"
+        behind = f", beyond {hold.folds} fold{'s' * (hold.folds > 1)}" if hold.folds else ""
+        held = f"the branch from {plan.start_hz:.5g} to {hold.held_hz:.5g} Hz{behind}"
     if hold.multiplier > LARGEST_MULTIPLIER:
         raise LimitExceeded(
-            f"the fast loop would not hold the branch: by the model its largest multiplier is "
+            f"the fast loop would not hold the branch: in the model, its largest multiplier is "
             f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {1e3 * timing.latency_s:.3g} ms of latency "
-            f"at {timing.rate_hz:g} samples a second, allowed is at most {LARGEST_MULTIPLIER:g}; it would "
+            f"at {timing.rate_hz:g} samples a second; at most {LARGEST_MULTIPLIER:g} is allowed. It would "
             f"hold {held}. Nothing was played; narrow the range, shorten the latency, or lower the level"
         )
     if hold.end not in (ArcEnd.REACHED_BOUND, ArcEnd.CLOSED):

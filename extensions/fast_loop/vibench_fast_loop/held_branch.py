@@ -89,7 +89,7 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
     size_um = 1e6 * found.base_m
     held = (
         f"{found.frequency_hz.size} motions held, base {size_um.min():.4g} to {size_um.max():.4g} µm, its "
-        f"harmonics at most {found.residue.max():.2g} of that as displacement and "
+        f"harmonics relative to the fundamental at most {found.residue.max():.2g} as displacement and "
         f"{found.residue_acceleration.max():.2g} as acceleration."
     )
     sentences = [held]
@@ -99,9 +99,9 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
     if any(found.stability):
         counts = ", ".join(f"{found.stability.count(each.value)} {each.value}" for each in Stability)
         sentences.append(
-            f"Without feedback they would be: {counts}, measured with small perturbations of the drive."
+            f"Without feedback, the motions are {counts}, measured with small perturbations of the drive."
         )
-    sentences.extend(f"It ended because {each.end.value}." for each in ends)
+    sentences.extend(f"The branch ended because {each.end.value}." for each in ends)
     return tuple(sentences)
 
 

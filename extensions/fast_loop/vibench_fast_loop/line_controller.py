@@ -35,7 +35,7 @@ class LineController:
         """Connect, silence the output, and check the controller against its configuration."""
         if not config.resource:
             raise ConfigurationError(
-                "controller.resource is empty, and only a virtual rig knows where its controller is; give "
+                "controller.resource is empty, which is allowed only on a virtual rig; give "
                 "TCPIP0::<host>::<port>::SOCKET in the hardware configuration"
             )
         controller = cls(open_link(config.resource, config.visa_library), config)
@@ -48,10 +48,10 @@ class LineController:
         if different or facts.watchdog_s > config.watchdog_s * (1 + _PART):
             controller.close()
             raise ConfigurationError(
-                f"{facts.name} at {config.resource} takes {facts.rate_hz:g} samples a second, gives up to "
-                f"{facts.limit_v:g} V, waits {facts.watchdog_s:g} s for its host and takes {_laws(facts)}; "
-                f"the configuration says {config.rate_hz:g}, {config.limit_v:g} V, {config.watchdog_s:g} s "
-                f"and {_laws(config)}. It is silent; make them agree"
+                f"{facts.name} at {config.resource} has {facts.rate_hz:g} samples a second, up to "
+                f"{facts.limit_v:g} V, a watchdog time of {facts.watchdog_s:g} s and {_laws(facts)}; the "
+                f"configuration has {config.rate_hz:g}, {config.limit_v:g} V, {config.watchdog_s:g} s and "
+                f"{_laws(config)}. The controller is silent; correct the configuration or the controller"
             )
         return controller
 
@@ -87,14 +87,14 @@ class LineController:
         if not self._is_open:
             raise InstrumentError(
                 f"the connection to the real-time controller at {where} was closed during the request "
-                f"{request.ask}. It is silent; open the bench again"
+                f"{request.ask}. The controller is silent; open the bench again"
             )
         try:
             self._link.write(request.model_dump_json(exclude_defaults=False))
             line = self._link.read_bytes(_LONGEST_LINE, break_on_termchar=True)
         except (VisaIOError, OSError) as error:
             raise InstrumentLost(
-                f"the real-time controller at {where} does not answer ({error}). It falls silent by itself "
+                f"the real-time controller at {where} does not answer ({error}). Its watchdog silences it "
                 f"after {self._config.watchdog_s:g} s; check its power and its network"
             ) from error
         try:

@@ -93,7 +93,7 @@ class LoopDrive:
                 )
             case _:
                 raise LimitExceeded(
-                    "a real-time controller plays sines, and was given something else; it stayed silent"
+                    "a real-time controller plays only sines; the requested signal was not played"
                 )
         if ramp_s is not None:
             next_program = next_program.model_copy(update={"glide_s": ramp_s})
@@ -113,8 +113,8 @@ class LoopDrive:
             if self._program is not None and report.state is not LoopState.PLAYING:
                 self._program = None
                 raise LimitExceeded(
-                    f"the real-time controller ended by itself: {report.reason or 'it was told to'}. It is "
-                    "silent, and its recording kept; lower the level, or go in shorter steps"
+                    f"the real-time controller stopped: {report.reason or 'on request'}. Its output is "
+                    "silent, and the recording is kept; lower the level, or take shorter steps"
                 )
 
     def _silence(self, ramp_s: float) -> None:

@@ -30,7 +30,7 @@ class LoopTiming:
     def __post_init__(self) -> None:
         if not (0.0 < self.rate_hz < np.inf and 0.0 <= self.latency_s < np.inf):
             raise ValueError(
-                f"{self.rate_hz} samples a second, {self.latency_s} s of latency are not allowed: positive."
+                f"{self.rate_hz} samples a second, latency {self.latency_s} s: give positive, finite numbers."
             )
 
     @property

@@ -33,7 +33,7 @@ def test_stability_notes_are_assigned_to_their_points_in_any_order():
     np.testing.assert_array_equal(found.multiplier, [1.1, 0.96, np.nan, np.nan])
     np.testing.assert_array_equal(found.multiplier_u, [0.01, 0.01, np.nan, np.nan])
     said = branch_sentences([*POINTS, *notes])
-    wanted = "Without feedback they would be: 1 stable, 1 unstable, 1 not determined"
+    wanted = "Without feedback, the motions are 1 stable, 1 unstable, 1 not determined"
     assert any(each.startswith(wanted) for each in said), said
 
 

@@ -122,7 +122,7 @@ def test_it_falls_silent_without_requests_and_gives_the_reason(bench: Bench) -> 
     assert report.state is LoopState.SILENT
     assert report.reason
     controller.play(series(bench))
-    assert controller.report().state is LoopState.PLAYING, "it may be told to play again"
+    assert controller.report().state is LoopState.PLAYING, "the controller must play again on request"
 
 
 def test_silence_is_allowed_at_any_time_and_reaches_the_terminal(bench: Bench) -> None:
