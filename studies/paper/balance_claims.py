@@ -36,7 +36,7 @@ def continuous_weak_three(r: Reading) -> Values:
 
 @costly_claim(
     "section 3.2, Fig. 6(a)",
-    "Peaks of the lowest stable first-order solution on the grid, nearest to each.",
+    "Peaks of the lowest stable first-order solution on the grid, nearest to each resonance.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
     tried=(NARROWER_FIT, *DAMPINGS),
     remark=_BENT,
@@ -49,7 +49,7 @@ def continuous_weak_balance(r: Reading) -> Values:
 
 @costly_claim(
     "section 3.2, Fig. 6(a)",
-    "Peaks of Response I of n = 5 at 1 µm on the grid, nearest to each.",
+    "Peaks of Response I of n = 5 at 1 µm on the grid, nearest to each resonance.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
     tried=(NARROWER_FIT, ALIKE),
     remark=_BENT,
@@ -68,7 +68,7 @@ def _two_of(what: str) -> tuple[Expectation, ...]:
 
 @costly_claim(
     "section 3.2, Fig. 6(d)",
-    "The two highest peaks of each, and how high the next one is.",
+    "The two highest peaks of each response, and the relative height of the next peak.",
     *_two_of("balance"),
     *_two_of("Response I"),
 )
@@ -83,7 +83,7 @@ def continuous_strong(r: Reading) -> Values:
 
 @costly_claim(
     "section 3.2, Fig. 6(a)",
-    "Share of the frequencies at which a stable solution lies within 10 %.",
+    "Share of the frequencies at which a stable solution is within 10 % of the response.",
     at_least("Response I", "%", _MOST),
     at_least("Response II", "%", _MOST),
 )
@@ -94,7 +94,7 @@ def balance_weak(r: Reading) -> Values:
 
 @costly_claim(
     "section 3.2, Fig. 6(d)",
-    "Share of the frequencies at which a stable solution lies within 10 %: most of them.",
+    "Share of the frequencies at which a stable solution is within 10 %; at least half is required.",
     at_least("Response I", "%", _MAJORITY),
     at_least("Response II", "%", _MAJORITY),
 )

@@ -62,14 +62,14 @@ class Case(FigureOptions):
                 raise InvalidRequest(f"{what} of {value:g} m is not allowed; give a positive one")
         if not 0.0 <= self.sweep_falls <= STEEPEST_FALL:
             raise InvalidRequest(
-                f"a base amplitude that goes with f^-{self.sweep_falls:g} is not allowed; give a power from "
+                f"a base amplitude ~ f^-{self.sweep_falls:g} is not allowed; give a power from "
                 f"0 to {STEEPEST_FALL:g}"
             )
         top_hz = FigureOptions.highest_hz
         if not LOWEST_HZ < self.similarity_highest_hz <= top_hz:
             raise InvalidRequest(
                 f"models are simulated from {LOWEST_HZ:g} to {top_hz:g} Hz and cannot be compared up to "
-                f"{self.similarity_highest_hz:g} Hz; give a frequency between"
+                f"{self.similarity_highest_hz:g} Hz; give a frequency in this range"
             )
         super().__post_init__()
         try:
@@ -147,7 +147,7 @@ class Option:
 
 OPTIONS: Mapping[str, Option] = {
     "zeta": Option(
-        "the ratio of c_i = 2 zeta m_i w_i, each mass on its own spring",
+        "the damping ratio in c_i = 2 zeta m_i w_i, each mass on its own spring",
         "0.0165",
         "damping_ratio",
         float,
@@ -165,7 +165,7 @@ OPTIONS: Mapping[str, Option] = {
         "shares of 3+5+7", "3@0.05+5@0.15+7@0.8", "sum_model", "power:{}".format, "the sum as {}".format
     ),
     "compared": Option(
-        "models are compared up to [Hz]",
+        "highest frequency at which models are compared [Hz]",
         "400",
         "similarity_highest_hz",
         float,
@@ -182,14 +182,14 @@ OPTIONS: Mapping[str, Option] = {
         " or ".join(ExponentsBy), "ode45", "exponents_by", ExponentsBy, "exponents by {}".format
     ),
     "sweep-amplitude": Option(
-        "of the sweep's base [m]",
+        "base amplitude of the sweep [m]",
         "5e-6",
         "sweep_amplitude_m",
         float,
         lambda amplitude_m: f"sweep of {1e6 * amplitude_m:g} µm",
     ),
     "sweep-falls": Option(
-        "k of the sweep's A0 ~ f^-k", "2", "sweep_falls", float, "sweep with A0 ~ f^-{:g}".format
+        "exponent k of A0 ~ f^-k in the sweep", "2", "sweep_falls", float, "sweep with A0 ~ f^-{:g}".format
     ),
     "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "swept {}".format),
 }

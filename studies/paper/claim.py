@@ -27,7 +27,7 @@ class Expectation:
     def __post_init__(self) -> None:
         if not self.low <= self.high:
             raise InvalidRequest(
-                f"{self.name!r} wants {self.low:g} to {self.high:g}; give the lower bound first"
+                f"{self.name!r} has the bounds {self.low:g} to {self.high:g}; give the lower bound first"
             )
 
     @property
@@ -199,8 +199,8 @@ def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
     values = tuple(float(each) for each in claim.measure(Reading(evidence, case)))
     if len(values) != len(claim.wanted):
         raise InvalidRequest(
-            f"the claim {claim.key!r} wants {len(claim.wanted)} numbers and {len(values)} were measured; "
-            "give one for each"
+            f"the claim {claim.key!r} requires {len(claim.wanted)} numbers, but {len(values)} were measured; "
+            "measure one for each requirement"
         )
     return values
 

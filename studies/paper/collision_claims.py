@@ -25,7 +25,7 @@ _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
 
 @claim(
     "section 3.1, Fig. 3",
-    "Share of the frequencies that collide at 1, 5, 10 and 50 µm, and its smallest step.",
+    "Share of frequencies with collisions at 1, 5, 10 and 50 µm, and its smallest increase.",
     at_most("1 µm", "%", 0.05),
     at_least("5 µm", "%", 0.0),
     at_least("10 µm", "%", 0.0),
@@ -40,7 +40,7 @@ def regions_grow(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 4(b)",
-    "Largest |p| over the gap at 5 µm, over the colliding frequencies.",
+    "Largest ratio of |p| to the gap at 5 µm, among the colliding frequencies.",
     at_most("largest |p| over the gap", "", 1.1),
 )
 def p_saturates(r: Reading) -> Values:
@@ -52,7 +52,7 @@ def p_saturates(r: Reading) -> Values:
 
 @claim(
     "section 2, Fig. 2(c)",
-    "Largest and smallest of II over I over the colliding frequencies at 5 µm.",
+    "Largest and smallest ratio of Response II to I at 5 µm, among the colliding frequencies.",
     at_most("largest", "", 1.0),
     at_most("smallest", "", 0.7),
 )
@@ -65,7 +65,7 @@ def ii_below_i(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 5(a)",
-    "Share of the frequencies with a larger Response I, at 5 µm.",
+    "Share of the frequencies at which Response I is larger without damping, at 5 µm.",
     at_least("share", "%", 1.0),
 )
 def damping_lowers_i(r: Reading) -> Values:
@@ -76,7 +76,7 @@ def damping_lowers_i(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 5(a, c)",
-    "Share of colliding frequencies without damping, and at 7 µm, less that at 5 µm.",
+    "Increase of the share of colliding frequencies: without damping, and at 7 µm.",
     at_least("without damping", "%", 0.01),
     at_least("at 7 µm", "%", 0.01),
 )
@@ -88,8 +88,8 @@ def damping_shrinks_regions(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 5(b, d)",
-    "Median ratio of Response II without damping, and at 7 µm, to that at 5 µm, where the former "
-    "collides between 220 and 320 Hz.",
+    "Median ratio of Response II (without damping; at 7 µm) to Response II at 5 µm with damping, over the "
+    "frequencies from 220 to 320 Hz at which the former collides.",
     at_most("without damping", "", 1.0),
     at_most("at 7 µm", "", 1.0),
 )
@@ -102,7 +102,7 @@ def contrary_ii(r: Reading) -> Values:
 
 @claim(
     "section 5, Fig. 13(d)",
-    "First and last frequency of the region around 266 Hz at 5 µm, each from rest.",
+    "First and last colliding frequency around 266 Hz at 5 µm, with every run from rest.",
     about("first", "Hz", _SWEEP_COLLIDES_HZ[0], _ROUGHLY_HZ),
     about("last", "Hz", _SWEEP_COLLIDES_HZ[1], _ROUGHLY_HZ),
 )
@@ -115,7 +115,7 @@ def second_region(r: Reading) -> Values:
 
 @claim(
     "section 5, Fig. 13(d)",
-    "Lowest and highest drive frequency at an impact of that sweep, at A0 = 5 µm.",
+    "Lowest and highest drive frequency at an impact of the sweep, at A0 = 5 µm.",
     about("first impact", "Hz", _SWEEP_COLLIDES_HZ[0], _ABOUT_HZ),
     about("last impact", "Hz", _SWEEP_COLLIDES_HZ[1], _ABOUT_HZ),
     tried=(

@@ -46,8 +46,8 @@ def draw(options: FigureOptions) -> report.DrawnFigure:
         title="Figure 1 c: forces of the models",
         caption=(
             f"Force of the stops (gap {1e6 * options.gap_m:g} µm, grey line) and of the continuous models, "
-            "which have the same force 1 µm beyond it. The sum 3+5+7 shares that force equally, as the paper "
-            "does not say otherwise."
+            "which have the same force 1 µm beyond the gap. The terms of the sum 3+5+7 have equal shares of "
+            "this force, because the paper gives no shares."
         ),
         figure=figure,
         tables=(report.table("figure_1c", relative_displacement_m=p, **columns),),

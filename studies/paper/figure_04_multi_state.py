@@ -52,7 +52,7 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         name="figure_4",
         title="Figure 4: colliding and free states at 5 µm",
         caption=(
-            "Grey: m1 and m2 collided within the window. The exponent where they do not is that of the "
+            "Grey: m1 and m2 collided within the window. Without collisions, the exponent is that of the "
             f"slowest mode. Below: the motion at {_SHOWN_HZ:g} Hz and the spectrum of its last "
             f"{options.window_s:g} s, terminal resonances dotted. {options.sentence}"
         ),

@@ -21,7 +21,7 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
     """Return the study with and without damping, at 5 and 7 um; raises InvalidRequest without damping."""
     damped_s = options.only_damping_time_s
     if damped_s == 0.0:
-        raise InvalidRequest("figure 5 compares damping with none; give a damping time above 0 s")
+        raise InvalidRequest("figure 5 compares with an undamped specimen; give a damping time above 0 s")
     return (options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, damped_s)),)
 
 
@@ -55,9 +55,9 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         name="figure_5",
         title="Figure 5: influence of damping and of the amplitude",
         caption=(
-            "Bars at the foot: frequencies at which m1 and m2 collide, in the colour of the curve. Without "
-            "damping nothing forgets how it began, and each point is one draw. "
-            f"Colliding at {shares[0]} of the frequencies with damping and 5 µm, {shares[1]} without "
+            "Bars at the bottom: frequencies at which m1 and m2 collide, in the colour of the curve. Without "
+            "damping the transient does not decay, and each point is one random sample. "
+            f"Collisions at {shares[0]} of the frequencies with damping and 5 µm, {shares[1]} without "
             f"damping, {shares[2]} at 7 µm. {options.sentence}"
         ),
         figure=figure,

@@ -64,7 +64,7 @@ class FigureOptions:
             )
         if self.damping_ratio is not None and not 0.0 <= self.damping_ratio < math.inf:
             raise InvalidRequest(
-                f"a damping ratio of {self.damping_ratio} is not allowed; give zero or a positive one"
+                f"a damping ratio of {self.damping_ratio} is not allowed; give zero or a positive ratio"
             )
         if not _LEAST_GAP_M <= self.gap_m <= _LARGEST_GAP_M:
             raise InvalidRequest(

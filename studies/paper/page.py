@@ -18,7 +18,7 @@ from .settings import DampingScore, claims_by_setting, score_table, scores
 _HEADINGS = ("claim", "place", "measured", "required", "verdict")
 HEAD = f"| {' | '.join(_HEADINGS)} |"
 _METHOD = """\
-The page checks every claim of Gong et al. (2025) that has a number or a direction with a simulation
+Every claim of Gong et al. (2025) that has a number or a direction is checked with a simulation
 of their specimen. The paper gives hardly any tolerances. The bounds are ours, wide enough for chaos,
 which differs by some per cent from run to run; some bounds were set after a first look at the results.
 If chaos ends at random, a claim is measured from several starts, a millionth of the gap apart, and
@@ -211,10 +211,10 @@ def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigu
         Number of claims that hold, over damping.
     """
     failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
-    missing = f" Those that do not hold: {', '.join(failed)}." if failed else ""
+    missing = f" Claims that do not hold: {', '.join(failed)}." if failed else ""
     return Page(
         title="Claims that hold",
-        about="Claims of Gong et al. (2025), measured on our simulation of their specimen.",
+        about="Claims of Gong et al. (2025), checked with a simulation of their specimen.",
         warnings=(),
         findings=found.sentence + missing,
         figure=levels,

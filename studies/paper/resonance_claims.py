@@ -16,7 +16,7 @@ _GRID_HZ = 5.0
 """Tolerance of a peak on a grid of 5 Hz."""
 _ROUGH_HZ = 10.0
 """Tolerance of a peak of Response I in chaos: two steps of the coarse grid."""
-_AT_GAPS = f"The two highest peaks at {len(GAPS_M)} gaps, 5 to 60 µm, each at that A0; the worst of them."
+_AT_GAPS = f"The two highest peaks for {len(GAPS_M)} gaps, 5 to 60 µm, with A0 = gap; the worst case counts."
 
 
 @claim(
@@ -41,7 +41,7 @@ def bound_resonances(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 3(a)",
-    "Peaks of Response I at 1 µm on the grid, nearest to each.",
+    "Peaks of Response I at 1 µm on the grid, nearest to each resonance.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
 )
 def weak_peaks(r: Reading) -> Values:
@@ -52,7 +52,7 @@ def weak_peaks(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 3(a)",
-    "How far the three peaks near each resonance lie apart on the grid: a step at most.",
+    "Distance between the three peaks near each resonance on the grid, at most one step.",
     *(at_most(f"at {each:g} Hz", "Hz", _GRID_HZ) for each in PAPER_RESONANCES_HZ),
 )
 def weak_identical(r: Reading) -> Values:
@@ -79,7 +79,7 @@ def weak_equal(r: Reading) -> Values:
 
 @claim(
     "Figs. 2(c), 3 and 13",
-    "Response I at each linear resonance: at 50 µm over that at 1 µm.",
+    "Ratio of Response I at 50 µm to Response I at 1 µm, at each linear resonance.",
     *(at_most(f"at {each:g} Hz", "%", 1.0) for each in PAPER_RESONANCES_HZ),
 )
 def suppressed(r: Reading) -> Values:
@@ -91,7 +91,7 @@ def suppressed(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 3(d)",
-    "The two highest peaks of Response I at 50 µm, and how high the next one is.",
+    "The two highest peaks of Response I at 50 µm, and the relative height of the next peak.",
     *peaks_at(PAPER_TERMINAL_RESONANCES_HZ, _ROUGH_HZ),
     NO_THIRD,
 )
@@ -103,7 +103,7 @@ def strong_two_i(r: Reading) -> Values:
 
 @claim(
     "section 3.1, Fig. 3(d)",
-    "The two highest peaks of Response II at 50 µm, and how high the next one is.",
+    "The two highest peaks of Response II at 50 µm, and the relative height of the next peak.",
     *peaks_at(PAPER_TERMINAL_RESONANCES_HZ, _GRID_HZ),
     NO_THIRD,
 )
@@ -115,7 +115,7 @@ def strong_two_ii(r: Reading) -> Values:
 
 @costly_claim(
     "section 3.1",
-    "The two highest peaks of Response II at 100 µm, and how high the next one is.",
+    "The two highest peaks of Response II at 100 µm, and the relative height of the next peak.",
     *peaks_at(PAPER_TERMINAL_RESONANCES_HZ, _GRID_HZ),
     NO_THIRD,
 )

@@ -70,9 +70,9 @@ def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
             )
             for each in scores
         ),
-        f"The paper's c = 0.01 k, read in SI units, would make the damping ratios {first}, {second} and "
-        f"{third}; above 1 a mode does not oscillate. Read in mm, g and ms it is 1e-05 s. Of the claims that "
-        f"are measured at every damping, most hold at {best}.",
+        f"The paper's c = 0.01 k, read in SI units, would give damping ratios of {first}, {second} and "
+        f"{third}; above 1 a mode does not oscillate. Read in mm, g and ms, c / k is 1e-05 s. Of the claims "
+        f"that are measured at every damping, the most hold at {best}.",
     )
 
 
@@ -104,7 +104,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
     return report.DrawnFigure(
         name="reproduction_damping",
         title="Claims that hold, by damping",
-        caption="Dotted: what counts as near zero, and what the paper calls severe.",
+        caption="Dotted: upper limit of near zero, and lower limit of what the paper calls severe.",
         figure=figure,
         tables=(report.table("reproduction_damping", damping_time_s=damping_s, **columns),),
     )
@@ -128,6 +128,6 @@ def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -
         "Claims by setting",
         ("claim", *(each.name for each in settings)),
         (("hold", *totals), *kept),
-        "From rest alone. Claims that hold under every setting are left out, but counted in the first row. "
-        "An empty cell was not computed: claims on continuous models take too long.",
+        "All runs start from rest. Claims that hold under every setting are counted in the first row only. "
+        "Empty cells were not computed, because claims on continuous models take too long.",
     )

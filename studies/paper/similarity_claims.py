@@ -54,7 +54,7 @@ def rates(r: Reading, model: str, what: str) -> Reals:
 
 @claim(
     "section 4, Fig. 1(c)",
-    "Shares of the upper half of the gap in which that is so, with the force in equal parts.",
+    "Shares of the upper half of the gap in which this holds; the sum has equal shares of force.",
     at_least("sum between 5 and 7", "%", 1.0),
     at_least("closer with n", "%", 1.0),
     tried=(SEVENTH_COUNTS,),
@@ -91,7 +91,7 @@ def _fall_and_rise(between: str) -> tuple[Expectation, ...]:
 
 @claim(
     "section 4, Fig. 7(e-h)",
-    "Eqs. 6 and 7 at 1, 10 and 50 µm; the paper does not say which amplitude has the 68 %.",
+    "Eqs. 6 and 7 at 1, 10 and 50 µm; the paper does not state the amplitude of the 68 %.",
     *_fall_and_rise("10 µm"),
     tried=(*FITTED, *DAMPINGS),
     draws=_DRAWS,
@@ -117,7 +117,7 @@ def cubic_ii_lowest(r: Reading) -> Values:
 
 @costly_claim(
     "section 4, Fig. 8(a)",
-    "Rate at 50 µm less that at 1 µm.",
+    "Rate at 50 µm minus rate at 1 µm.",
     *(at_most(each, "%", 0.0) for each in _NAMES),
     tried=FITTED,
     draws=_DRAWS,
@@ -129,7 +129,7 @@ def rates_fall_i(r: Reading) -> Values:
 
 @costly_claim(
     "section 4, Fig. 8(a)",
-    "Largest step of the rate from one amplitude to the next.",
+    "Largest increase of the rate from one amplitude to the next.",
     *(at_most(each, "%", _READ_OFF) for each in _NAMES),
     tried=FITTED,
     draws=_DRAWS,
@@ -141,7 +141,7 @@ def rates_fall_steadily_i(r: Reading) -> Values:
 
 @costly_claim(
     "section 4, Fig. 8(b)",
-    "How far the smaller rate of 5 and 10 µm lies below the smaller of 1 and 50 µm.",
+    "Smaller rate of 1 and 50 µm minus smaller rate of 5 and 10 µm.",
     *(at_least(each, "%", 0.0) for each in _NAMES),
     tried=FITTED,
     draws=_DRAWS,
@@ -153,7 +153,7 @@ def rates_fall_rise_ii(r: Reading) -> Values:
 
 @costly_claim(
     "section 4, Fig. 8",
-    "Rate of n = 7 less that of n = 3, mean of the four amplitudes.",
+    "Rate of n = 7 minus rate of n = 3, mean over the four amplitudes.",
     *_BOTH,
     tried=FITTED,
     draws=_DRAWS,
@@ -165,7 +165,7 @@ def rates_grow_with_n(r: Reading) -> Values:
 
 @costly_claim(
     "section 4, Fig. 8",
-    "Rate of n = 7 less that of the sum, mean of the four amplitudes.",
+    "Rate of n = 7 minus rate of the sum, mean over the four amplitudes.",
     *_BOTH,
     tried=FITTED,
     draws=_DRAWS,
@@ -189,7 +189,7 @@ def extreme_orders(r: Reading) -> Values:
 
 @costly_claim(
     "section 4",
-    "Processor time of n = 47 over that of n = 3, on the same points.",
+    "Ratio of processor times of n = 47 to n = 3, for the same points.",
     at_least("ratio", "", 1.0),
 )
 def extreme_orders_cost(r: Reading) -> Values:

@@ -24,7 +24,7 @@ _STEPS = ("5 over 1 µm", "10 over 5 µm", "50 over 10 µm")
 
 @claim(
     "section 3.1, Fig. 4(e)",
-    "Level within 10 Hz of 201 over that of 95 Hz, and of 435 over that of 500 Hz.",
+    "Ratio of the levels within 10 Hz of 201 and 95 Hz, and of 435 and 500 Hz.",
     at_least("201 over 95 Hz", "", 1.0),
     at_least("435 over 500 Hz", "", 1.0),
 )
@@ -38,7 +38,7 @@ def redistributed(r: Reading) -> Values:
 
 @claim(
     "section 5, Figs. 10(f) and 14",
-    "Level within 10 Hz of 201 and of 435 Hz over that within 10 Hz of 260 Hz.",
+    "Levels within 10 Hz of 201 and of 435 Hz, relative to the level within 10 Hz of 260 Hz.",
     *(at_most(f"1 µm, {each:g} Hz", "%", _ABSENT) for each in PAPER_TERMINAL_RESONANCES_HZ),
     *(at_least(f"50 µm, {each:g} Hz", "%", _PRESENT) for each in PAPER_TERMINAL_RESONANCES_HZ),
 )
@@ -54,7 +54,7 @@ def lines_emerge(r: Reading) -> Values:
 
 @claim(
     "section 5, Figs. 10(f) and 14(b)",
-    "Largest of the spectrum at 50 µm, smoothed over 10 Hz, in 150-245 and in 350-500 Hz.",
+    "Frequency of the highest peak at 50 µm, smoothed over 10 Hz, in 150-245 and in 350-500 Hz.",
     *(about(f"near {each:g} Hz", "Hz", each, _NEAR_HZ) for each in PAPER_TERMINAL_RESONANCES_HZ),
 )
 def lines_at_terminal(r: Reading) -> Values:
@@ -69,7 +69,7 @@ def lines_at_terminal(r: Reading) -> Values:
 
 @claim(
     "sections 4 and 5, Figs. 10(e) and 14(a)",
-    "Response I at 260 Hz over that at the next lower amplitude.",
+    "Ratio of Response I at 260 Hz to its value at the next lower amplitude.",
     *(at_most(each, "", 1.0) for each in _STEPS),
 )
 def transmission_declines(r: Reading) -> Values:
@@ -80,7 +80,7 @@ def transmission_declines(r: Reading) -> Values:
 
 @claim(
     "sections 4 and 5, Figs. 10(f) and 14(b)",
-    "Exponent at 260 Hz less that at the next lower amplitude.",
+    "Exponent at 260 Hz minus its value at the next lower amplitude.",
     *(at_least(each.replace("over", "less"), "1/s", 0.0) for each in _STEPS),
 )
 def chaos_escalates(r: Reading) -> Values:

@@ -18,7 +18,7 @@ def refused(*arguments):
 @pytest.mark.parametrize("none", ["0", "-0.0"])
 def test_figure_5_needs_a_damping_time_above_zero(tmp_path, number, none):
     said = refused(number, "--out", tmp_path / "f", "--damping-time", none)
-    assert said == "figure 5 compares damping with none; give a damping time above 0 s"
+    assert said == "figure 5 compares with an undamped specimen; give a damping time above 0 s"
     assert not (tmp_path / "f").exists()
 
 

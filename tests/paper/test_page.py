@@ -110,7 +110,7 @@ def test_the_claims_report_begins_with_counts_and_has_a_card_per_section(found, 
     page = Page(path.read_text(encoding="utf-8"))
     assert page.headings == ["claims on", "result", "agreement", "what to look at"]
     assert page.findings.startswith("Of 3 claims 1 hold under the defaults, 0 for a share of starts, 1 under")
-    assert page.findings.endswith("Those that do not hold: third.")
+    assert page.findings.endswith("Claims that do not hold: third.")
     assert "Synthetic 1 of 3 claims hold under the defaults. no second, third" in page.visible
     order = ["findings", "figure-1", "cards", "card-1", "further", "figure-2", "details"]
     assert [each for each in page.ids if each in order] == order
