@@ -160,7 +160,7 @@ def test_invalid_simulated_faults_are_refused_before_opening(refusal, tmp_path):
     script = tmp_path / "faults.toml"
     script.write_text('[[faults]]\nat_s = 1\nfault = "fill_disk"\n', encoding="utf-8")
     served = refusal("serve-rig", "--address", "127.0.0.1:0", "--faults", script)
-    assert "befall the program that records" in served
+    assert "need a program that records" in served
     real = ROOT / "hardware_configs" / "lab_rig.toml"
     measured = refusal("measure", campaign(tmp_path), "--bench", real, "--faults", script, "--out", "out")
     assert "is a real one" in measured

@@ -92,7 +92,7 @@ class TestTheScript:
     @pytest.mark.parametrize("name", sorted(DISK_FAULTS))
     def test_a_rig_served_to_other_programs_refuses_disk_faults(self, scripted, name):
         text = fault(name, 1, **({"delay_s": 0.1} if name == "slow_disk" else {}))
-        with pytest.raises(ConfigurationError, match="befall the program that records"):
+        with pytest.raises(ConfigurationError, match="need a program that records"):
             VirtualRig(scripted(text), disk=DiskFaults.REFUSED)
 
 

@@ -284,7 +284,7 @@ def test_a_failed_simulation_is_reported_and_stops_the_rig():
     assert np.all(np.isfinite(conversion.read(20000)))
     for _ in range(2):
         with pytest.raises(
-            AcquisitionError, match=r"motion was lost.*The virtual rig stands still: restart it"
+            AcquisitionError, match=r"motion was lost.*The virtual rig has stopped: restart it"
         ):
             conversion.read(51200)
     assert world.time_s < 0.6

@@ -198,12 +198,12 @@ def catalogue_with(product_type: str, name: str) -> Catalogue:
     if old is None:
         known = ", ".join(device.product_type for device in devices)
         raise ConfigurationError(
-            f"The simulated DAQ has no {product_type!r}: it has {known}; "
-            "nothing was started, choose one of these"
+            f"The simulated DAQ has no device type {product_type!r}; "
+            f"nothing was started. Choose one of {known}"
         )
     if any(device.name.lower() == name.lower() and device is not old for device in devices):
         raise ConfigurationError(
-            f"The simulated {product_type} cannot be called {name!r}: another device is; "
+            f"The simulated {product_type} cannot be called {name!r}: another device has this name; "
             "nothing was started, choose another name"
         )
 

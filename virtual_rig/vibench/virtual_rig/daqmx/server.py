@@ -49,7 +49,7 @@ class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships 
 def _refuse(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
     context.abort(
         grpc.StatusCode.UNAUTHENTICATED,
-        f"this rig is served with a token: put what 'vibench serve-rig' printed into {TOKEN_VARIABLE}",
+        f"this rig needs a token: set {TOKEN_VARIABLE} to the token that 'vibench serve-rig' printed",
     )
 
 
@@ -120,8 +120,8 @@ class DaqServer:
             port = self._server.add_insecure_port(address)
         except RuntimeError as error:
             raise ConfigurationError(
-                f"The simulated DAQ cannot listen on {address}: it is taken or does not exist; "
-                f"nothing was started, use another port, or port 0 for a free one"
+                f"The simulated DAQ cannot listen on {address}: the address is in use or does not exist; "
+                f"nothing was started. Use another port, or port 0 for a free port"
             ) from error
         self.address = f"{address.rpartition(':')[0]}:{port}"
         with self._rig.changed:
@@ -219,7 +219,7 @@ def _require_address(address: str) -> None:
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(
             f"{address!r} is not an address to listen on; nothing was started, give HOST:PORT with a port up "
-            f"to {LAST_PORT}, as 127.0.0.1:31763; port 0 takes a free one"
+            f"to {LAST_PORT}, such as 127.0.0.1:31763; port 0 selects a free port"
         )
 
 

@@ -34,7 +34,7 @@ class TdmsLog:
         """Create the file; an existing one is replaced."""
         if find_spec("nptdms") is None:
             raise ConfigurationError(
-                "Logging needs npTDMS where the virtual rig runs: pip install 'vibench[exchange]'"
+                "Logging needs npTDMS on the computer of the virtual rig: pip install 'vibench[exchange]'"
             )
         self._settings = settings
         self._inputs = inputs

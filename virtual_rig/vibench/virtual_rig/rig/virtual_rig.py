@@ -161,7 +161,7 @@ class VirtualRig:
             return ScpiSocket(self.generator, self._scpi_port)
         except (OSError, OverflowError) as error:
             raise ConfigurationError(
-                f"port {self._scpi_port} cannot be listened on ({error}); give another, or 0 for a free one"
+                f"port {self._scpi_port} cannot be used ({error}); give another port, or 0 for a free port"
             ) from error
 
     def _serve(self) -> DaqServer:
@@ -206,8 +206,8 @@ def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
     script = load_fault_script(Path(virtual.faults))
     if disk is DiskFaults.REFUSED and any(each.fault in DISK_FAULTS for each in script.faults):
         raise ConfigurationError(
-            f"{virtual.faults}: {' and '.join(sorted(DISK_FAULTS))} befall the program that records, which "
-            "is not this one. Nothing was started; leave them out, or give the script to 'vibench measure'"
+            f"{virtual.faults}: {' and '.join(sorted(DISK_FAULTS))} need a program that records, and this "
+            "program does not. Nothing was started; omit them, or give the script to 'vibench measure'"
         )
     return script
 
@@ -221,7 +221,7 @@ def _address(resource: str) -> tuple[tuple[int, int], str]:
         ids = 0, 0
     if not fields[0].startswith("USB") or len(fields) < _USB_RESOURCE_FIELDS or ids[0] not in GENERATORS:
         raise ConfigurationError(
-            f"generator.resource = {resource!r}: the virtual generator sits on USB; "
+            f"generator.resource = {resource!r}: the virtual generator is a USB device; "
             "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
             "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
         )

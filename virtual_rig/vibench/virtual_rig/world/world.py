@@ -234,8 +234,8 @@ class World:
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
             raise ConfigurationError(
                 f"A sample rate of {sample_rate_hz:g} Hz is not possible on the virtual rig with its "
-                f"{self._grid.rate_hz:g} steps a second: {LOWEST_RATE_HZ:g} to {fastest_hz:g} Hz is; nothing "
-                "was started, choose one of those"
+                f"{self._grid.rate_hz:g} steps a second; nothing was started. Choose a rate from "
+                f"{LOWEST_RATE_HZ:g} to {fastest_hz:g} Hz"
             )
         with self._turn:
             ratio = self._grid.rate_hz / sample_rate_hz
@@ -387,7 +387,7 @@ class World:
                     if role in self._sensors and role not in others:
                         signals[self._rows[role]] = self._sensors[role].volts(means, first)
         except MotionFailed as error:
-            raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
+            raise AcquisitionError(f"{error}. The virtual rig has stopped: restart it") from error
         if others:
             ends = np.concatenate([self._last_end, motion.ends])
             self._last_end = ends[-1:]
@@ -455,7 +455,7 @@ def virtual_section(rig: Rig) -> VirtualConfig:
     """Return the rig's [virtual] section; raises ConfigurationError if the instruments are real."""
     if rig.virtual is None:
         raise ConfigurationError(
-            f"The rig {rig.name!r} has no [virtual] section, so its instruments are real and none was "
+            f"The rig {rig.name!r} has no [virtual] section, so its instruments are real and nothing was "
             "simulated; add the section, or open the bench with the real instruments"
         )
     return rig.virtual
