@@ -145,5 +145,5 @@ def test_a_requested_computing_time_is_met_even_if_a_window_takes_longer(contact
 
 def test_a_computing_time_too_short_for_a_drive_period_is_refused():
     chain = chain_of(gong2025(0.1, 10.0, "power:3"), 4)
-    with pytest.raises(ValueError, match=r"one drive period of 4\.7619 s takes longer to follow"):
+    with pytest.raises(ValueError, match=r"one drive period of 4\.7619 s takes longer to compute"):
         chain_response_to(chain, Harmonic(0.21, 2.71e-7), None, 0.5)

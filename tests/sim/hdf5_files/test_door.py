@@ -78,7 +78,7 @@ def too_many_attributes(file):
     [
         (huge, "declares 4000000000000 bytes, but stores only 0"),
         (huge_chunks, "chunks of 4000000000 bytes"),
-        (too_deep, "more than 32 deep"),
+        (too_deep, "more than 32 levels deep"),
         (too_many_links, "more than 20000 objects"),
         (too_many_attributes, "more than 1000 attributes"),
     ],

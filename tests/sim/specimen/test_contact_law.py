@@ -67,7 +67,7 @@ def test_a_contact_law_is_found_by_its_name(text, law):
         ("steel", r"Contact 'steel' is not known: give one of hertz, linear"),
         ("power:", r"Contact 'power:' is not known"),
         ("power:x", r"Contact 'power:x' is not known"),
-        ("power:4", r"Exponents \[4\] are not allowed: odd"),
+        ("power:4", r"Exponents \[4\] are not allowed: give odd"),
         ("power:1", r"Exponents \[1\] are not allowed"),
         ("power:3+3", r"Exponents \[3, 3\] are not allowed"),
         ("power:3+5+7+9+11+13+15", "at most 6"),
