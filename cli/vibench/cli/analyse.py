@@ -100,7 +100,7 @@ def analyse(
     ] = False,
     free: Annotated[
         list[Parameter] | None,
-        option("With --fit: also fit this number to noise; repeat for more, at most one mass.", "NAME"),
+        option("With --fit: also fit this parameter to noise tests; repeatable, one mass at most.", "NAME"),
     ] = None,
     hidden: Annotated[
         bool,

@@ -33,10 +33,10 @@ def figure(
     recordings: Annotated[
         Path | None, option("Recordings for figures 12 to 14; see vibench demo.", "DIR")
     ] = None,
-    damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
+    damping_time: Annotated[float, option("Damping c_i = time * k_i.", "S")] = FigureOptions.damping_time_s,
     gap: Annotated[float, option("Clearance at both stops.", "M")] = FigureOptions.gap_m,
     accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = FigureOptions.accuracy,
-    grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
+    grid: Annotated[FrequencyGrid, option("Points every 5 Hz (coarse) or 1 Hz (fine).")] = FigureOptions.grid,
     workers: Workers = None,
     kinds: Annotated[list[ImageKind], option("Image format; may be repeated.", name="--format")] = [  # noqa: B006 - typer copies it
         ImageKind.PNG,

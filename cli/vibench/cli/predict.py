@@ -62,7 +62,7 @@ def predict(
         ),
     ] = None,
     error: Annotated[str | None, option("Relative error to reach at each point, such as 1%.", "E")] = None,
-    time_limit: Annotated[str | None, option("Time for each point, such as 2s.", "T", name="--time")] = None,
+    time_limit: Annotated[str | None, option("Time limit per point, such as 2s.", "T", name="--time")] = None,
     workers: Workers = None,
     cluster: Cluster = None,
     out: Annotated[Path | None, option("Store the results in a file.", "FILE.h5")] = None,

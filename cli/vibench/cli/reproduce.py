@@ -29,12 +29,12 @@ IMAGES = "images"
 def reproduce(
     out: Annotated[Path, option("Folder for the page and its studies.", "DIR")],
     markdown: Annotated[Path | None, option("File of the page; by default in DIR.", "FILE.md")] = None,
-    damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
+    damping_time: Annotated[float, option("Damping c_i = time * k_i.", "S")] = FigureOptions.damping_time_s,
     accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = Accuracy.QUICK,
-    grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
+    grid: Annotated[FrequencyGrid, option("Points every 5 Hz (coarse) or 1 Hz (fine).")] = FigureOptions.grid,
     choices: Annotated[
         list[str] | None,
-        option(f"Other open choices of the paper: {_FORMS}.", "NAME=VALUE", name="--with"),
+        option(f"Choices that the paper leaves open: {_FORMS}.", "NAME=VALUE", name="--with"),
     ] = None,
     workers: Workers = None,
     as_json: AsJson = False,

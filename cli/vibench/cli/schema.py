@@ -11,7 +11,7 @@ from .output import print_json
 
 def schema(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="campaign, rig, study, map, mapping or specimen.")
+        str, typer.Argument(metavar="KIND", help="Kind: campaign, rig, study, map, mapping or specimen.")
     ],
 ) -> None:
     """Print the JSON Schema (draft 4) of a kind of TOML file, for an editor with validation."""

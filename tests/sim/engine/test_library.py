@@ -135,7 +135,7 @@ def test_a_scene_with_impossible_values_is_refused():
 
 def test_a_nan_time_is_refused():
     run = NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 3e-7)
-    with pytest.raises(ValueError, match="instant must be finite"):
+    with pytest.raises(ValueError, match="end time must be finite"):
         run.advance(np.nan, RunRecord(0))
     with pytest.raises(ValueError, match="tolerance"):
         NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 0.0)

@@ -81,7 +81,7 @@ class UserActions(QObject):
         else:
             self._context.warn(
                 "Cannot start: the description of the test was not scrolled to its end.",
-                next_step="Read it to the end on the Run page (Ctrl+3); PgDn scrolls.",
+                next_step="Read the description on the Run page (Ctrl+3); PgDn scrolls.",
             )
             self._context.page_requested.emit(RUN)
 
@@ -106,7 +106,7 @@ class UserActions(QObject):
         bridge = self._context.bridge
         if bridge.is_ordering:
             self._context.warn(
-                f"Cannot {verb} yet: {_BUSY}.", next_step="Wait until it has ended, then try again."
+                f"Cannot {verb} yet: {_BUSY}.", next_step="Try again when the command has ended."
             )
         elif bridge.state not in states:
             self._context.warn(f"Cannot {verb}: {_STANDS[bridge.state]}.", next_step=_NEXT[bridge.state])
@@ -133,8 +133,8 @@ _NEXT = {
     EngineState.READY: "Arm the test first (Ctrl+Return).",
     EngineState.CHECKING: "Wait for READY.",
     EngineState.ARMED: "Start the plan (F5), or disarm it (Cancel on the Run page).",
-    EngineState.RUNNING: "Wait until it has ended, or stop it (STOP, Esc).",
-    EngineState.HELD: "Press Go on (Run page), or stop it (STOP, Esc).",
+    EngineState.RUNNING: "Wait for the end of the measurement, or stop it (STOP, Esc).",
+    EngineState.HELD: "Press Go on (Run page), or stop the measurement (STOP, Esc).",
     EngineState.RAMPING_DOWN: "Wait for READY.",
     EngineState.FAULT: "See Details for the cause, then open the bench again on the Rig page (Ctrl+1).",
 }

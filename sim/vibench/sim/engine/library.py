@@ -172,7 +172,7 @@ class Engine:
         code = int(self._functions[function](structure.ctypes.data))
         if code < 0:
             raise ValueError(
-                f"The native engine refuses to {function}: array sizes must agree and numbers be finite."
+                f"The native engine refuses to {function}: array sizes must agree and numbers must be finite."
             )
         return code
 

@@ -212,7 +212,7 @@ class NativeRun(_Run):
         code = self.engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
         if code < 0:
             raise ValueError(
-                f"The native engine refuses to advance to {until_s} s: the instant must be finite."
+                f"The native engine refuses to advance to {until_s} s: the end time must be finite."
             )
         return Outcome(code)
 

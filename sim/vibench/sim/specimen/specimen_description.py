@@ -213,7 +213,7 @@ class SpecimenDescription(_Described):
         except ArithmeticError:
             moves = np.array([math.nan])
         if not bool(np.all(np.isfinite(moves))):
-            raise ValueError("its masses and springs are too small, or too large, to be computed with")
+            raise ValueError("its masses and springs are too small, or too large, for computation")
         return self
 
     def specimen(

@@ -202,7 +202,7 @@ class GridResults(Generic[Plan]):
         }
         if name not in columns:
             raise InvalidStudy(
-                f"{name!r} is not a quantity of a {self.plan.called}; there are {', '.join(columns)}."
+                f"{name!r} is not a quantity of a {self.plan.called}; give one of {', '.join(columns)}."
             )
         column = columns[name]
         rows = self.arrays[name].astype(np.float64)
@@ -224,7 +224,7 @@ class GridResults(Generic[Plan]):
         if unknown:
             names = ", ".join(axis.name for axis in self.axes)
             raise InvalidStudy(
-                f"{unknown[0]!r} is not an axis of this {self.plan.called}; there are {names}."
+                f"{unknown[0]!r} is not an axis of this {self.plan.called}; give one of {names}."
             )
         return tuple(
             _index(axis, fixed[axis.name]) if axis.name in fixed else slice(None) for axis in self.axes
@@ -289,7 +289,7 @@ def _index(axis: StudyAxis, value: Value) -> int:
             return index
     shown = ", ".join(str(each) for each in axis.values[:SHOWN_VALUES])
     more = ", …" if len(axis.values) > SHOWN_VALUES else ""
-    raise InvalidStudy(f"{value!r} is not a value of {axis.name}; there are {shown}{more}.")
+    raise InvalidStudy(f"{value!r} is not a value of {axis.name}; give one of {shown}{more}.")
 
 
 def _is_same(here: Value, requested: Value) -> bool:

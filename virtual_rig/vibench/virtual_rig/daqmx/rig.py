@@ -197,7 +197,7 @@ class WallPace:
     def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
         """Follow ``clock`` [s], any monotonic clock."""
         if not 0 < speed < float("inf"):
-            message = f"the speed of a rig on the wall clock is {speed}; it must be above 0 and finite"
+            message = f"the speed of the rig is {speed} times real time; it must be above 0 and finite"
             raise ValueError(message)
         self.speed = speed
         self._clock = clock

@@ -262,7 +262,7 @@ class QueuePage(Page):
         self.summary.setText(
             f"{campaign.name}: {count} recording{'' if count == 1 else 's'}   ·   "
             f"takes {clock(preview.duration_s)}   ·   "
-            f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
+            f"if started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )
 
     def _add_test(self) -> None:

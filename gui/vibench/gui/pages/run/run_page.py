@@ -135,7 +135,7 @@ class LevelMeters(QWidget):
         """Paint every row."""
         painter = QPainter(self)
         if not self._rows:
-            paint_hint(painter, self.rect(), "Shows all channels while a test runs.", self._theme.muted)
+            paint_hint(painter, self.rect(), "Channel levels appear while a test runs.", self._theme.muted)
         row_height = _ROW * self.fontMetrics().height()
         for number, (word, level) in enumerate(self._rows):
             self._paint_row(painter, QRectF(0, number * row_height, self.width(), row_height), word, level)
