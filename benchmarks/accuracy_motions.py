@@ -247,8 +247,8 @@ class MotionBenchmark:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
-                    "Quick is sufficient: from start to start Response I "
-                    f"scatters by {self.levels[0].response_i_scatter:.1%}, which no level reduces."
+                    f"`quick` is sufficient: Response I scatters by {self.levels[0].response_i_scatter:.1%} "
+                    "between starts, and no level reduces this scatter."
                 )
 
     @property
@@ -263,13 +263,13 @@ class MotionBenchmark:
     def _periodic_advice(self) -> str:
         quick, standard, reference = self.levels
         steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
-        errors = f"{steps} in the state"
+        errors = f"{steps} in the state at the three levels"
         price = f"reference takes {reference.cost / quick.cost:.1f} times as long as quick"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
                 return f"Each level reduces the error: {errors}; {price}."
             case [Accuracy.STANDARD]:
-                return f"Only reference reduces the error: {errors}; {price}."
+                return f"Only `reference` reduces the error: {errors}; {price}."
             case [Accuracy.REFERENCE]:
                 return f"Standard reduces the error, reference does not: {errors}; {price}."
             case _:

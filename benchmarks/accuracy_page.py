@@ -79,8 +79,8 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "",
         f"Each scene is simulated until it settles, and from {lotteries[0].starts} further starts, a",
         "millionth of the gap apart, for at most 300 s. A chaotic or undecided motion may still change.",
-        "The intervals of the shares hold together in 19 of 20 cases, now and after a change. Cost is",
-        "the time of the whole prediction divided by that of one run.",
+        "All intervals of shares hold together in 19 of 20 cases, also if a motion changes later. Cost is",
+        "the time of the whole prediction divided by the time of one run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -118,7 +118,7 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "## Transients, from rest",
         "",
         "In a settled motion, integration errors decay; in a transient a small error may grow a",
-        "thousandfold. Each level promises its error above multiplied by the largest growth. The stated",
+        "thousandfold. Each level promises the settled error above times the largest growth. The stated",
         "error of the responses comes from a stricter run from the same start. The state is compared after",
         "0.1 s with the independent solution, the responses of the second half with the reference level.",
         "Each cell has the error of the state (promised), then the error of the responses (stated).",
@@ -185,7 +185,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
             names.setdefault(pair, []).append(each.motion.name)
     if names:
         lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
-        yield from ("", f"Errors that a level does not reduce by a factor of {LEAST_GAIN:g}:", "", *lines)
+        yield from ("", f"Levels that reduce an error by less than a factor of {LEAST_GAIN:g}:", "", *lines)
 
 
 def main() -> None:

@@ -167,7 +167,7 @@ def test_every_point_of_a_curve_reaches_the_requested_error(answered):
         (("--error", "1%", "--duration", 30), "--error was given with --duration"),
         (("--time", "2s", "--accuracy", "quick"), "--time was given with --accuracy"),
         (("--error", "1%", "--budget", "1s"), "--error was given with --budget"),
-        (("--error", "200%"), "--error was given as '200%': it must be 1 or less"),
+        (("--error", "200%"), "--error was given as '200%': it must be below 1"),
         (("--error", "0"), "--error was given as '0': it must be above 0"),
         (("--error", "small"), "'small' is not a number, alone or with %"),
         (("--time", "soon"), "'soon' is not a number, alone or with ms or s or min or h"),
