@@ -22,7 +22,7 @@ def open_to_write(path: Path) -> int:
 def open_for_all(path: Path) -> int:
     """Return the descriptor of a lock file for all users, which is created if missing.
 
-    Raises OSError if the path is not a regular file with a single name, but for example a link or a pipe.
+    Raises OSError if the path is not a regular file with a single name: a link or a pipe, for example.
     """
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:
