@@ -121,7 +121,7 @@ def on_another_computer(what):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, tmp_path):
-    there = "Not reached, since it runs on another computer: night (process"
+    there = "Not reached because it runs on another computer: night (process"
     with on_another_computer("night") as path:
         alone = vibench_here("stop", cwd=tmp_path)
         assert alone.returncode == 1

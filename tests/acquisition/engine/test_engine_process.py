@@ -91,12 +91,12 @@ class TestTheJob:
             compared = [each.name for each in until_state(client, EngineState.READY).check.findings]
             assert any("since last time" in name for name in compared) is not is_new
         plan = client.arm(campaign("run", duration_s=3.0), tmp_path / "new")
-        titles = ["What", "Level", "Limits", "How long", "Saved in", "If nobody looks"]
+        titles = ["What", "Level", "Limits", "Duration", "Saved in", "Without a viewer"]
         assert [line.partition(":")[0] for line in plan.lines] == titles
         # What may break, not the length of a ramp or the points of a period.
         assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
         assert re.fullmatch(
-            r"If nobody looks: aborted after [\d.]+ s; after [\d.]+ s where a window hangs", plan.lines[5]
+            r"Without a viewer: aborted after [\d.]+ s; after [\d.]+ s if the window hangs", plan.lines[5]
         )
         assert until_state(client, EngineState.ARMED).armed.expires_in_s > 50
         assert not (tmp_path / "new").exists()
@@ -166,7 +166,7 @@ class TestACheckIsStopped:
             status = until_state(visitor, EngineState.READY)
         assert status.check is None
         assert [message.what.partition(":")[0] for message in status.messages][-2:] == [
-            "The viewer is gone",
+            "The viewer was lost",
             "the bench check was stopped",
         ]
 
@@ -184,7 +184,7 @@ class TestACheckIsStopped:
 
 class TestRefusals:
     def test_requests_not_allowed_in_a_state_are_refused_with_a_sentence(self, client, tmp_path):
-        with pytest.raises(EngineError, match=r"is closed and cannot start now; it can when it is armed"):
+        with pytest.raises(EngineError, match=r"is closed and cannot start now; it must be armed first"):
             client.start()
         with pytest.raises(EngineError, match="cannot mark now"):
             client.mark("too early")
@@ -279,7 +279,7 @@ class TestNobodyLooks:
         )  # asks nothing meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
         messages = until_state(client, EngineState.READY).messages
-        told = [message for message in messages if message.what.startswith("The viewer is gone")][-1]
+        told = [message for message in messages if message.what.startswith("The viewer was lost")][-1]
         assert told.kind.value == "fault"
         assert "unattended" in told.next_step
 
@@ -413,7 +413,7 @@ class TestItsEnd:
         with start_engine() as process:
             running(process.client, shipped_rig, tmp_path)
         assert not process.is_alive
-        kept(tmp_path / "run.h5", "was told to end")
+        kept(tmp_path / "run.h5", "a request ended the engine")
 
     @pytest.mark.thorough
     def test_a_client_of_a_killed_engine_gets_an_error(self, engine, shipped_rig, tmp_path):

@@ -58,7 +58,7 @@ def test_a_request_that_the_state_does_not_permit_is_refused(handler, word):
     verb = VERBS[word]
     assert EngineState.CLOSED not in verb.states
     arguments = dict.fromkeys(name for name in verb.request.model_fields if name != "ask")
-    with pytest.raises(Exception, match=f"is closed and cannot {word} now; it can when it is "):
+    with pytest.raises(Exception, match=f"is closed and cannot {word} now; it must be "):
         handler.carry_out(verb, arguments)
 
 
@@ -69,7 +69,7 @@ def test_a_closing_bench_refuses_requests(shipped_rig):
     handler = RequestHandler(engine, jobs)
     engine.open(shipped_rig)
     handler.carry_out(VERBS["close"], {})
-    with pytest.raises(EngineError, match="is being closed, and the engine cannot check meanwhile"):
+    with pytest.raises(EngineError, match="is being closed, so the engine cannot check now"):
         handler.carry_out(VERBS["check"], {})
     jobs.leave()
     jobs.run()
@@ -127,7 +127,7 @@ def test_an_armed_run_stays_armed_long_enough_to_be_started(shipped_rig, tmp_pat
     assert engine.published.state is EngineState.ARMED
     looked_after_until(handler, lambda: engine.published.state is not EngineState.ARMED)
     last = engine.published.status().messages[-1]
-    assert (last.what.partition(":")[0], last.done) == ("The viewer is gone", "Disarmed.")
+    assert (last.what.partition(":")[0], last.done) == ("The viewer was lost", "Disarmed.")
     engine.close()
 
 

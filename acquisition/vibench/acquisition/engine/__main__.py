@@ -40,12 +40,12 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
     parser.add_argument("--attendance", type=Supervision, default=Supervision.ATTENDED)
     parser.add_argument("--what", default="engine", help="purpose, shown to other viewers")
-    parser.add_argument("--host", default=LOOPBACK, help="address to listen at; a token is always required")
+    parser.add_argument("--host", default=LOOPBACK, help="address to listen on; a token is always required")
     parser.add_argument(
         "--forgotten-s",
         type=float,
         default=FORGOTTEN_S,
-        help="unattended: ends after this time without a request, if no campaign was ever started [s]",
+        help="unattended, no campaign started: end the engine after this time without a request [s]",
     )
     return parser.parse_args()
 
@@ -65,7 +65,7 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
         pause = Event()
         while not handler.is_forgotten(after_s):
             pause.wait(after_s / 10)
-        handler.shutdown(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to carry out")
+        handler.shutdown(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to run")
 
     Thread(target=look, name="engine forgotten", daemon=True).start()
 

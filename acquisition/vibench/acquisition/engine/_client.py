@@ -100,8 +100,8 @@ def the_engine(pid: int | None) -> Announcement:
     if others:
         raise EngineError(f"{wanted}; {_named(others)} has no engine and can only be stopped: 'vibench stop'")
     raise EngineError(
-        f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
-        "one of another user, or with another VIBENCH_STATE_DIR, is stopped from there"
+        f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: stop "
+        "an engine of another user, or with another VIBENCH_STATE_DIR, from there"
         + "".join(f". {each}" for each in [out_of_reach()] if each)
     )
 
@@ -122,7 +122,7 @@ def out_of_reach() -> str:
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return (
-        f"Not reached, since it runs on another computer: {named}; run 'vibench stop' there" if named else ""
+        f"Not reached because it runs on another computer: {named}; run 'vibench stop' there" if named else ""
     )
 
 
@@ -177,8 +177,8 @@ def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PA
         raise _silent(patience_s) from error
     except OSError as error:
         raise EngineGone(
-            f"no engine answers at {address.host}:{address.port} ({error}); start one, or see whether it "
-            "has ended"
+            f"no engine answers at {address.host}:{address.port} ({error}); check that it still runs, or "
+            "start one"
         ) from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     try:
@@ -229,9 +229,9 @@ def exchange(
 
 def _silent(patience_s: float) -> EngineSilent:
     return EngineSilent(
-        f"the engine does not answer within {patience_s:g} s; its process hangs, or was stopped. What it "
-        "drives may go on: 'vibench stop' leaves a stop that it obeys when it comes back; in an emergency "
-        "switch the amplifier off by hand"
+        f"the engine does not answer within {patience_s:g} s; its process hangs or is suspended. The output "
+        "may stay on: 'vibench stop' requests a stop that the engine obeys when it runs again; in an "
+        "emergency switch the amplifier off by hand"
     )
 
 

@@ -210,7 +210,7 @@ class Engine:
             self.published.messages.warn(
                 f"The live twin has ended ({words}).",
                 "The measurement goes on.",
-                "Changes of the specimen are not noticed; turn the twin on again.",
+                "Changes of the specimen are no longer detected; turn the twin on again.",
             )
 
     def _check_ended(self, stopped: CheckStopped) -> None:

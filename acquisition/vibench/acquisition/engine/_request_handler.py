@@ -76,14 +76,14 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         lines=(
             f"What: {len(missing)} recordings ({kinds})" + (f", {kept} kept from before" if kept else ""),
             f"Level: at most {loudest:g} Vpp at the generator",
-            f"Limits: {closest.what} comes closest, {closest.use:.0%} of {bound} in {tightest}",
-            f"How long: {length} (h:min:s), ramps and checks included",
+            f"Limits: the closest is {closest.what}, at {closest.use:.0%} of {bound} in {tightest}",
+            f"Duration: {length} (h:min:s), ramps and checks included",
             f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
-            "If nobody looks: "
+            "Without a viewer: "
             + (
-                f"aborted after {granted_s:.1f} s; after {hung_s:.1f} s where a window hangs"
+                f"aborted after {granted_s:.1f} s; after {hung_s:.1f} s if the window hangs"
                 if is_attended
-                else "it goes on, unattended"
+                else "continues, unattended"
             ),
         ),
         expires_in_s=ARMED_S,
@@ -101,7 +101,7 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
         if sheet is None or missing:
             raise CheckFailed(
                 f"settings made by hand are not confirmed ({'; '.join(missing)}). Nothing was energised; "
-                "look at each knob, confirm it, and open the bench again"
+                "check and confirm each knob, then open the bench again"
             )
         return sheet
 
@@ -150,14 +150,14 @@ class RequestHandler:
             # returned yet.
             if self._is_ending or (self._is_closing and state is not EngineState.CLOSED):
                 raise EngineError(
-                    f"the bench is being closed, and the engine cannot {verb.word} meanwhile; "
-                    "ask again when it is closed"
+                    f"the bench is being closed, so the engine cannot {verb.word} now; "
+                    "try again when the bench is closed"
                 )
             if state not in verb.states:
                 now, *permitted = (each.value.replace("_", " ") for each in (state, *verb.states))
                 allowed = " or ".join(permitted)
                 raise EngineError(
-                    f"the engine is {now} and cannot {verb.word} now; it can when it is {allowed}"
+                    f"the engine is {now} and cannot {verb.word} now; it must be {allowed} first"
                 )
             return method(**arguments)
 
@@ -267,7 +267,7 @@ class RequestHandler:
     def carried_request(self) -> CampaignRequest:
         """Return the last started campaign, with its options."""
         if self._carried is None:
-            raise EngineError("nothing was started by a request to this engine; arm and start a campaign")
+            raise EngineError("no campaign was started in this engine yet; arm and start a campaign")
         return self._carried
 
     def turn_twin(self, switch: TwinSwitch) -> None:
@@ -279,7 +279,7 @@ class RequestHandler:
         """Publish the live twin's report."""
         self._engine.published.twin(told)
 
-    def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "the engine was told to end") -> None:
+    def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "a request ended the engine") -> None:
         """End the run, silence everything, and let the engine end. Legal in every state."""
         self._stop(StopRequest.by(cause, reason))
         self._is_ending = True
@@ -296,7 +296,7 @@ class RequestHandler:
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
             self.disarm()
             engine.published.messages.warn(
-                f"Armed for {ARMED_S:g} s and not started.", "Disarmed.", "Arm again."
+                f"Armed for {ARMED_S:g} s but not started.", "Disarmed.", "Arm again."
             )
         if self._attendance is Supervision.UNATTENDED:
             return
@@ -341,15 +341,15 @@ class RequestHandler:
         engine = self._engine
         if engine.published.state is EngineState.ARMED:
             self.disarm()
-            engine.published.messages.warn(f"The viewer is gone: {reason}.", "Disarmed.", "Arm again.")
+            engine.published.messages.warn(f"The viewer was lost: {reason}.", "Disarmed.", "Arm again.")
         elif engine.published.state in SOUNDING and engine.switch.request is None:
             engine.switch.ask(StopRequest.by(Cause.VIEWER_GONE, reason))
             kept = "; the recording is kept" if engine.published.state in DRIVING else ""
             engine.published.messages.alarm(
-                f"The viewer is gone: {reason}.",
+                f"The viewer was lost: {reason}.",
                 f"Ramped down{kept}.",
-                "If the computer was too busy, end other programs, grant more patience (Settings), or arm a "
-                "campaign that is left alone, unattended (Queue page, or vibench measure).",
+                "If the computer was too busy, end other programs, allow a longer silence (Settings, "
+                "patience), or run the campaign unattended (Queue page, or vibench measure).",
             )
 
     def _close(self) -> None:

@@ -154,7 +154,7 @@ class Admission:
             with suppress(OSError):
                 send(
                     connection,
-                    refusal("the token is not this engine's; the connection was closed", EngineError()),
+                    refusal("the token is not valid here; the connection was closed", EngineError()),
                 )
             self._turn_away(connection)
             return
@@ -192,9 +192,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
-        return refusal(
-            f"what was asked is not understood ({where}: {detail['msg']}); nothing was done", error
-        )
+        return refusal(f"the request is not valid ({where}: {detail['msg']}); nothing was done", error)
     except AcquisitionError as error:
         return refusal(str(error), error)
 

@@ -170,7 +170,7 @@ def stop_engine(
         if not isinstance(engine, Announcement):
             raise EngineError(
                 f"process {engine.pid} ({engine.what}) is not an engine and cannot be held. It continues; "
-                "stop it: ramp, abort or off"
+                "stop it with ramp, abort or off"
             )
         _tell(engine, level, reason)
         return StopDelivery.TOLD
@@ -181,7 +181,7 @@ def stop_engine(
         if isinstance(engine, Announcement):
             return _tell(engine, level, reason)
         raise EngineGone(
-            f"no stop could be written to the state folder for process {engine.pid}: {error}. {SWITCH_OFF}"
+            f"the stop for process {engine.pid} was not written to the state folder: {error}. {SWITCH_OFF}"
         ) from error
     match fate_of(stop, lambda: engine.is_alive):
         case Fate.SILENT:
@@ -196,7 +196,7 @@ def stop_engine(
     with suppress(OSError):
         Path(stop).unlink()
     raise EngineGone(
-        f"process {engine.pid} ({engine.what}) has ended and has not confirmed that its output is off. "
+        f"process {engine.pid} ({engine.what}) has ended without confirming that its output is off. "
         f"{SWITCH_OFF}"
     )
 
