@@ -117,8 +117,8 @@ def test_a_density_above_its_abort_limit_ramps_down_the_run(recorded):
     ("changes", "said"),
     [
         ({"spectrum": ()}, "at least 1 item"),
-        ({"spectrum": corners((100, 1), (50, 1))}, "give them rising"),
-        ({"abort_db": 2.0}, "is not above tolerance_db"),
+        ({"spectrum": corners((100, 1), (50, 1))}, "in rising order"),
+        ({"abort_db": 2.0}, "must be above tolerance_db"),
         ({"response_limits": corners((50, 1), (50, 2))}, "response_limits has corners"),
     ],
 )

@@ -52,7 +52,7 @@ def test_the_longest_time_of_a_feedback_plan_includes_every_wait(plan):
 )
 def test_the_setting_needed_for_a_held_level_is_checked_against_its_limit(plan, rig):
     held = list(plan.excitation.held_accelerations())
-    (check,) = [each for each in limit_checks(plan, rig) if "holds the base's level" in each.what]
+    (check,) = [each for each in limit_checks(plan, rig) if "hold the base's level" in each.what]
     assert check.value == max(needed_vpp(rig, acceleration, at_hz) for at_hz, acceleration in held)
     assert check.is_kept
 
@@ -95,7 +95,7 @@ def test_acceleration_of_a_displacement_grows_with_frequency_squared():
                 harmonic=3,
                 subharmonic=2,
             ),
-            "harmonic = 3 and subharmonic = 2 were given; one of them must be 1",
+            "harmonic = 3 and subharmonic = 2 were given; at least one of them must be 1",
         ),
         (
             lambda: SettledSine(

@@ -75,7 +75,7 @@ def test_the_preview_spectrum_has_the_rms_of_the_signal(plan):
 
 
 def test_a_preview_at_too_low_a_rate_names_the_required_rate(plan):
-    with pytest.raises(ValueError, match=f"ask for more than {2 * plan.highest_frequency_hz:g}"):
+    with pytest.raises(ValueError, match=f"use more than {2 * plan.highest_frequency_hz:g}"):
         plan.preview(1.9 * plan.highest_frequency_hz)
 
 
@@ -106,7 +106,7 @@ def test_an_unknown_key_is_refused():
         (
             WhiteNoise,
             {"band_start_hz": 20.1, "band_stop_hz": 20.9, "repetition_hz": 1},
-            "no harmonic of 1 Hz lies in the band up to 20.9 Hz; lower repetition_hz or widen the band",
+            "no harmonic of 1 Hz is in the band up to 20.9 Hz; lower repetition_hz or widen the band",
         ),
         (SineSweep, {"start_hz": 100, "stop_hz": 100, "duration_s": 5}, "use a dwell for one frequency"),
         (
@@ -124,7 +124,7 @@ def test_an_unknown_key_is_refused():
         (
             OddMultisine,
             {"band_start_hz": 20, "band_stop_hz": 800, "excited_lines": (21, 22)},
-            "has 22, which is not an odd harmonic in the band; odd lines from 21 to 799 are allowed",
+            "has 22, which is not an odd harmonic in the band; give odd lines from 21 to 799",
         ),
     ],
 )

@@ -61,8 +61,8 @@ def test_limits_are_checked_at_the_highest_level():
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"lowest_vpp": 0.85}, "leave no two levels"),
-        ({"lowest_vpp": 1.0}, "leave no two levels"),
+        ({"lowest_vpp": 0.85}, "give fewer than two levels"),
+        ({"lowest_vpp": 1.0}, "give fewer than two levels"),
         ({"step_vpp": 1e-4}, "holds at most 4000"),
         ({"step_vpp": 0}, "greater than 0"),
         ({"lowest_vpp": 0}, "greater than 0"),

@@ -87,8 +87,8 @@ def test_a_third_party_kind_is_planned_measured_and_reported(tmp_path):
     ("target", "reason"),
     [
         ("no_such_module:TwoTones", "cannot be loaded (ModuleNotFoundError"),
-        ("vibench.acquisition.plan:Dwell", "no plan with that kind alone"),
-        ("two_tones:Segment", "no plan with that kind alone"),
+        ("vibench.acquisition.plan:Dwell", "not a plan of this kind only"),
+        ("two_tones:Segment", "not a plan of this kind only"),
     ],
 )
 def test_a_broken_third_party_kind_affects_only_its_own_plans(tmp_path, target, reason):

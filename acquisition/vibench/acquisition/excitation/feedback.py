@@ -41,7 +41,7 @@ class Settling(FrozenModel):
         if self.shortest_wait_s > self.longest_wait_s:
             raise ValueError(
                 f"shortest_wait_s = {self.shortest_wait_s:g} is longer than longest_wait_s = "
-                f"{self.longest_wait_s:g}; lower the one or raise the other"
+                f"{self.longest_wait_s:g}; lower the first or raise the second"
             )
         return self
 
@@ -84,7 +84,7 @@ class BaseLevel(FrozenModel):
         """Return the peak acceleration to be held at ``frequency_hz`` [m/s2]."""
         if self.displacement_m is not None:
             return self.displacement_m * (2 * pi * frequency_hz) ** 2
-        assert self.acceleration_m_per_s2 is not None, "the validator asks for one of them"
+        assert self.acceleration_m_per_s2 is not None, "the validator requires one of the two"
         return self.acceleration_m_per_s2
 
 

@@ -65,10 +65,10 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
         for name, corners in (("spectrum", self.spectrum), ("response_limits", self.response_limits)):
             places = [each.frequency_hz for each in corners]
             if places != sorted(set(places)):
-                raise ValueError(f"{name} has corners at {places} Hz; give them rising, each once")
+                raise ValueError(f"{name} has corners at {places} Hz; give each once, in rising order")
         if self.abort_db <= self.tolerance_db:
             raise ValueError(
-                f"abort_db = {self.abort_db:g} is not above tolerance_db = {self.tolerance_db:g}; raise it"
+                f"abort_db = {self.abort_db:g} must be above tolerance_db = {self.tolerance_db:g}; raise it"
             )
         return self
 

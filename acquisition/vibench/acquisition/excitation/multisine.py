@@ -128,6 +128,6 @@ def require_lines(lines: Lines, stop_hz: float, repetition_hz: float) -> None:
     """Refuse a band without lines; raises ConfigurationError."""
     if len(lines) == 0:
         raise ConfigurationError(
-            f"no harmonic of {repetition_hz:g} Hz lies in the band up to {stop_hz:g} Hz; "
+            f"no harmonic of {repetition_hz:g} Hz is in the band up to {stop_hz:g} Hz; "
             "lower repetition_hz or widen the band"
         )

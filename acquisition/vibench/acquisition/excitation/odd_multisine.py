@@ -40,13 +40,13 @@ class OddMultisine(PeriodicNoise):
         if strangers:
             raise ValueError(
                 f"excited_lines has {strangers[0]}, which is not an odd harmonic in the band; "
-                f"odd lines from {odd[0]} to {odd[-1]} are allowed, or none at all to have them drawn"
+                f"give odd lines from {odd[0]} to {odd[-1]}, or leave excited_lines out for a random choice"
             )
         silent = tuple(sorted(set(odd) - set(excited)))
         if self.detection_lines not in ((), silent):
             raise ValueError(
                 "detection_lines must be the odd lines of the band that are not excited; "
-                "leave them out to have them filled in"
+                "leave detection_lines out for these lines"
             )
         # Store the chosen lines in the plan, so that other programs can read them from its file.
         object.__setattr__(self, "excited_lines", tuple(sorted(excited)))

@@ -247,7 +247,7 @@ class AbstractExcitation(FrozenModel, ABC):
         if sample_rate_hz <= 2 * highest_hz:
             raise ConfigurationError(
                 f"a preview at {sample_rate_hz:g} samples/s cannot show {highest_hz:g} Hz; "
-                f"ask for more than {2 * highest_hz:g} samples/s"
+                f"use more than {2 * highest_hz:g} samples/s"
             )
         volts = 0.5 * self.amplitude_vpp * _sample(self.shown_steps(), sample_rate_hz)
         one_sided = np.abs(np.fft.rfft(volts)) * 2 / len(volts)

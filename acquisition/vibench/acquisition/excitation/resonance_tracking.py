@@ -85,7 +85,7 @@ class ResonanceTracking(AbstractFeedback):
         if not self.low_hz < self.start_hz < self.high_hz:
             raise ValueError(
                 f"start_hz = {self.start_hz:g} is not between low_hz = {self.low_hz:g} and high_hz = "
-                f"{self.high_hz:g}; give the three in this order: low, start, high"
+                f"{self.high_hz:g}; choose low_hz < start_hz < high_hz"
             )
         return self
 
@@ -93,8 +93,8 @@ class ResonanceTracking(AbstractFeedback):
     def _super_or_sub(self) -> Self:
         if self.harmonic > 1 and self.subharmonic > 1:
             raise ValueError(
-                f"harmonic = {self.harmonic} and subharmonic = {self.subharmonic} were given; one of them "
-                "must be 1"
+                f"harmonic = {self.harmonic} and subharmonic = {self.subharmonic} were given; at least one "
+                "of them must be 1"
             )
         return self
 

@@ -70,7 +70,7 @@ class MovingSine(AbstractExcitation):
     def _sweep_moves(self) -> Self:
         if self.start_hz == self.stop_hz:
             raise ValueError(
-                f"start_hz and stop_hz are both {self.start_hz:g}, but a sweep moves; "
+                f"start_hz and stop_hz are both {self.start_hz:g}, but a sweep needs two frequencies; "
                 "use a dwell for one frequency"
             )
         if self.step_s > self.duration_s:
@@ -80,9 +80,9 @@ class MovingSine(AbstractExcitation):
             )
         if self.duration_s / self.step_s > MOST_SWEEP_STEPS:
             raise ValueError(
-                f"a sweep of {self.duration_s:g} s in steps of {self.step_s:g} s takes "
-                f"{self.duration_s / self.step_s:.3g} of them, allowed are {MOST_SWEEP_STEPS}; give a longer "
-                "step_s"
+                f"a sweep of {self.duration_s:g} s with step_s = {self.step_s:g} has "
+                f"{self.duration_s / self.step_s:.3g} steps, at most {MOST_SWEEP_STEPS} are allowed; give a "
+                "longer step_s"
             )
         return self
 
@@ -152,8 +152,8 @@ class SineSweep(MovingSine):
     def _generator_holds_its_setting(self) -> Self:
         if self.swept_by is SweptBy.GENERATOR and self.hold is not Hold.ACCELERATION:
             raise ValueError(
-                f"hold = {self.hold.value!r} changes the amplitude on the way, and a generator that sweeps "
-                "by itself keeps its setting; use swept_by = 'computer', or hold = 'acceleration'"
+                f"hold = {self.hold.value!r} changes the amplitude during the sweep, but the generator's own "
+                "sweep keeps its setting; use swept_by = 'computer', or hold = 'acceleration'"
             )
         return self
 

@@ -37,8 +37,8 @@ class SteppedLevel(FixedSine):
     def _has_levels(self) -> Self:
         if self.lowest_vpp + self.step_vpp > self.amplitude_vpp * (1 + 1e-9):
             raise ValueError(
-                f"lowest_vpp = {self.lowest_vpp:g} and step_vpp = {self.step_vpp:g} leave no two levels up "
-                f"to amplitude_vpp = {self.amplitude_vpp:g}; give a lower level or a smaller step"
+                f"lowest_vpp = {self.lowest_vpp:g} and step_vpp = {self.step_vpp:g} give fewer than two "
+                f"levels up to amplitude_vpp = {self.amplitude_vpp:g}; lower lowest_vpp or step_vpp"
             )
         count = self._steps()
         if count > MOST_STEPS:

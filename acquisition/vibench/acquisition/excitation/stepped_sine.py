@@ -29,7 +29,7 @@ class FrequencyGrid(FrozenModel):
         if self.stop_hz < self.start_hz:
             raise ValueError(
                 f"stop_hz = {self.stop_hz:g} is below start_hz = {self.start_hz:g}; "
-                "give the grid from low to high and choose the way through it with direction"
+                "give the grid from low to high and choose the order of its steps with direction"
             )
         steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
         if steps > 2 * MOST_STEPS:
@@ -70,7 +70,7 @@ class FrequencySteps(AbstractExcitation):
             if high <= low:
                 raise ValueError(
                     f"frequencies_hz has {high:g} after {low:g}; "
-                    "list every frequency once, rising, and choose the way through it with direction"
+                    "list each frequency once, in rising order, and choose the order of steps with direction"
                 )
         count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
         if count > self.most_steps:
