@@ -53,28 +53,26 @@ class Question:
 
 QUESTIONS = (
     Question("name", "What is the bench called?"),
-    Question("generator.resource", "Which of them is the function generator?", Found.GENERATORS),
-    Question("generator.settle_s", "How long does it need after each message [s]? 0.1 is safe"),
-    Question("generator.amplitude_limit_vpp", "What is the largest setting you will ever allow [Vpp]?"),
-    Question("daq.device", "Which of them is the converter?", Found.CONVERTERS),
+    Question("generator.resource", "Which of these is the function generator?", Found.GENERATORS),
+    Question("generator.settle_s", "Waiting time after each message to it [s]? 0.1 is safe"),
+    Question("generator.amplitude_limit_vpp", "Largest amplitude that you allow on this bench [Vpp]?"),
+    Question("daq.device", "Which of these is the converter?", Found.CONVERTERS),
     Question("daq.sample_rate_hz", "How many samples a second?"),
     Question("daq.channels.drive_voltage.physical", "Which input reads the generator's voltage?"),
-    Question("daq.channels.drive_voltage.attenuation", "Divider in front of it (1: none)?"),
+    Question("daq.channels.drive_voltage.attenuation", "Voltage divider in front of this input (1: none)?"),
     Question("daq.channels.amplifier_voltage.physical", "Which input reads the amplifier's output?"),
-    Question("daq.channels.amplifier_voltage.attenuation", "Divider in front of it?"),
+    Question("daq.channels.amplifier_voltage.attenuation", "Voltage divider in front of this input?"),
     Question("daq.channels.base_acceleration.physical", "Which input reads the accelerometer on the base?"),
     Question(
         "daq.channels.base_acceleration.iepe_current_a",
-        "Current that this input feeds the accelerometer [A]? 0 if it has its own supply",
+        "Supply current from this input to the accelerometer [A]? 0 if it has its own supply",
     ),
     Question("daq.channels.m0_velocity.physical", "Which input reads the vibrometer?"),
     Question("amplifier.serial", "Serial number of the amplifier?"),
     Question("amplifier.gain_db", "Gain at its knob [dB]?"),
     Question("amplifier.current_limit_a", "Its current limit [A rms]?"),
     Question("shaker.serial", "Serial number of the shaker?"),
-    Question(
-        "shaker.fixture_mass_kg", "Mass on the table besides the specimen [kg], weighed with its screws?"
-    ),
+    Question("shaker.fixture_mass_kg", "Mass of the fixture with its screws, without the specimen [kg]?"),
     Question("accelerometer.model", "Model of the accelerometer?"),
     Question("accelerometer.serial", "Its serial number?"),
     Question(
@@ -84,12 +82,10 @@ QUESTIONS = (
     Question("accelerometer.calibrated", "The date on that certificate (YYYY-MM-DD)?"),
     Question("vibrometer.serial", "Serial number of the vibrometer?"),
     Question("vibrometer.decoder", "Its decoder?"),
-    Question(
-        "vibrometer.range_mm_per_s_per_v", "Its range, as on its screen [mm/s per volt, or with a unit]?"
-    ),
-    Question("vibrometer.delay_s", "Delay of its output [s]? 0 if nobody has measured it"),
+    Question("vibrometer.range_mm_per_s_per_v", "Its range, as displayed [mm/s per volt, or with a unit]?"),
+    Question("vibrometer.delay_s", "Delay of its output [s]? 0 if not measured"),
     Question("vibrometer.calibrated", "The date of its calibration (YYYY-MM-DD)?"),
-    Question("specimen.gap_m", "Gap of the specimen [m], by feeler gauge?"),
+    Question("specimen.gap_m", "Gap of the specimen [m], measured by feeler gauge?"),
 )
 """Questions in the order in which they are asked."""
 
@@ -139,7 +135,7 @@ def with_answer(text: str, key: str, answer: str, note: str) -> str:
         return text[:begin] + line + text[end:]
     begin, end, name = _table(text, key)
     if end == 0:
-        raise ConfigurationError(f"the template has no place for {key}; leave it out of the answers")
+        raise ConfigurationError(f"the template has no key {key}; remove it from the answers")
     header = text.index("\n", begin) + 1
     return f"{text[:header]}{name} = {_guess_type(answer)}  # {note}\n{text[header:]}"
 
@@ -213,7 +209,7 @@ def _literal(held: str, answer: str, key: str, note: str) -> str:
                 return date.fromisoformat(answer).isoformat()
             except ValueError as error:
                 raise ConfigurationError(
-                    f"{key}: {answer!r} is not a date; give one as 2026-02-10"
+                    f"{key}: {answer!r} is not a date; give a date such as 2026-02-10"
                 ) from error
         case _:
             return _number(answer, key)
@@ -226,7 +222,7 @@ def _number(answer: str, key: str) -> str:
         if "/" in answer:  # a sensitivity with its unit
             return json.dumps(answer, ensure_ascii=False)
         raise ConfigurationError(
-            f"{key}: {answer!r} is not a number; give one, such as 0.1 or 2e-3"
+            f"{key}: {answer!r} is not a number; give a number such as 0.1 or 2e-3"
         ) from error
 
 
@@ -276,7 +272,7 @@ def configure(
         raise ConfigurationError(f"{target} exists already, and nothing is overwritten; give another name")
     if not target.absolute().parent.is_dir():
         raise ConfigurationError(
-            f"{target.absolute().parent} is not a folder; make it, or give another place"
+            f"{target.absolute().parent} is not a folder; create it, or choose another folder"
         )
     text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is relative to the template
     questions = questions_for(text) if questions is None else questions
@@ -314,7 +310,7 @@ def _valid_answer(
 
 def _require_text(answer: str, key: str) -> None:
     if not answer.isprintable():
-        raise ConfigurationError(f"{key}: {answer!a} has a letter that cannot be shown; leave it out")
+        raise ConfigurationError(f"{key}: {answer!a} has a character that is not printable; remove it")
 
 
 def _default_answer(text: str, key: str) -> str:
@@ -336,7 +332,7 @@ def _require_within_bounds(text: str, key: str) -> None:
             raise ConfigurationError(wrong) from error
     except ArithmeticError as error:
         raise ConfigurationError(
-            f"{key}: the number is too large, or too small, to be computed with; give another"
+            f"{key}: the number is too large or too small to compute with; give another number"
         ) from error
 
 
@@ -347,7 +343,7 @@ def _write(target: Path, text: str) -> None:
         with replace_file(target) as coming:
             coming.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
+        raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give a new path") from error
 
 
 def _with_product(text: str, seen: InstrumentList, note: str) -> str:
@@ -385,7 +381,7 @@ FIRST_VPP = 5e-3
 """Level of the first signal on a new bench, peak to peak [V]."""
 _FROM = {
     Role.DRIVE_VOLTAGE: "T-piece at the output of the generator",
-    Role.AMPLIFIER_VOLTAGE: "output of the amplifier, beside the shaker",
+    Role.AMPLIFIER_VOLTAGE: "output of the amplifier, at the shaker",
 }
 Confirmed = Callable[[str], str]
 """Asks whether a wire connects two ends. The page shows the answer; an empty answer ends the procedure."""
@@ -412,12 +408,12 @@ def first_day(
     an instrument fails.
     """
     folder = config.absolute().parent
-    again = f"begin again with --from {in_a_command(config)} and the name of a new configuration"
+    again = f"start again with --from {in_a_command(config)} and a new name for the configuration"
     pages = [*_head(bench, config, operator), *_wires(bench.rig, confirmed, again)]
     first = bench_report(bench, folder, switch, FIRST_VPP)
-    pages += _chapter(f"Noise floor, and the first {1e3 * FIRST_VPP:g} mVpp", first)
+    pages += _chapter(f"Noise floor, and a first sine of {1e3 * FIRST_VPP:g} mVpp", first)
     if first.verdict is Verdict.FAIL:
-        pages.append(f"The bench check was not played: correct each FAIL above, and {again}.")
+        pages.append(f"The bench check was not run: correct each FAIL above, and {again}.")
         return DayPage("\n".join(pages) + "\n", Verdict.FAIL)
     checked = check_bench(bench, folder, switch=switch)
     pages += _chapter("The bench check, at two per cent of the amplitude limit", checked.report)
@@ -446,12 +442,12 @@ def _head(bench: Bench, config: Path, operator: str) -> Iterator[str]:
 
 
 def _wires(rig: Rig, confirmed: Confirmed, again: str) -> Iterator[str]:
-    yield "\n## Wires, both ends of each\n"
+    yield "\n## Wires (both ends checked)\n"
     for channel in channels_of(rig):
         pair = _pair(rig, channel)
         answer = confirmed(pair)
         if not answer:
-            raise CheckFailed(f"not confirmed: {pair}. Nothing has played; plug it in, and {again}")
+            raise CheckFailed(f"not confirmed: {pair}. Nothing was played; connect it and {again}")
         yield f"- {pair}: {answer}"
 
 
@@ -475,5 +471,5 @@ def _next_steps(rig: Rig, checked: CheckResult, config: Path) -> Iterator[str]:
         yield "\nDo not energise: correct each FAIL, and check again with"
         yield f"\n    vibench bench check --bench {bench}"
         return
-    yield f"\nThe bench may be armed for {rig.check_valid_h:g} h. Record a first sweep with"
+    yield f"\nThe check is valid for {rig.check_valid_h:g} h. Record a first sweep with"
     yield f"\n    vibench measure first_day --bench {bench} --out recordings"
