@@ -64,7 +64,7 @@ def test_too_little_address_space_is_refused_before_loading_libraries(tmp_path, 
     ended = limited(tmp_path, "RLIMIT_AS", 1_000_000 * most_mb, *arguments)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert re.fullmatch(
-        rf"error: this process may have {most_mb} MB of address space, and needs \d+ MB\. Nothing was done; "
+        rf"error: this process may use {most_mb} MB of address space, but needs \d+ MB\. Nothing was done; "
         r"raise the limit \(ulimit -v \d+\) and try again\.\n",
         ended.stderr,
     )

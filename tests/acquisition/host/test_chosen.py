@@ -25,7 +25,7 @@ def test_an_enum_member_and_its_value_as_text_are_equivalent():
         ),
         (
             lambda folder: list_recordings(folder, "some"),
-            "'some' is no Refresh; give one of 'changed', 'all'",
+            "'some' is not a Refresh; give one of 'changed', 'all'",
         ),
     ],
 )

@@ -127,7 +127,7 @@ def test_a_specimen_may_state_its_format_version(tmp_path):
     assert faults("specimen", text) == []
     for wrong in ("2", "true", '"1"', "0"):
         path.write_text(text.replace("= 1", f"= {wrong}"), encoding="utf-8")
-        with pytest.raises(ValueError, match="is not version 1, which this vibench reads") as refused:
+        with pytest.raises(ValueError, match="this version of vibench reads 1 to") as refused:
             load_specimen(path)
         assert "\n" not in str(refused.value)
         assert faults("specimen", path.read_text(encoding="utf-8")) != []
@@ -239,7 +239,7 @@ def test_a_file_of_a_later_version_is_refused_with_advice(version, tmp_path):
     path = Path(tmp_path) / "later.toml"
     text = (shipped_folder("campaigns") / "quick.toml").read_text(encoding="utf-8")
     path.write_text(f"format_version = {version}\n{text}", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="a later vibench wrote it: install that one"):
+    with pytest.raises(ConfigurationError, match="install a later vibench"):
         load_campaign(path)
     path.write_text(f"format_version = 1\n{text}", encoding="utf-8")
     assert load_campaign(path) == load_campaign("quick")

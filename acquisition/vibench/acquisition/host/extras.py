@@ -38,7 +38,7 @@ def need_space(megabytes: int, advice: str = "") -> None:
         most, _ = resource.getrlimit(resource.RLIMIT_AS)
         if most not in (resource.RLIM_INFINITY, -1) and most < 1_000_000 * megabytes:
             raise ConfigurationError(
-                f"this process may have {most / 1e6:.0f} MB of address space, and needs {megabytes} MB. "
+                f"this process may use {most / 1e6:.0f} MB of address space, but needs {megabytes} MB. "
                 "Nothing was done; "
                 f"raise the limit (ulimit -v {1000 * megabytes}) and try again. {advice}".rstrip()
             )
@@ -65,5 +65,5 @@ def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[st
 
 def _missing(library: str, extra: str) -> MissingLibrary:
     return MissingLibrary(
-        f"{library} is not installed, which this needs; nothing was opened: pip install 'vibench[{extra}]'"
+        f"{library} is needed and not installed. Nothing was opened; run pip install 'vibench[{extra}]'"
     )

@@ -19,7 +19,7 @@ VERSION = 1
 FORMAT = "format_version"
 """Key of a file's version; a file without this key has the current version."""
 DRAFT = "http://json-schema.org/draft-04/schema#"
-_SPECIMEN = {"type": "string", "description": "Name or path of the specimen that this one starts from."}
+_SPECIMEN = {"type": "string", "description": "Name or path of the specimen that this table changes."}
 _RANGE = {
     "type": "object",
     "properties": {each: {"type": "number"} for each in ("start", "stop", "step")},
@@ -110,7 +110,7 @@ def json_schema(kind: str) -> Json:
     ConfigurationError.
     """
     if kind not in SCHEMAS:
-        raise ConfigurationError(f"there is no schema of {kind!r}; there are {', '.join(SCHEMAS)}")
+        raise ConfigurationError(f"there is no schema {kind!r}; give one of {', '.join(SCHEMAS)}")
     made: Json = _draft_4(SCHEMAS[kind].load().model_json_schema())
     made["properties"][FORMAT] = {"enum": [VERSION]}
     SCHEMAS[kind].widen(made)

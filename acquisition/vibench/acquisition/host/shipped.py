@@ -61,7 +61,7 @@ def named(given: Path | str, folder: str) -> Path:
     known = {each.stem: each for each in all_shipped(folder)}
     if path.name not in known:
         raise ConfigurationError(
-            f"{path.name!r} is neither a file here nor one of those that come with vibench: "
+            f"{path.name!r} is neither an existing file nor one that comes with vibench: "
             f"{', '.join(known)}; give one of these names, or the path of a TOML file"
         )
     return known[path.name]
@@ -84,5 +84,5 @@ def documentation_page(page: str = "index") -> Path:
     built, written = built_site() / f"{page}.html", sources / f"{page}.md"
     if not re.fullmatch(r"[\w/-]+", page) or not (built.is_file() or written.is_file()):
         names = ", ".join(sorted(path.stem for path in sources.glob("*.md")))
-        raise ConfigurationError(f"the documentation has no page {page!r}; there are {names}")
+        raise ConfigurationError(f"the documentation has no page {page!r}; give one of {names}")
     return built if built.is_file() else written

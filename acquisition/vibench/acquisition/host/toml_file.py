@@ -59,8 +59,8 @@ def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
         raise ConfigurationError(
-            f"{origin}: {FORMAT} = {_shown(written)} is not a version that this vibench reads, 1 to "
-            f"{VERSION}; a later vibench wrote it: install that one"
+            f"{origin}: {FORMAT} = {_shown(written)} cannot be read; this version of vibench reads 1 to "
+            f"{VERSION}: install a later vibench"
         )
     for version in range(written, VERSION):
         if (model, version) in MIGRATIONS:
@@ -79,7 +79,7 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
         raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
     except ArithmeticError as error:
         raise ConfigurationError(
-            f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
+            f"{origin}: a number is too large or too small to compute with ({error}); correct it"
         ) from error
 
 
@@ -258,7 +258,7 @@ def _table(content: Table, path: tuple[str, ...]) -> Iterator[str]:
                 yield from _table(value, inner)
             case list():
                 for element in value:
-                    assert isinstance(element, dict), "_is_nested lets through lists of tables only"
+                    assert isinstance(element, dict), "_is_nested allows only lists of tables"
                     yield f"\n[[{'.'.join(inner)}]]"
                     yield from _table(element, inner)
 
