@@ -104,12 +104,12 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     if not found:
         raise ConfigurationError(
             missing_package(name)
-            or f"{name!r} is not a name of {kind.value}: {', '.join(plug_in_names(kind))} are installed. "
-            "Correct the driver in the hardware configuration, or install the package that offers it"
+            or f"{name!r} is not installed in {kind.value}: {', '.join(plug_in_names(kind))} are. Correct "
+            "the driver in the hardware configuration, or install the package that provides it"
         )
     if len(found) > 1:
         raise ConfigurationError(
-            f"{name!r} of {kind.value} is offered more than once ({', '.join(sorted(found))}); uninstall one"
+            f"{name!r} of {kind.value} is provided twice ({', '.join(sorted(found))}); uninstall one of them"
         )
     (row,) = found.values()
     try:
@@ -145,7 +145,7 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
 
 _SILENCING = {"stop", "close", "silence"}
 _ADVICE = (
-    "Correct its package and run its contract tests (docs/instruments.md), or name another driver in the "
+    "Correct its package and run its contract tests (docs/instruments.md), or set another driver in the "
     "hardware configuration"
 )
 
@@ -196,13 +196,13 @@ class Guarded:
         try:
             return _taken(hint, found)
         except (TypeError, ValueError) as error:
-            raise self._broken(member, f"it gave {error}") from error
+            raise self._broken(member, f"it returned {error}") from error
 
     def _broken(self, member: str, what: str) -> BrokenPromise:
-        where = "when it was asked" if member == "__call__" else f"in {member}"
+        where = "when called" if member == "__call__" else f"in {member}"
         is_source = member in _SILENCING and self._promise is not Digitizer
         alarm = " THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand." if is_source else ""
-        return BrokenPromise(f"the plug-in {self._name} broke its promise {where}: {what}.{alarm} {_ADVICE}")
+        return BrokenPromise(f"the plug-in {self._name} failed {where}: {what}.{alarm} {_ADVICE}")
 
 
 def _taken(hint: Any, value: Any) -> Any:

@@ -81,7 +81,7 @@ class Block:
 
 def _not_zero(units: float) -> float:
     if units == 0:
-        raise ValueError("a sensor that gives no volts measures nothing")
+        raise ValueError("the units per volt of a sensor must not be 0")
     return units
 
 
@@ -327,18 +327,18 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
     rows = len(digitizer.roles)
     if block.volts.ndim != 2 or block.volts.shape[0] != rows or block.volts.shape[1] == 0:
         raise InstrumentError(
-            f"the converter handed over a block of shape {block.volts.shape} where {samples} samples of "
-            f"{rows} channels were requested; its driver must wait until they are there, or raise "
+            f"the converter returned a block of shape {block.volts.shape}, but {samples} samples of "
+            f"{rows} channels were requested; its driver must wait for all of them, or raise "
             "InstrumentLost"
         )
     if not np.isfinite(block.volts).all():
         raise InstrumentError(
-            f"the converter handed over samples that are not numbers, from sample {block.first_sample} on; "
-            "its driver must hand over volts, or raise DataLost"
+            f"the converter returned samples that are not numbers, from sample {block.first_sample} on; "
+            "its driver must return volts, or raise DataLost"
         )
     if unknown := {each.channel for each in block.overloads} - set(digitizer.roles):
         raise InstrumentError(
-            f"the converter reports overloads of {shortened(repr(sorted(unknown)))}; its channels are "
+            f"the converter reports overloads of channels {shortened(repr(sorted(unknown)))}; it has "
             f"{', '.join(digitizer.roles)}. Check that no other program changed its task"
         )
     return block
