@@ -95,7 +95,7 @@ def test_playback_under_another_plan_is_refused(playing, tmp_path):
     other = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"frequency_hz": 255.0})})
     with (
         open_bench(playing()) as bench,
-        pytest.raises(ConfigurationError, match=r"made with the plan of 'dwell'.*Nothing was played back"),
+        pytest.raises(ConfigurationError, match=r"recorded with the plan 'dwell'.*Nothing was played back"),
     ):
         run_measurement(bench, other, tmp_path / "again.h5")
 

@@ -172,7 +172,7 @@ class TestRefusals:
             loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + "\n[retry]\nattempts = 3\non = []\n")
 
     def test_a_ramp_with_fewer_than_four_steps_is_refused(self):
-        with pytest.raises(ValueError, match=r"ramp_step_s = 0\.1 leaves fewer than 4 stairs.*at most 0\.05"):
+        with pytest.raises(ValueError, match=r"ramp_step_s = 0\.1 gives fewer than 4 steps.*at most 0\.05"):
             Measurement(
                 name="a",
                 excitation=Dwell(amplitude_vpp=1, frequency_hz=1, duration_s=1),

@@ -51,13 +51,13 @@ def test_the_shipped_scan_visits_all_three_masses():
 @pytest.mark.parametrize(
     ("points", "sentence"),
     [
-        ([point("top"), point("Top")], r"two points have the name 'top'; give every point its own"),
-        ([point("top"), point("foot", node=1)], r"two points have the node '1'; give every point its own"),
+        ([point("top"), point("Top")], r"two points have the name 'top'; give each another name"),
+        ([point("top"), point("foot", node=1)], r"two points have the node '1'; give each another node"),
         ([{"name": "top", "body": "m0"}], r"scan\.0\.x_m, scan\.0\.y_m, scan\.0\.z_m are missing"),
         ([point("top", "m3")], r"scan\.0\.body.*'m3': input should be 'm0', 'm1' or 'm2'"),
         ([point("top", x_m=float("nan"))], r"scan\.0\.x_m.*finite"),
         ([point("top", direction="up")], r"scan\.0\.direction.*'x', 'y', 'z'"),
-        ([point("t" * 60)], r"a name of 66 characters, allowed are 64"),
+        ([point("t" * 60)], r"would have 66 characters, allowed are 64"),
     ],
 )
 def test_an_invalid_scan_point_is_refused_with_one_sentence(points, sentence):

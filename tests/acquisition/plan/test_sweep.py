@@ -179,20 +179,20 @@ POINT = {"frequency_hz": [200], "amplitude_vpp": [1]}
         ({**POINT, "order": ["frequency_hz"]}, "leaves out 'amplitude_vpp'"),
         ({**POINT, "continue_from_previous": "amplitude_vpp"}, "must be the innermost axis"),
         ({**POINT, "continue_from_previous": "repetition"}, "is not an axis for a chain"),
-        ({**POINT, "direction": ["up"]}, "does not apply to the excitation 'dwell'"),
+        ({**POINT, "direction": ["up"]}, "has no meaning for the excitation 'dwell'"),
         (
             {
                 "measurement": {"excitation": SWEEP},
                 "amplitude_vpp": [1, 2],
                 "continue_from_previous": "amplitude_vpp",
             },
-            "leads from dwell to dwell",
+            "works only for dwells",
         ),
         ({**POINT, "name": "x" * 60}, "give the sweep a shorter name"),
         ({**POINT, "command": "rm"}, "command is not a known key"),
         (
             {**POINT, "frequency_hz": by(1, 1200, 1), "continue_from_previous": "frequency_hz"},
-            "a chain of 1200 points was given, allowed are 1000",
+            "a chain would have 1200 points, allowed are 1000",
         ),
     ],
 )

@@ -89,9 +89,9 @@ class Campaign(FrozenModel):
             values = [str(getattr(each, what)).lower() for each in self._numbered_scan()]
             twice = next((value for value in values if values.count(value) > 1), None)
             if twice is not None:
-                raise ValueError(f"scan: two points have the {what} {twice!r}; give every point its own")
+                raise ValueError(f"scan: two points have the {what} {twice!r}; give each another {what}")
         if self.scan and any(each.point is not None for each in self.measurements):
-            raise ValueError("a measurement has its own point; list it under [[scan]] with the others")
+            raise ValueError("a measurement of a scan cannot have a point; list the point under [[scan]]")
         return self
 
     @model_validator(mode="after")
@@ -102,12 +102,12 @@ class Campaign(FrozenModel):
                 continue
             if len(point.name) > LONGEST_NAME:
                 raise ValueError(
-                    f"scan: the recording {point.name!r} would have a name of {len(point.name)} characters, "
+                    f"scan: the recording name {point.name!r} would have {len(point.name)} characters, "
                     f"allowed are {LONGEST_NAME}; shorten the name of the point or of the measurement"
                 )
             if EXCITATION_KINDS[kind].is_feedback:
                 raise ValueError(
-                    f"scan: {kind} needs the motion of m0, and a scan moves the vibrometer; use an "
+                    f"scan: {kind} needs the motion of m0, but a scan moves the vibrometer elsewhere; use an "
                     "excitation without feedback"
                 )
         return self
@@ -120,8 +120,8 @@ class Campaign(FrozenModel):
         twice = sorted(name for name, count in names.items() if count > 1)
         if twice:
             raise ValueError(
-                f"two measurements would be recorded as {twice[0]!r}; give every measurement and sweep "
-                "its own name, and every axis different values (capital letters do not count)"
+                f"two measurements would be recorded as {twice[0]!r}; give each measurement and sweep "
+                "a different name, and each axis different values (A and a count as the same letter)"
             )
         return self
 

@@ -64,8 +64,8 @@ def require_own_plan(measurement: Measurement, rig: Rig) -> None:
             return
     if made.model_dump(include=_PLAYED) != measurement.model_dump(include=_PLAYED):
         raise ConfigurationError(
-            f"{path} was made with the plan of {made.name!r}, a {made.excitation.kind} whose numbers are not "
-            f"those of {measurement.name!r}. Nothing was played back; give the plan that it was made with"
+            f"{path} was recorded with the plan {made.name!r} ({made.excitation.kind}), which differs from "
+            f"the plan {measurement.name!r}. Nothing was played back; give the plan of the recording"
         )
 
 
@@ -239,7 +239,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
 
 def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck]:
     can = generator_driver(rig.generator).describe(rig.generator)
-    setting = "the setting beside what the generator can"
+    setting = "the highest setting of the generator"
     most_vpp, range_of = can.amplitude_range_vpp[1], f"range of the {can.name}"
     yield LimitCheck(
         setting, excitation.highest_amplitude_vpp, most_vpp, "Vpp", range_of, "lower amplitude_vpp"
@@ -249,7 +249,7 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
         highest, excitation.highest_frequency_hz, can.highest_sine_hz, "Hz", range_of, "lower the frequency"
     )
     if excitation.own_sweep_s is not None:
-        sweep, longest = "the generator's own sweep", f"what the {can.name} sweeps by itself"
+        sweep, longest = "the generator's own sweep", f"longest sweep of the {can.name}"
         remedy = 'set swept_by = "computer"'
         yield LimitCheck(sweep, excitation.own_sweep_s, can.longest_sweep_s, "s", longest, remedy)
     if excitation.period_points is not None:
@@ -257,7 +257,7 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
         memory = f"memory of the {can.name}"
         for what, limit, remedy, side in (
             ("points of a period", most, "lower points", LimitSide.AT_MOST),
-            ("points of a period, at least", fewest, "raise points", LimitSide.AT_LEAST),
+            ("smallest number of points", fewest, "raise points", LimitSide.AT_LEAST),
         ):
             yield LimitCheck(what, excitation.period_points, limit, "points", memory, remedy, side)
 
@@ -271,7 +271,7 @@ def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     if needed:
         most_vpp, at_hz = max(needed)
         yield LimitCheck(
-            f"the setting that holds the base's level (at {at_hz:g} Hz)",
+            f"the setting needed to hold the base's level (at {at_hz:g} Hz)",
             most_vpp,
             measurement.excitation.amplitude_vpp,
             "Vpp",

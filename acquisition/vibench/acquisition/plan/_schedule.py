@@ -27,7 +27,7 @@ _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
 def _is_of_a_file(value: object) -> object:
     if isinstance(value, str) and re.search(_NAME, value) is None:
-        raise ValueError("it names a file; give 1 to 64 letters a to z, digits, _ and -, not _ or - first")
+        raise ValueError("it is a file name; use 1 to 64 letters a to z, digits, _ and -, not _ or - first")
     return value
 
 
@@ -136,15 +136,15 @@ class Measurement(FrozenModel):
             return self
         allowed = () if isinstance(self.excitation, AbstractFeedback) else self.excitation.wishes
         if unknown := [name for name in self.until.wishes if name not in allowed]:
-            known = f"it can be {' or '.join(allowed)}" if allowed else "leave until out"
+            known = f"give {' or '.join(allowed)}" if allowed else "leave until out"
             raise ValueError(
-                f"until names {unknown[0]}, which {self.excitation.kind} does not wait for; {known}"
+                f"until contains {unknown[0]}, which {self.excitation.kind} does not support; {known}"
             )
         longest_s = max(each.record_s for each in self.excitation.steps())
         if self.excitation.period_points is None and self.until.shortest_s > max(longest_s, SHORTEST_S):
             raise ValueError(
-                f"until.shortest_s of {self.until.shortest_s:g} s is longer than the {longest_s:g} s of the "
-                "recording; give a shorter one, or record for longer"
+                f"until.shortest_s = {self.until.shortest_s:g} is longer than the recording of "
+                f"{longest_s:g} s; lower shortest_s, or record for longer"
             )
         return self
 
@@ -152,7 +152,7 @@ class Measurement(FrozenModel):
     def _ramp_has_stairs(self) -> Self:
         if self.ramp_step_s * FEWEST_STAIRS > self.ramp_s * (1 + 1e-9):
             raise ValueError(
-                f"ramp_step_s = {self.ramp_step_s:g} leaves fewer than {FEWEST_STAIRS} stairs in a ramp of "
+                f"ramp_step_s = {self.ramp_step_s:g} gives fewer than {FEWEST_STAIRS} steps in a ramp of "
                 f"{self.ramp_s:g} s; give at most {self.ramp_s / FEWEST_STAIRS:g}"
             )
         return self
@@ -163,7 +163,7 @@ class Measurement(FrozenModel):
         if length_s > LONGEST_S:
             raise ValueError(
                 f"one measurement would play for {length_s:.4g} s, allowed are {LONGEST_S:g} s (30 days); "
-                "shorten it, or make several of it"
+                "shorten it, or divide it into several"
             )
         return self
 
@@ -368,12 +368,12 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:
             raise ConfigurationError(
-                f"{measurement.name} needs a real-time controller, and this bench has none. Nothing was "
+                f"{measurement.name} needs a real-time controller, but this bench has none. Nothing was "
                 "played; add [controller] to the hardware configuration"
             )
         case DriveSource.OUTPUT if rig.daq.output is None:
             raise ConfigurationError(
-                f"{measurement.name} needs an analogue output, and this bench has none: its function "
+                f"{measurement.name} needs an analogue output, but this bench has none: its function "
                 "generator repeats one waveform. Nothing was played; add [daq.output] to the hardware "
                 "configuration, or use white_noise with more realisations"
             )

@@ -44,14 +44,14 @@ class Range(FrozenModel):
         if self.stop <= self.start:
             raise ValueError(
                 f"stop = {self.stop:g} is not above start = {self.start:g}; give the range from low to "
-                "high and choose the way through it with direction"
+                "high and choose the order of its values with direction"
             )
         if (self.step is None) == (self.count is None):
             raise ValueError("give either step or count, and not both")
         if self.step is not None and self.spacing is RangeSpacing.LOGARITHMIC:
-            raise ValueError("logarithmic values have no common step; give count")
+            raise ValueError("logarithmic values have no constant step; give count")
         if self._count() > MOST_VALUES:
-            raise ValueError(f"the range has {self._count()} values, allowed are {MOST_VALUES}: widen step")
+            raise ValueError(f"the range has {self._count()} values, allowed are {MOST_VALUES}; raise step")
         return self
 
     @property
@@ -156,10 +156,10 @@ class Sweep(FrozenModel):
     @model_validator(mode="after")
     def _order_names_every_axis(self) -> Self:
         if len(set(self.order)) != len(self.order):
-            raise ValueError(f"order = {_words(self.order)} names an axis twice; name each once")
+            raise ValueError(f"order = {_words(self.order)} contains an axis twice; give each axis once")
         missing = [axis for axis in self._axes() if axis not in self.order]
         if missing:
-            raise ValueError(f"order leaves out {_words(missing)}; name every axis that is given")
+            raise ValueError(f"order lacks {_words(missing)}; it must contain every axis of the sweep")
         return self
 
     @model_validator(mode="after")
@@ -169,20 +169,20 @@ class Sweep(FrozenModel):
             return self
         if axis not in (SweepAxis.FREQUENCY, SweepAxis.LEVEL):
             raise ValueError(
-                f"continue_from_previous = {axis.value!r} is not an axis for a chain; allowed are "
+                f"continue_from_previous = {axis.value!r} is not an axis for a chain of points; allowed are "
                 "'frequency_hz' and 'amplitude_vpp'"
             )
         given = [each for each in self.order if each in self._axes() and each is not SweepAxis.DIRECTION]
         if not given or given[-1] is not axis:
             raise ValueError(
-                f"continue_from_previous = {axis.value!r} must be the innermost axis that is given; "
-                f"the order is {_words(given)}"
+                f"continue_from_previous = {axis.value!r} must be the innermost axis of the sweep; "
+                f"its order is {_words(given)}"
             )
         passed = len(self._axes()[axis]) * (2 if _TURNING & set(self.direction) else 1)
         longest = passed if self.lead_points is None else min(passed, self.lead_points)
         if longest > MOST_LEAD_INS:
             raise ValueError(
-                f"a chain of {longest} points was given, allowed are {MOST_LEAD_INS}; split the sweep"
+                f"a chain would have {longest} points, allowed are {MOST_LEAD_INS}; divide the sweep"
             )
         return self
 
@@ -195,8 +195,8 @@ class Sweep(FrozenModel):
         if count > MOST_POINTS:
             shown = " x ".join(f"{number} {axis}" for axis, number in counts.items())
             raise ValueError(
-                f"the sweep {self.name!r} has {count} points ({shown}), allowed are {MOST_POINTS}: widen a "
-                "step or split it"
+                f"the sweep {self.name!r} has {count} points ({shown}), allowed are {MOST_POINTS}; raise a "
+                "step or divide the sweep"
             )
         self.points()
         return self
@@ -304,8 +304,8 @@ def _set_direction(excitation: Excitation, way: Direction, name: str) -> Excitat
         raise ValueError(f"{name}: {complaints(error, excitation.model_dump())}") from error
     if turned is None:
         raise ValueError(
-            f"{name}: direction = {way.value!r} does not apply to the excitation {excitation.kind!r} by "
-            "itself; give continue_from_previous to go along an axis, or leave direction out"
+            f"{name}: direction = {way.value!r} has no meaning for the excitation {excitation.kind!r} alone; "
+            "set continue_from_previous to step along an axis, or leave direction out"
         )
     return turned
 
@@ -316,7 +316,7 @@ def _with_lead_in(
     led = excitation.led(way, lead_s)
     if led is None:
         raise ValueError(
-            f"{name}: continue_from_previous leads from dwell to dwell, and the excitation is "
+            f"{name}: continue_from_previous works only for dwells, but the excitation is "
             f"{excitation.kind!r}; give kind = 'dwell', or leave continue_from_previous out"
         )
     return led
@@ -325,7 +325,7 @@ def _with_lead_in(
 def _measurement(content: Mapping[str, Any], name: str) -> Measurement:
     if len(name) > LONGEST_NAME:
         raise ValueError(
-            f"the point {name!r} has a name of {len(name)} characters, allowed are {LONGEST_NAME}; give the "
+            f"the point name {name!r} has {len(name)} characters, allowed are {LONGEST_NAME}; give the "
             "sweep a shorter name"
         )
     try:
