@@ -75,7 +75,7 @@ def test_every_recording_of_a_folder_is_verified(vibench_here, folder):
     assert bad.returncode == 1
     assert bad.stderr == "error: 1 of 3 recordings cannot be trusted: two.h5\n"
     told = {each["path"]: each for each in json.loads(bad.stdout)["recordings"]}
-    assert told["two.h5"]["sentence"] == "not as it was sealed: data of /m0_velocity"
+    assert told["two.h5"]["sentence"] == "changed since sealing: data of /m0_velocity"
     assert (told["one.h5"]["verdict"], told["two.h5"]["verdict"]) == ("intact", "damaged")
     assert vibench_here("verify", "two.h5", cwd=folder).returncode == 1
     assert vibench_here("verify", "one.h5", cwd=folder).returncode == 0
@@ -96,7 +96,7 @@ def test_damaged_recordings_are_not_analysed(vibench_here, folder, arguments):
     damage(folder / "two.h5")
     found = vibench_here(*arguments, cwd=folder)
     assert found.returncode == 1
-    assert "error: two.h5 is damaged (not as it was sealed: data of /m0_velocity)" in found.stderr
+    assert "error: two.h5 is damaged (changed since sealing: data of /m0_velocity)" in found.stderr
     assert not list(folder.glob("two*.csv"))
 
 
@@ -105,7 +105,7 @@ def test_the_catalogue_names_a_damaged_recording_and_fails(vibench_here, folder)
         file["m0_velocity"].attrs["delay_s"] = 1.0
     found = vibench_here("catalogue", ".", "--json", cwd=folder)
     assert found.returncode == 1
-    assert found.stderr.startswith("error: two.h5: not as it was sealed: attributes")
+    assert found.stderr.startswith("error: two.h5: changed since sealing: attributes")
     seals = [each["seal"] for each in json.loads(found.stdout)["recordings"]]
     assert seals == ["intact", "damaged", "intact"]
 
@@ -142,7 +142,7 @@ def test_a_crate_marks_damaged_recordings(vibench_here, folder):
     assert found.returncode == 1
     errors = [line for line in found.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 2
-    assert "two.h5 cannot be trusted (damaged: not as it was sealed: data of /m0_velocity)" in found.stderr
+    assert "two.h5 cannot be trusted (damaged: changed since sealing: data of /m0_velocity)" in found.stderr
     assert "three.h5 cannot be trusted (unreadable: " in found.stderr
     # Nothing is left out for it: a deposit may be all that remains.
     assert {"one.h5", "two.h5", "three.h5"} < names

@@ -34,7 +34,7 @@ def test_volts_without_a_converter_step_are_stored_to_half_a_fine_step(volts):
 def test_a_wrong_converter_step_is_detected():
     true_step, claimed_step = 5.0 / 2**23, 5.0 / 2**22
     volts = np.arange(-100.0, 100.0)[None] * true_step
-    with pytest.raises(RecordingError, match=r"'m0_velocity' lie up to 0\.50 counts beside"):
+    with pytest.raises(RecordingError, match=r"'m0_velocity' differ by up to 0\.50 counts from"):
         scale(claimed_step).counts(volts)
 
 

@@ -93,7 +93,7 @@ def test_the_text_of_a_feedback_note_is_parsed_to_values():
 
 
 def test_other_events_and_truncated_notes_are_ignored():
-    assert read("check", "left out: the bench was checked shortly before") is None
+    assert read("check", "skipped: the bench was checked shortly before") is None
     assert read("settled", SETTLED[:100] + "…") is None
 
 

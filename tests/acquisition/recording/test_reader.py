@@ -127,7 +127,7 @@ def without_segments(path):
         (text, "is not a readable HDF5 file"),
         (text, "If another program wrote it, convert it with vibench import"),
         (cut_short, "cut short"),
-        (another_hdf5, "no recording of vibench"),
+        (another_hdf5, "not a recording of vibench"),
         (newer, "format version 2.*reads version 1.*Update"),
         (without_segments, "is damaged"),
     ],

@@ -96,7 +96,7 @@ def test_recovery_does_not_overwrite_another_recording_of_the_same_name(tmp_path
     part, _ = abandoned(tmp_path)
     other, _ = abandoned(tmp_path / "other")
     shutil.move(recover(other), tmp_path / "a.h5")
-    with pytest.raises(RecordingError, match="another recording"):
+    with pytest.raises(RecordingError, match="are different recordings"):
         recover(part)
     assert part.exists()
 
@@ -125,7 +125,7 @@ def test_recover_reports_when_there_is_nothing_to_recover(tmp_path):
     with pytest.raises(RecordingError, match=r"nothing to recover; give the path of a \.h5\.part"):
         recover(tmp_path / "a.h5")
     (tmp_path / "a.h5").touch()
-    with pytest.raises(RecordingError, match=r"nothing to recover; analyse a\.h5, which is there"):
+    with pytest.raises(RecordingError, match=r"nothing to recover; analyse a\.h5, which exists"):
         recover(tmp_path / "a.h5")
 
 

@@ -210,7 +210,7 @@ def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
 
 def test_numbers_that_json_cannot_store_are_refused(tmp_path, make_header):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
-        with pytest.raises(RecordingError, match="'steady' cannot be kept as JSON"):
+        with pytest.raises(RecordingError, match="'steady' cannot be stored as JSON"):
             writer.begin_segment("steady", frequency_hz=float("nan"))
         writer.begin_segment("steady", frequency_hz=np.float64(260.0), realisation=np.int64(3))
         writer.end_segment()

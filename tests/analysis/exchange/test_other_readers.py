@@ -119,7 +119,7 @@ def test_a_recording_open_in_xarray_is_not_reported_as_truncated(known_file):
     xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
     with (
         xarray.open_dataset(known_file, engine="h5netcdf"),
-        pytest.raises(RecordingError, match="open in this program already"),
+        pytest.raises(RecordingError, match="with a different lock"),
     ):
         open_recording(known_file)
     with open_recording(known_file) as recording:

@@ -60,7 +60,7 @@ def test_a_different_recording_with_the_same_identity_gives_a_warning(dwells, dw
     found = analysed(tmp_path)
     assert len(found.results) == 1
     (said,) = (each for each in check_warnings(found) if "copies" in each)
-    assert "states that it is the recording" in said
+    assert "has the identity of the recording" in said
 
 
 @pytest.mark.thorough

@@ -92,9 +92,9 @@ class Committer:
         self._is_abandoned = self._thread.is_alive()
         if self._is_abandoned:
             raise RecordingError(
-                f"The disk has not answered for {self._closing_patience_s:g} s (is it a network folder that"
-                f" has gone away?). The {self.committed_samples} samples committed before are kept there;"
-                " recover the recording when the disk is back."
+                f"The disk has not responded for {self._closing_patience_s:g} s (is a network folder"
+                f" disconnected?). The {self.committed_samples} samples committed before are kept there;"
+                " recover the recording when the disk responds again."
             )
 
     def raise_unseen_failure(self) -> None:
@@ -113,7 +113,7 @@ class Committer:
             if isinstance(self.failure, FileNotFoundError):
                 kept = "the samples saved before are lost with the file"
             raise RecordingError(
-                f"The disk refused the recording: {self.failure}. Recording has ended; {kept}. Make room or"
+                f"Writing to the disk failed: {self.failure}. The recording has ended; {kept}. Make room or"
                 " change the disk, and measure again."
             ) from self.failure
         if not self._thread.is_alive():
@@ -124,7 +124,7 @@ class Committer:
         if not has_room:
             raise RecordingError(
                 f"The disk is too slow: {self._waiting_samples} samples per channel wait to be written"
-                f" (room for {self._queue_samples}) and none left within {QUEUE_PATIENCE_S:g} s."
+                f" (room for {self._queue_samples}); none was written within {QUEUE_PATIENCE_S:g} s."
                 " The block was not recorded; record to a faster or a local disk."
             )
 
@@ -205,7 +205,7 @@ class TableWriter:
         if not self.free_rows:
             raise RecordingError(
                 f"The recording's table of {self._places.table.name} is full:"
-                f" {self._places.table.capacity} rows. Recording goes on without this row; divide the"
+                f" {self._places.table.capacity} rows. Recording continues without this row; divide the"
                 " measurement into several recordings."
             )
         self.rows += 1
@@ -272,13 +272,13 @@ class Journal:
         """Begin a named range of samples."""
         if self._open is not None:
             raise RecordingError(
-                f"The segment {label!r} cannot begin: {self._open.label!r} has not ended. End it first."
+                f"The segment {label!r} cannot begin: {self._open.label!r} is still open. End that first."
             )
         numbers_json = json_text(f"The numbers of segment {label!r}", numbers)
         if len(numbers_json) > layout.NUMBERS_WIDTH:
             raise RecordingError(
                 f"The numbers of segment {label!r} take {len(numbers_json)} bytes as JSON; at most"
-                f" {layout.NUMBERS_WIDTH} fit. Keep what the analysis needs, the rest belongs into the plan."
+                f" {layout.NUMBERS_WIDTH} fit. Keep only what the analysis needs; put the rest in the plan."
             )
         opened = OpenSegment(self._segments.rows, label, first_sample, numbers_json)
         batch = self._segments.append(opened.cells(layout.OPEN_SEGMENT, is_complete=0))
@@ -288,7 +288,7 @@ class Journal:
     def end_segment(self, last_sample: int) -> Batch:
         """End the segment that is open."""
         if self._open is None:
-            raise RecordingError("No segment is open, so none can end. Begin one first.")
+            raise RecordingError("No segment is open. Begin a segment before ending it.")
         batch = self._segments.replace(self._open.row, self._open.cells(last_sample, is_complete=1))
         self._open = None
         return batch
@@ -305,7 +305,7 @@ class Journal:
         """
         if overload.channel not in self._roles:
             raise RecordingError(
-                f"An overload names the channel {overload.channel!r};"
+                f"An overload of the unknown channel {overload.channel!r} was given;"
                 f" the recording has {', '.join(self._roles)}."
             )
         row, last = self._last_overload.get(overload.channel, (-1, overload))

@@ -45,7 +45,7 @@ def _iso_date(text: str) -> str:
 def _names(text: str) -> str:
     for name in text.split():
         if len(name) > ROLE_WIDTH or not ROLE_PATTERN.fullmatch(name):
-            raise ValueError(f"{name[:ROLE_WIDTH]!r} is not a name of a channel")
+            raise ValueError(f"{name[:ROLE_WIDTH]!r} is not a channel name")
     return text
 
 
@@ -138,7 +138,7 @@ def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
     ):
         if not math.isclose(value, follows, rel_tol=SAME_SCALE):
             raise RecordingError(
-                f"the channel {role!r} says {name} = {value:g}, and its other attributes give {follows:g}"
+                f"the channel {role!r} has {name} = {value:g}, but its other attributes give {follows:g}"
             )
     return header
 
@@ -157,9 +157,9 @@ def json_object(text: str) -> dict[str, Any]:
     except RecursionError as error:
         raise ValueError("its lists and objects are nested too deeply") from error
     if not isinstance(value, dict):
-        raise ValueError(f"it is a JSON {type(value).__name__}, and an object is needed")  # noqa: TRY004
+        raise ValueError(f"it is a JSON {type(value).__name__}; a JSON object is needed")  # noqa: TRY004
     if _is_deeper(value, DEEPEST_JSON):
-        raise ValueError(f"its lists and objects lie more than {DEEPEST_JSON} deep in one another")
+        raise ValueError(f"its lists and objects are nested more than {DEEPEST_JSON} levels deep")
     return value
 
 
@@ -177,7 +177,7 @@ def _refuse_constant(constant: str) -> float:
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text} is too large a number")
+        raise ValueError(f"the number {text} is too large")
     return value
 
 

@@ -54,7 +54,7 @@ def sole_use(path: Path) -> Iterator[None]:
         if not file.is_locked_alone():
             raise RecordingError(
                 f"{path} is still being recorded, or another program has it open. Nothing was changed;"
-                " let the recording end (or close the other program) and try again."
+                " wait until the recording has ended (or close the other program) and try again."
             )
         yield
 

@@ -158,7 +158,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
     if final.exists():
-        raise RecordingError(f"{final} exists, and nothing is ever overwritten; move it away.")
+        raise RecordingError(f"{final} exists, and nothing is ever overwritten; move that file away.")
     try:
         meet_trouble()
         _copy(part, tmp, key, written)
@@ -185,8 +185,8 @@ def whereabouts(part: Path, error: Exception) -> str:
     if is_there and not isinstance(error, FileNotFoundError):
         return f"All committed samples are safe in {part}; make room, then recover that file."
     return (
-        f"{part} is not there: it or its folder was removed, moved or cut off while it was recorded;"
-        " put it back and recover it, or measure again."
+        f"{part} was not found: the file or its folder was removed, moved or disconnected during the"
+        " recording; put it back and recover it, or measure again."
     )
 
 
@@ -218,8 +218,8 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
             write_view(copy, role, overview, part.with_suffix("").stem)
             if written is not None and written[role] != digests[f"/{role}"]:
                 raise RecordingError(
-                    f"{part} does not give back {role!r} as recorded; check disk and memory. It is kept"
-                    " as it is; what can be read of it becomes a recording when it is recovered."
+                    f"{part}: the samples of {role!r} differ from those recorded; check disk and memory."
+                    " The file is kept unchanged; recover it to get a recording of its readable samples."
                 )
         for table in layout.TABLES:
             _write_table(copy, table, _rows(source, table, samples))
@@ -229,7 +229,7 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
         found = check_seal(copy, SealDepth.WHOLE, key)
     if found.state is not SealState.INTACT:
         raise RecordingError(
-            f"{tmp} does not read back as it was written ({found.sentence}); check disk and memory. All"
+            f"{tmp} differs from what was written to it ({found.sentence}); check disk and memory. All"
             f" committed samples are safe in {part}; recover that file."
         )
 
@@ -333,7 +333,7 @@ def recover(path: Path | str) -> Path:
     final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path
     part = layout.part_of(final)
     if not part.exists():
-        hint = f"analyse {final.name}, which is there" if final.is_file() else "give the path of a .h5.part"
+        hint = f"analyse {final.name}, which exists" if final.is_file() else "give the path of a .h5.part"
         raise RecordingError(f"{part} does not exist, so there is nothing to recover; {hint}.")
     key = seal_key()
     try:
@@ -343,7 +343,7 @@ def recover(path: Path | str) -> Path:
         raise
     except OSError as error:
         raise RecordingError(
-            f"{part} cannot be recovered: {error}. Nothing is lost; see that folder and file may be written,"
+            f"{part} cannot be recovered: {error}. Nothing is lost; check that folder and file are writable,"
             " and try again."
         ) from error
     return final
@@ -367,12 +367,12 @@ def _holds(final: Path, recording_id: str, part: Path) -> bool:
         same, seal = copy.recording_id == recording_id, copy.check_seal(SealDepth.WHOLE)
     if not same:
         raise RecordingError(
-            f"{final} is another recording than {part}, and nothing is ever overwritten."
-            " Nothing was changed; rename one of the two and try again."
+            f"{final} and {part} are different recordings, and nothing is ever overwritten."
+            " Nothing was changed; rename one of the two files and try again."
         )
     if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
         raise RecordingError(
-            f"{final} is damaged ({seal.sentence}), and {part} still holds what it was made of."
+            f"{final} is damaged ({seal.sentence}), but {part} still contains its samples."
             f" Nothing was changed; rename {final.name} and try again."
         )
     return same

@@ -258,10 +258,10 @@ class RecordingHeader:
                 parsed = json.loads(text)
             except ValueError as error:
                 raise RecordingError(
-                    f"{name} is not JSON ({error}); give the plan's or bench's own JSON text."
+                    f"{name} is not JSON ({error}); give the JSON text of the plan or bench."
                 ) from error
             if not isinstance(parsed, dict):
-                raise RecordingError(f"{name} holds a JSON {type(parsed).__name__}; it must be an object.")
+                raise RecordingError(f"{name} is a JSON {type(parsed).__name__}; it must be an object.")
 
     def configuration(self) -> dict[str, str]:
         """Return the texts of the group ``/configuration``, all JSON."""

@@ -237,7 +237,7 @@ def json_text(what: str, values: Mapping[str, Any]) -> str:
         return json.dumps(dict(values), allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:
         raise RecordingError(
-            f"{what} cannot be kept as JSON: {error}. Give text, finite numbers, truth values, None,"
+            f"{what} cannot be stored as JSON: {error}. Give text, finite numbers, truth values, None,"
             " or lists and mappings of them."
         ) from error
 

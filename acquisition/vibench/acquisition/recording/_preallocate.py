@@ -117,8 +117,8 @@ def _require_room(path: Path, needed_bytes: int) -> None:
     free_bytes = shutil.disk_usage(path.parent).free
     if free_bytes < ROOM_FACTOR * needed_bytes:
         raise RecordingError(
-            f"{path} needs {ROOM_FACTOR * needed_bytes / 1e6:.0f} MB (the recording, and as much again"
-            f" while it is finished); the disk has {free_bytes / 1e6:.0f} MB. Nothing was recorded; make"
+            f"{path} needs {ROOM_FACTOR * needed_bytes / 1e6:.0f} MB (the recording, and its finished"
+            f" copy); the disk has {free_bytes / 1e6:.0f} MB free. Nothing was recorded; make"
             " room, or choose another folder or a shorter measurement."
         )
 
@@ -235,11 +235,11 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
         raise
     except (OSError, RuntimeError) as error:
         raise RecordingError(
-            f"{path} could not be added to: {error}. It is as it was; make room, or close the programs"
-            " that have it open, and try again."
+            f"nothing could be added to {path}: {error}. The file is unchanged; make room, or close the"
+            " programs that have it open, and try again."
         ) from error
     raise RecordingError(
-        f"{path} was changed by another program each of {ATTEMPTS} times. Nothing was added; try again later."
+        f"another program changed {path} during {ATTEMPTS} attempts. Nothing was added; try again later."
     )
 
 

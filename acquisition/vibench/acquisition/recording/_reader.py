@@ -60,7 +60,7 @@ def open_hdf5(path: Path) -> h5py.File:
     except OSError as error:
         if _LOCKED_OTHERWISE in str(error):
             raise RecordingError(
-                f"{path} is open in this program already, by another library and with another locking: close "
+                f"another library of this program has already opened {path} with a different lock: close "
                 "it there first. The file was not touched."
             ) from error
         require_reachable(str(path), error)
@@ -108,7 +108,7 @@ def _require_ours(path: Path, file: h5py.File) -> None:
         raise RecordingError(f"{path} is damaged: its attributes cannot be read ({error}).") from error
     if attributes.get("format") != layout.FORMAT:
         raise RecordingError(
-            f"{path} is an HDF5 file, but no recording of vibench: its attribute 'format' is"
+            f"{path} is an HDF5 file, but not a recording of vibench: its attribute 'format' is"
             f" {str(attributes.get('format', 'missing'))[:LONGEST]!r}, not {layout.FORMAT!r}."
         )
     version = attributes.get("format_version")
@@ -279,7 +279,7 @@ class Recording(RecordingDescription):
     ) -> Iterator[RecordedBlock]:
         """Yield the samples of a range in blocks of ``samples``; the last block may be shorter."""
         if samples < 1:
-            raise RecordingError(f"Blocks of {samples} samples were requested; allowed are 1 and more.")
+            raise RecordingError(f"Blocks of {samples} samples were requested; request 1 or more.")
         begin, end = self._range(start, stop)
         for first in range(begin, end, samples):
             last = min(first + samples, end)
@@ -345,7 +345,7 @@ class Recording(RecordingDescription):
         except DAMAGE as error:
             require_reachable(self._open.file, error)
             raise RecordingError(
-                f"The results in {self.path} cannot be read: {error}. Its samples are as before; analyse it."
+                f"The results in {self.path} cannot be read: {error}. Its samples are unchanged; analyse it."
             ) from error
 
     @property
@@ -370,7 +370,7 @@ class Recording(RecordingDescription):
         """
         if self.path.suffix == layout.PART_SUFFIX:
             raise RecordingError(
-                f"{self.path} is not finished, so nothing was added to it: let it end, or recover it."
+                f"{self.path} is not finished, so nothing was added: wait until it has ended, or recover it."
             )
         used = self.roles if roles is None else tuple(self.channel(role).role for role in roles)
         key = seal_key()
@@ -419,7 +419,7 @@ def open_recording(path: Path | str) -> Recording:
         handle.file.close()
         require_reachable(str(path), error)
         raise RecordingError(
-            f"{path} is damaged, or no recording of vibench: {str(error)[:LONGEST]}."
+            f"{path} is damaged, or not a recording of vibench: {str(error)[:LONGEST]}."
             " Copy it again from where it was recorded."
         ) from error
     return recording
@@ -428,7 +428,7 @@ def open_recording(path: Path | str) -> Recording:
 def _require_as_checked(handle: OpenRecording, seal: str) -> None:
     """Raise RecordingError if the file was changed after this process had checked its seal."""
     if was_checked(seal) and check_seal(handle.file, SealDepth.QUICK, seal_key()).state is SealState.DAMAGED:
-        raise RecordingError("it is no longer what it was when its seal was checked")
+        raise RecordingError("it was changed after its seal had been checked")
 
 
 def _read(handle: OpenRecording) -> Recording:
@@ -483,9 +483,9 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
         or dataset.ndim != 1
         or dataset.dtype != np.dtype(layout.COUNT_DTYPE)
     ):
-        raise RecordingError(f"the channel {role!r} is not a row of counts")
+        raise RecordingError(f"the channel {role!r} is not an array of counts")
     if len(dataset) < samples or (growth is Growth.FINISHED and len(dataset) != samples):
-        raise RecordingError(f"the channel {role!r} has {len(dataset)} samples, and the recording {samples}")
+        raise RecordingError(f"the channel {role!r} has {len(dataset)} samples, the recording {samples}")
     if dataset.chunks is not None and dataset.id.get_num_chunks() != -(-len(dataset) // dataset.chunks[0]):
         raise RecordingError(f"the channel {role!r} lacks some of its samples")
 
@@ -496,5 +496,5 @@ def _growing(handle: OpenRecording) -> dict[str, object]:
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):
         state = RecordingState.INTERRUPTED
-        reason = "its program ended before it could say how the run ended"
+        reason = "its program ended before it could record how the run ended"
     return {"samples": tables.first_number(file, layout.N_VALID), "state": state, "reason": reason}

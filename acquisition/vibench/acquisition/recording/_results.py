@@ -95,7 +95,7 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
         raise RecordingError(f"the results cannot be read ({error})") from error
     for name, group in found.items():
         if not isinstance(group, h5py.Group):
-            raise RecordingError(f"{name!r} among the results is not a result")
+            raise RecordingError(f"the entry {name!r} of the results is not a result")
     return found
 
 

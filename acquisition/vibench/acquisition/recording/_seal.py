@@ -161,10 +161,10 @@ def check_seal(
         differing = list(_differing(file, manifest, depth, states))
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         require_reachable(file, error)
-        return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
+        return SealCheck(SealState.DAMAGED, f"it cannot be read to check its seal ({error})", "")
     if differing:
         more = f" and {len(differing) - 3} more" if len(differing) > 3 else ""
-        return SealCheck(SealState.DAMAGED, f"not as it was sealed: {', '.join(differing[:3])}{more}", seal)
+        return SealCheck(SealState.DAMAGED, f"changed since sealing: {', '.join(differing[:3])}{more}", seal)
     as_sealed = AS_SEALED if depth is SealDepth.WHOLE else f"{AS_SEALED}, samples not checked"
     return _signature_check(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal, as_sealed)
 
@@ -216,7 +216,7 @@ def copy_sentence(kept: Identified, name: str, copy: Identified) -> str:
     """Return the text that explains why ``copy`` counts as a duplicate of the recording ``name``."""
     if copy.samples_id and copy.samples_id == kept.samples_id:
         return f"has the same samples as {name}"
-    return f"states that it is the recording {name}: one of the two was altered, or is not finished"
+    return f"has the identity of the recording {name}: one of the two was altered, or is not finished"
 
 
 def seal_result(group: h5py.Group, key: SealKey | None) -> None:
@@ -232,11 +232,11 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
         if not checksum and is_of_a_sealing_version(group.file):
             return SealCheck(SealState.DAMAGED, "its seal is gone", "")
         if not checksum:
-            return _unsealed("it was saved before results had one", key)
+            return _unsealed("it was saved before results were sealed", key)
         text = _result_text(group)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         require_reachable(group.file, error)
-        return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
+        return SealCheck(SealState.DAMAGED, f"it cannot be read to check its seal ({error})", "")
     if _sha256(text.encode()) != checksum:
         return SealCheck(SealState.DAMAGED, "not as it was sealed", checksum)
     return _signature_check(text, [signature, key_id], key, checksum)
@@ -246,7 +246,7 @@ def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
     """Yield a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
         if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand to more
-            raise RecordingError(f"{dataset.name} holds {dataset.nbytes:.2g} bytes, which no result has")
+            raise RecordingError(f"{dataset.name} has {dataset.nbytes:.2g} bytes, more than any result")
         yield np.asarray(dataset[()])
         return
     for begin in range(0, len(dataset), PIECE_ITEMS):
@@ -355,7 +355,7 @@ def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> Sea
             "been changed; restore it from a copy"
         )
         return SealCheck(SealState.SEAL_GONE, sentence, "")
-    return _unsealed("it was made before recordings had one", key)
+    return _unsealed("it was made before recordings were sealed", key)
 
 
 def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[str, str | int | float]:
@@ -368,7 +368,7 @@ def _unsealed(excuse: str, key: SealKey | None) -> SealCheck:
     """Report a missing seal; with a key it is an error, because a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
-    return SealCheck(SealState.OTHER_KEY, f"it has no seal, and none by the key given ({key.name})", "")
+    return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none with the given key ({key.name})", "")
 
 
 def _signature_check(
@@ -380,10 +380,10 @@ def _signature_check(
         return SealCheck(SealState.INTACT, f"{as_sealed}{also}", seal)
     if not signature or key_id != key.name:
         by = f"with the key {key_id}" if key_id else "without a key"
-        sentence = f"{as_sealed}, but {by}, not with the one given ({key.name})"
+        sentence = f"{as_sealed}, but {by}, not with the given key ({key.name})"
         return SealCheck(SealState.OTHER_KEY, sentence, seal)
     if not hmac.compare_digest(signature.encode(), key.signature(text.encode()).encode()):
-        return SealCheck(SealState.DAMAGED, "its signature is not that of the key: it was forged", seal)
+        return SealCheck(SealState.DAMAGED, "its signature does not match the key: it was forged", seal)
     return SealCheck(SealState.INTACT, f"{as_sealed}, and signed with the key {key.name}", seal)
 
 
@@ -436,7 +436,7 @@ def journal_objection(path: Path, seal: str) -> str:
     stated = {each for one in noted for each in (one.seal, one.attempt_seal) if each}
     if stated and seal not in stated:
         point = noted[0].point
-        return f"its seal is not the one in the campaign's journal for {point}: another recording"
+        return f"its seal differs from that in the campaign's journal for {point}: another recording"
     for each in noted:
         if each.attempt_seal not in ("", each.seal):
             return f"the campaign's journal has two seals for {each.point}: the journal was changed"
@@ -532,6 +532,6 @@ class CheckedCounts:
         digest = states[number].copy()
         digest.update(piece.data)
         if digest.digest() != states[number + 1].digest():
-            raise ValueError("they are no longer what they were when the seal was checked")
+            raise ValueError("they were changed after the seal had been checked")
         self._last[dataset.name] = (number, piece)
         return piece

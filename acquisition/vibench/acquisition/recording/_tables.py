@@ -98,7 +98,7 @@ def read_columns(file: h5py.File, table: Table) -> Columns:
     if layout.N_ROWS in group:
         rows = first_number(group, layout.N_ROWS)
         if not 0 <= rows <= min(len(each) for each in datasets):
-            raise RecordingError(f"the table {table.name} counts {rows} rows, and holds fewer")
+            raise RecordingError(f"the table {table.name} states {rows} rows, but has fewer")
     else:
         (rows, *others) = {len(each) for each in datasets}
         if others:
@@ -116,8 +116,8 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
         or len(dataset) > table.capacity + 1  # a recovery adds one event
     ):
         raise RecordingError(
-            f"the column {column.name} of the table {table.name} is not one of {column.dtype} of at most "
-            f"{table.capacity + 1} rows"
+            f"the column {column.name} of the table {table.name} must have the type {column.dtype} and at "
+            f"most {table.capacity + 1} rows"
         )
     return dataset
 
@@ -158,7 +158,7 @@ def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence
         is_right &= np.isin(columns["channel"], [role.encode() for role in roles])
     if not is_right.all():
         raise RecordingError(
-            f"row {int(np.argmin(is_right))} of the table {table.name} speaks of what is not in the recording"
+            f"row {int(np.argmin(is_right))} of the table {table.name} does not match the recording"
         )
 
 

@@ -68,9 +68,9 @@ class CountScale:
         if (worst > COUNT_TOLERANCE).any():
             row = int(worst.argmax())
             raise RecordingError(
-                f"The volts of {self._roles[row]!r} lie up to {worst[row]:.2f} counts beside the converter's"
-                f" steps of {self._step_v[row, 0]:g} V. The block was not recorded, because counts would not"
-                " give the same volts back; correct volts_per_count and volts_at_zero_count, or give None"
+                f"The volts of {self._roles[row]!r} differ by up to {worst[row]:.2f} counts from whole steps"
+                f" of {self._step_v[row, 0]:g} V. The block was not recorded, because its counts would give"
+                " other volts; correct volts_per_count and volts_at_zero_count, or give None"
                 " to keep the volts to 2^-30 of the range."
             )
 
@@ -90,8 +90,8 @@ class DescriptorReserve:
         except OSError as error:
             self.close()
             raise RecordingError(
-                f"this process may open no more files ({error}), and a recording needs {RESERVED} to be "
-                "finished. Nothing was recorded; raise its limit (ulimit -n), or close other programs"
+                f"this process may open no more files ({error}), but a recording needs {RESERVED} more to "
+                "finish. Nothing was recorded; raise its limit (ulimit -n), or close other programs"
             ) from error
 
     def close(self) -> None:
@@ -121,7 +121,7 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
         if taken.exists():
             raise RecordingError(
                 f"{taken} exists, and nothing is ever overwritten. Nothing was recorded; choose another name"
-                " (a .part or .tmp is what an interrupted recording left: recover it first)."
+                " (an interrupted recording leaves a .part or .tmp file: recover it first)."
             )
     key = seal_key()
     reserve = DescriptorReserve()
@@ -276,7 +276,7 @@ class RecordingWriter:
         if block.first_sample < self.samples:
             raise RecordingError(
                 f"A block beginning at sample {block.first_sample} was given, but {self.samples} samples are"
-                " recorded already and nothing is overwritten. The block was not recorded; hand over every"
+                " recorded already and nothing is overwritten. The block was not recorded; write each"
                 " block once, in order."
             )
         made = block.counts
@@ -338,6 +338,6 @@ class RecordingWriter:
             self._disk.sync()
         except OSError as error:
             raise RecordingError(
-                f"The disk refused the end of the recording: {error}."
+                f"The end of the recording could not be written: {error}."
                 f" {whereabouts(layout.part_of(self.path), error)}"
             ) from error
