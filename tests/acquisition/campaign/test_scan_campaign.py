@@ -108,7 +108,7 @@ def test_the_seal_covers_the_scan_coordinates(kept, tmp_path):
         assert recording.check_seal(SealDepth.WHOLE).state is SealState.INTACT
     with h5py.File(tmp_path / "dwell-side.h5", "a") as file:
         file.attrs["point_x_m"] = 0.03
-    with pytest.raises(RecordingError, match="no longer what it was when its seal was checked"):
+    with pytest.raises(RecordingError, match="was changed after its seal had been checked"):
         open_recording(tmp_path / "dwell-side.h5")
 
 
@@ -234,7 +234,7 @@ def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
     ("change", "sentence"),
     [
         ("no vibrometer", r"the rig .* has no channel m0_velocity\. Nothing was played"),
-        ("sensor on m2", r"a point on m2, and the rig .* records m2_velocity with another sensor"),
+        ("sensor on m2", r"a point on m2, but the rig .* records m2_velocity with another sensor"),
     ],
 )
 def test_a_point_that_the_rig_cannot_reach_is_refused(coarse, tmp_path, change, sentence):

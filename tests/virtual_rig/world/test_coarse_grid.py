@@ -80,8 +80,8 @@ def test_a_grid_whose_error_is_too_large_is_refused_with_the_error(rate_hz):
         rig_with(5120.0, grid_rate_hz=rate_hz)
 
 
-def test_a_grid_too_coarse_for_the_sampling_rate_is_refused():
-    with pytest.raises(ConfigurationError, match=r"carries 6400 samples a second at most.*51200"):
+def test_a_coarse_grid_is_refused_for_a_sample_rate_that_it_does_not_carry():
+    with pytest.raises(ConfigurationError, match=r"allows at most 6400 samples a second.*51200"):
         rig_with(51_200.0, grid_rate_hz=COARSE.rate_hz)
     world = World(rig_with(6400.0, grid_rate_hz=COARSE.rate_hz), terminal=None)
     with pytest.raises(ConfigurationError, match=r"51200 Hz is not possible .* 12800 steps.*500 to 6400 Hz"):

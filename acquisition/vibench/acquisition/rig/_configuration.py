@@ -88,10 +88,10 @@ class VirtualConfig(FrozenModel):
     def _is_fine_enough(cls, rate_hz: float) -> float:
         if not COARSEST_GRID_RATE_HZ <= rate_hz <= USUAL_GRID_RATE_HZ:
             raise ValueError(
-                f"the virtual rig is computed in {COARSEST_GRID_RATE_HZ:g} to {USUAL_GRID_RATE_HZ:g} steps a "
-                f"second: coarser, the base would move by more than "
+                f"the virtual rig needs {COARSEST_GRID_RATE_HZ:g} to {USUAL_GRID_RATE_HZ:g} steps a second: "
+                f"with fewer, the base would move by more than "
                 f"{level_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.1%} too little at {WATCHED_HZ:g} Hz; give "
-                "a rate in between, or leave it out"
+                "a rate in this range, or leave it out"
             )
         return rate_hz
 
@@ -228,7 +228,7 @@ class AmplifierConfig(FrozenModel):
         if self.low_cut_hz < self.high_cut_hz:
             return self
         raise ValueError(
-            f"low_cut_hz = {self.low_cut_hz:g} must lie below high_cut_hz = {self.high_cut_hz:g}; correct one"
+            f"low_cut_hz = {self.low_cut_hz:g} must be below high_cut_hz = {self.high_cut_hz:g}; correct them"
         )
 
     @property
@@ -268,7 +268,7 @@ class ShakerConfig(FrozenModel):
     def _can_be_computed_with(self) -> Self:
         for name, value in self.model_dump().items():
             if isinstance(value, float) and value > _LARGEST:
-                raise ValueError(f"{name} = {value:g} is too large to be computed with; correct it")
+                raise ValueError(f"{name} = {value:g} is too large to compute with; correct it")
         return self
 
 
@@ -330,7 +330,7 @@ class DaqConfig(FrozenModel):
         ):
             twice = sorted({value for value in values if values.count(value) > 1})
             if twice:
-                raise ValueError(f"{what} {', '.join(twice)} is given twice: every channel needs its own")
+                raise ValueError(f"{what} {', '.join(twice)} is given twice; channels must differ in {what}")
         return self
 
 
@@ -409,7 +409,7 @@ class Rig(FrozenModel):
     def _has_sensors(self) -> Self:
         for role, sensor in self.sensors.items():
             if role.quantity == "voltage":
-                raise ValueError(f"sensors.{role}: a voltage comes by wire; leave the table out")
+                raise ValueError(f"sensors.{role}: a voltage channel has no sensor; remove the table")
             if sensor_table(role) != f"sensors.{role}":
                 raise ValueError(f"sensors.{role}: describe it in the table [{sensor_table(role)}]")
             try:
@@ -441,12 +441,12 @@ class Rig(FrozenModel):
         """
         if Role.M0_VELOCITY not in self._roles:
             raise ConfigurationError(
-                f"a scan moves the vibrometer, and the rig {self.name!r} has no channel m0_velocity. Nothing "
+                f"a scan needs the vibrometer, but the rig {self.name!r} has no channel m0_velocity. Nothing "
                 "was played; add it to daq.channels, or leave the scan out"
             )
         if role is not Role.M0_VELOCITY and role in self._roles:
             raise ConfigurationError(
-                f"the scan has a point on {role.place}, and the rig {self.name!r} records {role.value} with "
+                f"the scan has a point on {role.place}, but the rig {self.name!r} records {role.value} with "
                 "another sensor. Nothing was played; leave out that point or that channel"
             )
         channels = tuple(
@@ -470,9 +470,9 @@ class Rig(FrozenModel):
         if self.virtual is None or fastest_hz is None or self.daq.sample_rate_hz <= fastest_hz:
             return self
         raise ValueError(
-            f"virtual.grid_rate_hz = {self.virtual.grid_rate_hz:g} carries {fastest_hz:g} samples a second "
-            f"at most, and daq.sample_rate_hz is {self.daq.sample_rate_hz:g}; lower that, or "
-            "make the grid finer"
+            f"virtual.grid_rate_hz = {self.virtual.grid_rate_hz:g} allows at most {fastest_hz:g} samples a "
+            f"second, but daq.sample_rate_hz is {self.daq.sample_rate_hz:g}; lower daq.sample_rate_hz, or "
+            "raise virtual.grid_rate_hz"
         )
 
     @model_validator(mode="after")
@@ -483,10 +483,9 @@ class Rig(FrozenModel):
         if steps == round(steps):
             return self
         raise ValueError(
-            f"controller.rate_hz = {self.controller.rate_hz:g} takes {steps:.4g} of the "
-            f"{self.virtual.grid_rate_hz:g} steps a second of the virtual rig from sample to sample; give a "
-            f"rate that takes a whole number of them, {self.virtual.grid_rate_hz / max(round(steps), 1):g} "
-            "for example"
+            f"controller.rate_hz = {self.controller.rate_hz:g} would take {steps:.4g} steps of the virtual "
+            f"rig ({self.virtual.grid_rate_hz:g} a second) from sample to sample; give a rate with a whole "
+            f"number of steps, for example {self.virtual.grid_rate_hz / max(round(steps), 1):g}"
         )
 
     @property

@@ -45,7 +45,7 @@ def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     quantity, unit = config.role.quantity, config.role.unit
     if (facts.quantity, facts.unit) != (quantity, unit):
         raise ConfigurationError(
-            f"the sensor {name!r} of {config.physical} tells of {facts.quantity} in {facts.unit!r}, and "
+            f"the sensor {name!r} of {config.physical} measures {facts.quantity} in {facts.unit!r}, but "
             f"{config.role.value} records {quantity} in {unit!r}; give the channel another role or sensor"
         )
     return facts
@@ -182,15 +182,15 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
     if not sys.stdin.isatty():
         wanted = "; ".join(_shown(knob) for knob in knobs)
         raise CheckFailed(
-            f"these settings are made by hand and must be confirmed: {wanted}. Nobody sits at "
-            "this terminal and nothing was energised; confirm them at one (vibench bench check --knobs "
-            "SHEET.toml keeps the answers, and vibench measure --knobs SHEET.toml takes them for 36 hours)"
+            f"these settings are made by hand and must be confirmed: {wanted}. Nothing was energised, "
+            "because no one can answer here; confirm them at a terminal (vibench bench check --knobs "
+            "SHEET.toml saves the answers, and vibench measure --knobs SHEET.toml uses them for 36 hours)"
         )
     try:
         operator = input("Who confirms the settings made by hand? ") or "at the terminal"
         return confirm_by_asking(input, operator)(knobs)
     except (KeyboardInterrupt, EOFError) as stop:
-        raise CheckStopped("stopped at the settings made by hand; nothing was energised") from stop
+        raise CheckStopped("stopped before the knobs were confirmed; nothing was energised") from stop
 
 
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
@@ -211,7 +211,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
         missing = [_shown(knob) for knob in knobs if knob not in sheet.knobs]
         if missing:
             raise CheckFailed(
-                f"{path} does not confirm {'; '.join(missing)}. Nothing was energised; look at these "
+                f"{path} does not confirm {'; '.join(missing)}. Nothing was energised; check these "
                 "knobs and confirm them again"
             )
         return sheet
@@ -234,7 +234,7 @@ def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
             coming.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(
-            f"{path} cannot be written ({error.strerror}); nothing was energised, give another place"
+            f"{path} cannot be written ({error.strerror}). Nothing was energised; give another path"
         ) from error
 
 

@@ -53,8 +53,8 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
                 f"{path}: {key} = "
                 + (
                     missing_package(name)
-                    or f"{name!r} is not installed: {', '.join(names)} may be given, or the name of an entry "
-                    f"point {kind.value} of a package that you install (docs/instruments.md)"
+                    or f"{name!r} is not installed; give one of {', '.join(names)}, or install a package "
+                    f"with this entry point in {kind.value} (docs/instruments.md)"
                 )
             )
 
@@ -66,8 +66,8 @@ def with_faults(rig: Rig, script: Path) -> Rig:
     """
     if rig.virtual is None:
         raise ConfigurationError(
-            f"{script}: the rig {rig.name!r} is a real one, and faults can be scripted on a virtual one "
-            "only. Nothing was opened; leave the script out, or name a rig with a [virtual] table"
+            f"{script}: faults can be scripted only on a virtual rig, and {rig.name!r} is a real one. "
+            "Nothing was opened; leave the script out, or give a rig with a [virtual] table"
         )
     script = named(script, "hardware_configs/faults")
     scripted = rig.virtual.model_copy(update={"faults": str(script.absolute())})

@@ -68,7 +68,7 @@ def volts_per_unit(text: str, unit: str) -> float:
     example = _EXAMPLES.get(unit, f"'50 mV/({unit})'")
     if re.search(r"\b[pn]C\b", spelled):
         raise ValueError(
-            f"{text!r} is a charge, and the converter measures volts; give the sensitivity of the sensor "
+            f"{text!r} is a charge, but the converter measures volts; give the sensitivity of the sensor "
             f"with its charge amplifier, such as {example}"
         )
     raise ValueError(
