@@ -113,14 +113,14 @@ def test_watch_reports_that_no_engine_runs():
     told = vibench("stop")
     assert told.returncode == 1
     assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
-    assert f"looked for in {os.environ['VIBENCH_STATE_DIR']}" in told.stderr
+    assert f"Only {os.environ['VIBENCH_STATE_DIR']} was searched" in told.stderr
 
 
 def test_watch_reports_an_unwritable_state_folder(vibench_here, tmp_path):
     (tmp_path / "state").write_text("a file")
     told = vibench_here("stop", cwd=tmp_path, environment={"VIBENCH_STATE_DIR": str(tmp_path / "state")})
     assert told.returncode == 1
-    assert "what drives a bench cannot be looked for in the state folder" in told.stderr
+    assert "the state folder cannot be searched for programs" in told.stderr
     assert "VIBENCH_STATE_DIR" in told.stderr
 
 

@@ -152,7 +152,7 @@ def test_a_user_can_stop_a_program_of_root_in_their_folder(of_nobody):
 def test_an_unreadable_folder_is_not_treated_as_empty(of_nobody):
     os.chown(engines_folder(), 0, 0)
     os.seteuid(NOBODY)
-    with pytest.raises(AcquisitionError, match="cannot be looked for in the state folder"):
+    with pytest.raises(AcquisitionError, match="the state folder cannot be searched"):
         programs_to_stop(None)[0]
 
 
@@ -178,5 +178,5 @@ except AcquisitionError as error:
 def test_a_full_state_folder_refuses_the_program_without_leftovers(own_state):
     script = [sys.executable, "-c", ON_A_FULL_DISK]
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
-    assert "a script cannot be announced in the state folder" in ended.stdout, ended.stderr
+    assert "a script cannot be entered in the state folder" in ended.stdout, ended.stderr
     assert [each.name for each in own_state.rglob("*") if each.is_file()] == []

@@ -34,7 +34,7 @@ from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, Stop
 # The file name contains process, start time and level, so a process that may open no more files can still see
 # the stop, and a full disk can store it. The file contains the reason if there is space (decision 0029).
 
-SILENT_REASON = "a stop that was left in the state folder"
+SILENT_REASON = "a stop request in the state folder"
 
 
 def engines_folder() -> Path:
@@ -132,7 +132,7 @@ class Watchdog:
             self._thread.start()
         except RuntimeError as error:
             raise AcquisitionError(
-                f"the system gives this process no more threads ({error}), and the {name} needs one. Nothing "
+                f"this process can start no more threads ({error}), but the {name} needs one. Nothing "
                 "was played; end other programs, or raise the limit (ulimit -u)"
             ) from error
 
@@ -243,8 +243,8 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
         paths = sorted(engines_folder().iterdir())
     except OSError as error:
         raise AcquisitionError(
-            f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
-            "with VIBENCH_STATE_DIR. In an emergency switch the amplifier off by hand"
+            f"the state folder cannot be searched for programs that drive a bench ({error}); set "
+            "VIBENCH_STATE_DIR to the folder of the program. In an emergency switch the amplifier off by hand"
         ) from error
     for path in paths:
         if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait
@@ -361,8 +361,8 @@ def announce_program(press: Press, program: Program) -> Iterator[None]:
         _REACHED.enter(entry)
     except OSError as error:
         raise AcquisitionError(
-            f"{program.what} cannot be announced in the state folder ({error}), so that nobody could stop "
-            "it. Nothing was started; make room there, or name another folder with VIBENCH_STATE_DIR"
+            f"{program.what} cannot be entered in the state folder ({error}), so no other program could stop "
+            "it. Nothing was started; make room there, or set VIBENCH_STATE_DIR to another folder"
         ) from error
     try:
         yield

@@ -203,8 +203,8 @@ class MemoryReserve:
                     self._held = mmap.mmap(-1, RESERVE_BYTES)
                 except (OSError, MemoryError) as error:
                     raise AcquisitionError(
-                        f"this process can get no more memory ({error}), and needs {RESERVE_BYTES / 1e6:g} "
-                        "MB to be sure of silencing the drive. Nothing was played; close other programs, or "
+                        f"this process can get no more memory ({error}), but needs {RESERVE_BYTES / 1e6:g} "
+                        "MB to silence the drive in any case. Nothing was played; close other programs, or "
                         "raise its limit (ulimit -v)"
                     ) from error
 
