@@ -90,7 +90,7 @@ def test_the_live_twin_reports_p_and_a_change_ends_the_run_if_planned(running, t
     client.tell_change("The specimen is not what it was.")
     status = until(client, lambda status: status.state not in DRIVING)
     assert [each.state for each in status.rows] == ["failed"]
-    assert "as on_changed_specimen asks" in status.rows[0].reason
+    assert "as on_changed_specimen requires" in status.rows[0].reason
     events, gaps = recorded(tmp_path)
     assert ("specimen", "The specimen is not what it was.") in events
     assert "limit" in dict(events)

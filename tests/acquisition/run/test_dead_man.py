@@ -142,7 +142,7 @@ def test_plans_that_a_dead_man_cannot_play_are_refused_before_the_campaign(kind,
     before_s = virtual.world.time_s
     refused = {"name": "second", "excitation": {"amplitude_vpp": 1.0, **REFUSED[kind]}}
     campaign = Campaign.model_validate({"name": "trial", "measurements": [PLAN.model_dump(), refused]})
-    with pytest.raises(ConfigurationError, match="lets only sines of one frequency play"):
+    with pytest.raises(ConfigurationError, match="allows only sines of one frequency"):
         run_campaign(bench, campaign, tmp_path)
     assert list(tmp_path.iterdir()) == []
     assert virtual.world.time_s == before_s

@@ -164,7 +164,7 @@ def test_a_dwell_without_a_vibrometer_gives_responses_of_its_accelerometers(tmp_
     [
         ({"vibrometer": None}, "the channel m0_velocity has no sensor; add the table [vibrometer]"),
         ({"sensors": {"m2_velocity": sheet("m0_acceleration")}}, "is not a sensitivity for 'm s-1'"),
-        ({"sensors": {"drive_voltage": sheet("m0_force")}}, "a voltage comes by wire"),
+        ({"sensors": {"drive_voltage": sheet("m0_force")}}, "a voltage channel has no sensor"),
         (
             {"sensors": {"m0_velocity": sheet("m0_velocity")}},
             "describe it in the table [vibrometer]",

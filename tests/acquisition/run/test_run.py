@@ -169,7 +169,7 @@ class TestThePlanIsCarriedOut:
         list(run_of(bench, tmp_path, check=LowLevelCheck.RECENTLY_PASSED))
         assert [each["label"] for each in bench.recorder.segments] == ["ramp_up", "dwell", "ramp_down"]
         events = [event[1:] for event in bench.recorder.events]
-        assert ("check", "left out: the bench was checked shortly before") in events
+        assert ("check", "skipped: the bench was checked shortly before") in events
         assert ("player", "function generator") in events
 
     def test_the_header_contains_plan_bench_and_confirmations(self, played):
@@ -348,7 +348,7 @@ class TestEveryWayOut:
         with run_of(bench, tmp_path) as run:
             upto(run, state)
         assert run.state is RunState.STOPPED
-        assert "left it" in bench.recorder.ending[1]
+        assert "abandoned the run" in bench.recorder.ending[1]
         assert_silent_and_finished(bench, RecordingState.STOPPED)
         assert_ended_without_a_jump(bench, state)
 
@@ -585,10 +585,10 @@ class TestTheBenchCheck:
     @pytest.mark.parametrize(
         ("fault", "sentence"),
         [
-            ({"drive_factor": 2.0}, "a factor of 2 is a wrong load"),
-            ({"drive_factor": 0.5}, "a factor of 2 is a wrong load"),
+            ({"drive_factor": 2.0}, "a factor of 2 means a wrong load"),
+            ({"drive_factor": 0.5}, "a factor of 2 means a wrong load"),
             ({"drive_factor": 0.0}, "check the wire from the generator"),
-            ({"base_factor": 1.5}, "the base moves with"),
+            ({"base_factor": 1.5}, "the base acceleration is"),
             ({"base_factor": 0.6}, "check the amplifier's gain"),
             ({"background_m_per_s2": 10.0}, "before anything plays"),
         ],

@@ -85,7 +85,7 @@ STOPS = {
     "viewer gone": Stop(
         lambda run: run.switch.ask(StopRequest.by(Cause.VIEWER_GONE, "nobody looks")), "nobody looks", ABORT_S
     ),
-    "program left": Stop(lambda run: run.close(), "left it", ABORT_S),
+    "program left": Stop(lambda run: run.close(), "abandoned", ABORT_S),
 }
 
 

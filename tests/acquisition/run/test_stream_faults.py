@@ -166,7 +166,7 @@ def test_a_second_ctrl_c_does_not_wait_for_the_ramp_and_ends_silent(laboratory, 
         with pytest.raises(KeyboardInterrupt):
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=insist)
         assert at_the_amplifier_v(virtual) < SILENT_V
-    kept_drive(tmp_path / "run.h5", RecordingState.STOPPED, "left it|keyboard")
+    kept_drive(tmp_path / "run.h5", RecordingState.STOPPED, "abandoned|keyboard")
 
 
 class FillingDisk:
@@ -194,13 +194,13 @@ def test_a_full_disk_fades_the_output_out_and_keeps_the_recording(laboratory, tm
     virtual, connected = laboratory()
     long = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"duration_s": 120})})
     with bench_on(connected) as bench:
-        with pytest.raises(RecordingError, match="The disk refused the recording") as failure:
+        with pytest.raises(RecordingError, match="Writing to the disk failed") as failure:
             run_measurement(bench, long, tmp_path / "run.h5", create=FillingDisk)
         assert at_the_amplifier_v(virtual) < SILENT_V
     one_sentence(failure)
     with open_recording(tmp_path / "run.h5") as recording:
         assert recording.state is RecordingState.FAILED
-        assert "disk refused" in recording.reason
+        assert "Writing to the disk failed" in recording.reason
         assert recording.samples > 0
 
 

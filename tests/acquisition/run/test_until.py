@@ -159,7 +159,7 @@ def test_the_recording_continues_if_the_analysis_process_dies(rig, tmp_path, mon
     with recording:
         assert seconds(recording, "dwell") == [pytest.approx(2.0)]
     assert outcome.state is RunState.FINISHED
-    assert "the analysis beside the run has ended" in outcome.reason
+    assert "the analysis during the run has ended" in outcome.reason
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
 
 def _without_dead_man(what: str) -> ConfigurationError:
     return ConfigurationError(
-        f"{what}, and generator.dead_man_s lets only sines of one frequency play, as bursts of the generator "
-        "that are triggered while the run lives. Nothing was played; leave dead_man_s out of the hardware "
+        f"{what}, but generator.dead_man_s allows only sines of one frequency, because it plays bursts that "
+        "the run must keep triggering. Nothing was played; leave dead_man_s out of the hardware "
         "configuration for this campaign"
     )

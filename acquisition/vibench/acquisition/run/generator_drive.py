@@ -207,8 +207,8 @@ class GeneratorDrive:
                 self._generator.load_waveform(values, repetition_hz, self._due_vpp)
             case _, Stream() | None:
                 raise ConfigurationError(
-                    "a function generator was given a stream, which it cannot play. Its output stayed as it "
-                    "was; open the bench with an analogue output"
+                    "a function generator cannot play a stream. Its output was not changed; "
+                    "open the bench with an analogue output"
                 )
         self._setting_vpp = self._due_vpp
 

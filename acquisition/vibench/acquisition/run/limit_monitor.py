@@ -159,8 +159,8 @@ class LimitMonitor:
             )
             self._change = LimitExceeded(
                 f"{text.rstrip('.')}. The run was ramped down and its recording kept, as on_changed_specimen "
-                "asks; look at the specimen, and begin a new baseline with 'vibench twin --new-baseline' if "
-                "it is meant to be so",
+                "requires; check the specimen; if the change is intended, set a new baseline with "
+                "'vibench twin --new-baseline'",
                 trip,
             )
 

@@ -317,7 +317,7 @@ class PhaseRunner:
         late_for_s = late_s + self._late_steps * phase.duration_s
         if self._late_steps >= LATE_STEPS and late_for_s > LATE_FOR_S:
             raise DriveLate(
-                f"{text}, {self._late_steps} times in a row. The run was ended, and what was played is kept; "
+                f"{text}, {self._late_steps} times in a row. The run was ended and its recording kept; "
                 "give a longer step_s, or shorten generator.settle_s if the instrument allows it"
             )
         return late_s
@@ -382,14 +382,14 @@ class PhaseRunner:
         """
         if not self._drive.can_hold:
             source = self._drive.drive_source.value
-            reason = f"what the {source} plays must be fed and cannot be held: it was ramped down"
+            reason = f"a stream of the {source} cannot be held: the run was ramped down"
             raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
         before = self.state
         self._enter(RunState.HELD)
         while self._switch.is_holding:
             self._held_s += BLOCK_S
             if self._held_s > HOLD_LONGEST_S:
-                reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
+                reason = f"held for {HOLD_LONGEST_S:g} s, the longest hold that fits in the recording"
                 raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
             yield from self._recorded([self.loop.linger(BLOCK_S)])
         self._enter(before)

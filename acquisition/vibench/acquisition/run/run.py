@@ -89,8 +89,8 @@ def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] |
         return None
     if drive_source_of(measurement, bench.rig) is DriveSource.OUTPUT:
         raise ConfigurationError(
-            f"{measurement.name} is decided while it plays, and an analogue output is written ahead of its "
-            "time. Nothing was played; let daq.output play streams only, and connect the function generator"
+            f"{measurement.name} uses feedback, but the signal of an analogue output is written in advance. "
+            'Nothing was played; set daq.output.plays = "streams", and connect the function generator'
         )
     return feedback_controller(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
 
@@ -274,7 +274,7 @@ class Run(ClosedOnLeaving):
             yield from self._ramped_down_early(runner, LEVELS[cause])
             raise
         except GeneratorExit:
-            self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
+            self._ending.is_stopped("the calling program abandoned the run", Cause.PROGRAM)
             deque(self._ramped_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
 
@@ -325,7 +325,7 @@ class Run(ClosedOnLeaving):
                 pause_s = self._drive.pause_s
             case LowLevelCheck.RECENTLY_PASSED:
                 self._begin(announced)
-                loop.log(EventKind.CHECK, "left out: the bench was checked shortly before")
+                loop.log(EventKind.CHECK, "skipped: the bench was checked shortly before")
                 pause_s = 0.0
         del announced  # not stored for drives that do not read ahead
         yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))

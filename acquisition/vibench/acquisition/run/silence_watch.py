@@ -111,7 +111,7 @@ def _row(channels: tuple[Channel, ...], role: Role) -> int:
     roles = [channel.role for channel in channels]
     if role not in roles:
         raise CheckFailed(
-            f"the rig has no {role.value} channel, which shows the signal that the shaker gets. "
+            f"the rig has no {role.value} channel, which must show the signal sent to the shaker. "
             "Nothing was played; connect it and add it to daq.channels"
         )
     return roles.index(role)
@@ -121,7 +121,7 @@ def _require_quiet(what: str, found: float, expected: float, unit: str) -> None:
     if found > QUIET_SHARE * expected:
         raise CheckFailed(
             f"{what} shows {found:.3g} {unit} at {CHECK_FREQUENCY_HZ:g} Hz before anything plays, "
-            f"a quarter of the {expected:.3g} {unit} to come would be too much. The output stayed off; "
+            f"more than a quarter of the expected {expected:.3g} {unit}. The output stayed off; "
             "look for another source on the amplifier, hum, or a loose cable"
         )
 
@@ -130,16 +130,16 @@ def _require_drive(figures: CheckFigures) -> None:
     ratio = figures.drive_v / figures.expected_drive_v
     if abs(ratio - 1) <= DRIVE_TOLERANCE:
         return
-    measured = f"the drive measures {figures.drive_v:.3g} V where {figures.expected_drive_v:.3g} V were set"
+    measured = f"the measured drive is {figures.drive_v:.3g} V, but {figures.expected_drive_v:.3g} V were set"
     if abs(ratio / WRONG_LOAD - 1) <= DRIVE_TOLERANCE or abs(ratio * WRONG_LOAD - 1) <= DRIVE_TOLERANCE:
-        advice = "a factor of 2 is a wrong load: compare the generator's load setting with load_ohm"
+        advice = "a factor of 2 means a wrong load: compare the generator's load setting with load_ohm"
     else:
         advice = (
-            "check the wire from the generator (or analogue output, if that plays) to the drive_voltage "
-            "input, its range and attenuation"
+            "check the wire from the generator (or from the analogue output) to the drive_voltage "
+            "input, and the range and attenuation of this input"
         )
     raise CheckFailed(
-        f"{measured}, {DRIVE_TOLERANCE:.0%} off is allowed. The output was turned off; {advice}"
+        f"{measured}; {DRIVE_TOLERANCE:.0%} deviation is allowed. The output was turned off; {advice}"
     )
 
 
@@ -148,10 +148,10 @@ def _require_base(figures: CheckFigures) -> None:
     if 1 / BASE_FACTOR <= ratio <= BASE_FACTOR:
         return
     raise CheckFailed(
-        f"the base moves with {figures.base_m_per_s2:.3g} m/s2 where the model says "
-        f"{figures.expected_base_m_per_s2:.3g} m/s2, 3 dB off is allowed. The output was turned off; "
+        f"the base acceleration is {figures.base_m_per_s2:.3g} m/s2, but the model predicts "
+        f"{figures.expected_base_m_per_s2:.3g} m/s2; 3 dB deviation is allowed. The output was turned off; "
         "check the amplifier's gain and power, the accelerometer and its sensitivity, the moving mass, and "
-        "whether the specimen is the one that the rig names"
+        "that the specimen is the one in the hardware configuration"
     )
 
 
@@ -218,7 +218,7 @@ class SilenceWatch:
         self.is_heard = not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
         if self.is_heard:
             raise InstrumentError(
-                f"the drive is {self.text()}. It was told to be silent and the recording is kept; THE OUTPUT "
+                f"the drive is {self.text()}. It was commanded off and the recording is kept; THE OUTPUT "
                 "MAY STILL BE ON: switch the amplifier off by hand"
             )
 
@@ -258,7 +258,7 @@ class DriveGuard(ClosedOnLeaving):
         self._is_heard = is_heard
         reason = (
             f"the run read no samples for {STANDSTILL_BLOCKS * BLOCK_S:g} s; its output was switched off. "
-            "Look for what holds up this computer or its disk, then start again"
+            "Find what slows down this computer or its disk, then start again"
         )
         self._standstill = StopRequest(Cause.FAULT, StopLevel.OFF, reason)
         self._blocks = self._seen = 0

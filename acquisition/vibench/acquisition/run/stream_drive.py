@@ -125,8 +125,8 @@ class OutputSynthesizer:
                 return source.samples(first, count, self._rate_hz)
             case Waveform() | Sweep():
                 raise ConfigurationError(
-                    "a repeated waveform, or a generator's own sweep, was given to the analogue output, "
-                    "which streams. Nothing of it was played; play it by the function generator"
+                    "an analogue output plays only streams, not a repeated waveform or a generator's own "
+                    "sweep. Nothing of it was played; play it with the function generator"
                 )
 
 

@@ -56,7 +56,7 @@ class UntilWatch(ClosedOnLeaving):
             )
         except OSError as error:
             raise AcquisitionError(
-                f"{measurement.name} asks for until, and its analysis could not be started ({error}). "
+                f"{measurement.name} uses until, but its analysis could not be started ({error}). "
                 "Nothing was played; close other programs, or leave until out"
             ) from error
         excitation = measurement.excitation
@@ -156,7 +156,7 @@ class UntilWatch(ClosedOnLeaving):
             bounds = {name: answer["bounds"].get(name) for name in note.wishes}
             hindrance = str(answer["hindrance"])
         except (OSError, ValueError, KeyError, AttributeError):
-            hindrance = "the analysis beside the run has ended"
+            hindrance = "the analysis during the run has ended"
         self._found = note.model_copy(
             update={
                 "bounds": bounds,
