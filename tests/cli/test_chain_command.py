@@ -119,7 +119,7 @@ def test_an_exponent_is_reported_with_its_error():
         (("--cells", "200", "--amplitude", "1e-6", "--frequency", "200:300", "--duration", "99"), "numbers"),
         (
             ("--cells", "2", "--amplitude", "1e-6", "--frequency", "200", "--exponent", "0.01"),
-            "hold 32 intervals",
+            "contain 32 intervals",
         ),
     ],
 )

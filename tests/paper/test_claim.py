@@ -114,7 +114,7 @@ def test_empty_bounds_are_refused():
 
 
 def test_a_measure_must_give_a_number_for_each_expectation():
-    with pytest.raises(InvalidRequest, match="wants 1 numbers and 2"):
+    with pytest.raises(InvalidRequest, match="requires 1 numbers, but 2"):
         judge({2e-5: (1.0, 2.0)}, at_least("one", "", 0.0))
 
 

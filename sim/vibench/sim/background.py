@@ -220,7 +220,7 @@ def _call_back(job: Job, kind: str, value: Any) -> None:
         case "answer", _:
             job.on_answer(value)
         case _, MemoryError():
-            job.on_error(MemoryError(f"job needs over {MOST_BYTES >> 30} GB of memory; reduce the request"))
+            job.on_error(MemoryError(f"it needs more than {MOST_BYTES >> 30} GB of memory; request less"))
         case _:
             job.on_error(value)
 

@@ -96,5 +96,5 @@ def test_shooting_in_chaos_is_refused_or_finds_an_unstable_orbit():
 def test_zero_drive_and_mirrored_double_periods_are_refused():
     with pytest.raises(ValueError, match="positive amplitude"):
         periodic_orbit(SPECIMEN, Harmonic(100.0, 0.0))
-    with pytest.raises(ValueError, match="mirrored motion of 2 periods"):
+    with pytest.raises(ValueError, match="mirrored motion cannot have 2 periods"):
         periodic_orbit(SPECIMEN, Harmonic(100.0, 1e-6), OrbitShape.MIRRORED, 2)

@@ -188,7 +188,7 @@ def test_a_rig_that_is_switched_off_has_no_address():
 
 def test_a_generator_that_is_not_on_usb_cannot_be_simulated():
     generator = RIG.generator.model_copy(update={"resource": "GPIB0::10::INSTR"})
-    with pytest.raises(ConfigurationError, match=r"GPIB0::10::INSTR.*sits on USB"):
+    with pytest.raises(ConfigurationError, match=r"GPIB0::10::INSTR.*is a USB device"):
         VirtualRig(RIG.model_copy(update={"generator": generator}))
 
 
