@@ -81,8 +81,8 @@ def test_a_failed_run_has_no_exponent_and_states_the_reason():
     ("options", "message"),
     [
         ({"duration_s": 0.1}, f"request {FEWEST_INTERVALS} or more"),
-        ({"duration_s": -1.0}, "duration > 0"),
-        ({"settle_s": math.inf}, "give finite times"),
+        ({"duration_s": -1.0}, "the first > 0"),
+        ({"settle_s": math.inf}, "both must be finite"),
         ({"interval_s": 0.0}, "Interval 0.0 s is not allowed"),
         ({"initial_state": np.zeros(5)}, "six finite numbers"),
     ],

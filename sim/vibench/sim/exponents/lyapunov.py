@@ -190,7 +190,7 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
     """Return the number of settling intervals; raise ValueError if too few intervals follow them."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         raise ValueError(
-            f"Duration {duration_s} s (settling {settle_s} s) is not allowed: give finite times, duration > 0."
+            f"Duration {duration_s} s after {settle_s} s of settling: both must be finite, the first > 0."
         )
     skipped = max(ALIGNING, math.ceil(settle_s / interval.length_s - ALMOST))
     left = interval.count_in(settle_s + duration_s) - skipped
