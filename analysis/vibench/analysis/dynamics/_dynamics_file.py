@@ -111,7 +111,7 @@ def read_diagram(path: Path) -> BranchDiagram:
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != BRANCHES_FORMAT:
-                raise InvalidRequest(f"{path} holds no branches; give a file that vibench branches wrote")
+                raise InvalidRequest(f"{path} contains no branches; give a file that vibench branches wrote")
             request = BranchRequest.model_validate_json(str(file.attrs["request"]))
             lines = tuple(_read_line(file[name]) for name in sorted(file) if name.startswith("branch_"))
             return BranchDiagram(request, lines, float(file.attrs["elapsed_s"]))

@@ -90,7 +90,7 @@ def pack_folder(
         )
     entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):
-        raise NotEnoughData(f"{folder} holds no recording; give the folder of a campaign")
+        raise NotEnoughData(f"{folder} contains no recording; give the folder of a campaign")
     document = {
         "@context": f"{CONTEXT}/context",
         "@graph": [*_about(folder, facts, untrusted, entities), *entities],

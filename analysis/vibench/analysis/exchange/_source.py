@@ -176,7 +176,7 @@ def _readable(path: Path) -> Iterator[None]:
         if reason := system_error(error):
             raise UnusableData(f"{path.name} could not be read ({reason}); check the disk") from error
         raise UnusableData(
-            f"{path.name} is damaged, or not what its suffix says ({shortened(str(error))}); copy or export "
+            f"{path.name} is damaged, or has a wrong suffix ({shortened(str(error))}); copy or export "
             "it again"
         ) from error
 

@@ -101,7 +101,7 @@ def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
         name=f"hidden_impacts_{motion.name}",
         title=f"Collisions of {motion.name}",
         caption=(
-            "Above left: impulse of every impact on m1 (tracked; crosses without a contact model). "
+            "Above left: impulse of every impact on m1 (dots: tracked; crosses: no contact model). "
             "Above right: force of a stop over penetration from tracking, with 95 % bounds where determined. "
             "Below left: share of the energy of relative motion that each impact dissipated, without a "
             "contact model. Below right: gap from each impact without a contact model, and the gaps used for "

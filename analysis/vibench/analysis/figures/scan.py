@@ -74,6 +74,6 @@ def scan_caption(scan: Scan) -> str:
     confidence = scan.analyses[0].response.frequency_response.settings.confidence
     return (
         f"Measured transmission from base to {len(scan.points)} points, and its phase, at "
-        f"{f'the resonances {where} Hz' if where else 'no resonance: none stands above its uncertainty'}. "
+        f"{f'the resonances {where} Hz' if where else 'no resonance, because none is significant'}. "
         f"Values and bars ({100 * confidence:g} % bounds) are those of the line nearest to each resonance."
     )

@@ -169,7 +169,7 @@ def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) 
             f"averages from {response.used_s:.0f} s in total."
         ),
         estimate_sentence(response),
-        f"Resonances found: {found}." if found else "No resonance stands above its uncertainty.",
+        f"Resonances found: {found}." if found else "No significant resonance was found.",
         (
             f"Median coherence {response.median_coherence:.4f}; dash-dotted: coherence that independent "
             "noise would show."

@@ -315,7 +315,7 @@ def _response_to_hits(
         if bad.valid(data, channels.overloaded(start, start + size)).all():
             usable.append(data)
     if not usable:
-        raise NotEnoughData(f"none of {len(hits.starts)} hits is without a fault{bad.text}; measure again")
+        raise NotEnoughData(f"all {len(hits.starts)} hits have a fault{bad.text}; measure again")
     data = np.array(usable)
     settings = FrequencyResponseSettings(request.estimator, rate, size, "", 0.0, request.confidence)
     spectra = hit_spectra(data, hits, settings, band_hz[1], fades=request.window is not Window.BOXCAR)

@@ -100,7 +100,7 @@ def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
 def _resonances(result: NoiseResult) -> str:
     found = [each.frequency_hz for each in result.analysis.response.resonances]
     if not found:
-        return f"At {_level(result)} no resonance stands above its uncertainty."
+        return f"At {_level(result)} there is no significant resonance."
     verb = "is" if len(found) == 1 else "are"
     return f"At {_level(result)} there {verb} {_count(len(found), 'resonance')}, {_list_hz(found)} Hz."
 
@@ -497,7 +497,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
         return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}{known}"
     compared, every = sum(each.compared > 0 for each in overlay.ensemble), len(overlay.ensemble)
     if not compared:
-        return Agreement.OPEN, "too few simulated draws of the measured kind of motion"
+        return Agreement.OPEN, "too few simulated draws have the measured kind of motion"
     return Agreement.YES, "" if compared == every else f"{compared} of {every} quantities were compared"
 
 
