@@ -29,17 +29,11 @@ from .channel_output import (
 from .scpi_instrument import (
     CHANNELS,
     Command,
-    Parameters,
     Quirks,
     ScpiInstrument,
-    action,
     choice,
-    exactly,
-    none,
     number,
-    only,
-    report,
-    switch,
+    setting,
 )
 from .terminal_voltage import Relay, Terminal
 
@@ -132,7 +126,7 @@ class AFG1022(ScpiInstrument):
     def memory_changed(self) -> None:
         """Apply a changed waveform at once if it is playing."""
         sounding = self._channels[SOUNDING_CHANNEL]
-        if scpi.memory_name(sounding.shape) is not None:
+        if standard_shape(sounding.shape) is None:
             self._replace(SOUNDING_CHANNEL, sounding)
 
     def reset(self) -> None:
@@ -197,88 +191,52 @@ def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Chan
 
 def modulation_switch(mode: RunMode) -> Command:
     """Return the command of a modulation."""
-    return switch(
+    return setting(
         f"[SOURce#:]{mode.value}:STATe", "IVI; on: not simulated",
         lambda s: s.mode is mode, partial(without_mode, mode),
     )  # fmt: skip
 
 
-def _shape_name(parameter: bytes) -> str:
-    word = scpi.text(parameter)
-    name = standard_shape(word) or scpi.memory_name(word)
-    if name is None:
-        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    return name
-
-
-def _write_shape(generator: AFG1022, channel: int, parameters: Parameters) -> None:
+def _write_shape(generator: AFG1022, channel: int, parameter: bytes) -> None:
     """Select a shape, and lower the frequency to the limit of this shape if necessary."""
-    settings, name = generator.settings(channel), _shape_name(only(parameters))
+    settings = generator.settings(channel)
+    name = standard_shape(scpi.text(parameter)) or scpi.memory_name(parameter)
     frequency_hz = min(settings.frequency_hz, highest_frequency_hz(name))
     generator.configure(channel, replace(settings, shape=name, frequency_hz=frequency_hz))
 
 
-def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
-    none(parameters)
-    return generator.settings(channel).shape.encode("ascii")
-
-
-def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    """Set the phase from ``31DEG`` or radians; it is truncated to degrees, and must not be negative."""
+def _whole_degrees(parameter: bytes) -> int:
+    """Return the phase of ``31DEG`` or of radians, truncated to degrees; it must not be negative."""
     full_turn_deg = 360.0
-    angle, unit = scpi.number_and_unit(only(parameters))
+    angle, unit = scpi.number_and_unit(parameter)
     if unit not in ("", "RAD", "DEG"):
         raise scpi.ScpiError(scpi.ErrorCode.INVALID_SUFFIX)
     angle_deg = angle if unit == "DEG" else math.degrees(angle)
     if not 0 <= angle_deg <= full_turn_deg:
         raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
     # A small margin prevents truncation of 31 degrees, sent in radians, to 30.
-    whole = math.floor(angle_deg + 1e-9)
-    generator.configure(channel, replace(generator.settings(channel), phase_deg=whole))
+    return math.floor(angle_deg + 1e-9)
 
 
-def _ask_phase(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
-    none(parameters)
-    return scpi.as_number(math.radians(generator.settings(channel).phase_deg))
-
-
-def _memory(parameter: bytes) -> str:
-    name = scpi.memory_name(scpi.text(parameter))
-    if name is None:
-        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    return name
-
-
-def _load_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
-    target, data = exactly(parameters, 2)
-    generator.memory.load(_memory(target), scpi.block(data))
+def _load_memory(generator: AFG1022, _: int, target: bytes, data: bytes) -> None:
+    generator.memory.load(scpi.memory_name(target), scpi.block(data))
     generator.memory_changed()
 
 
-def _read_memory(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
-    return scpi.as_block(generator.memory.codes(_memory(only(parameters))).astype(">u2").tobytes())
+def _read_memory(generator: AFG1022, _: int, name: bytes) -> bytes:
+    return scpi.as_block(generator.memory.codes(scpi.memory_name(name)).astype(">u2").tobytes())
 
 
-def _define_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
-    target, points = exactly(parameters, 2)
-    if _memory(target) != scpi.EDIT_MEMORY:
+def _define_memory(generator: AFG1022, _: int, target: bytes, points: bytes) -> None:
+    if scpi.memory_name(target) != scpi.EDIT_MEMORY:
         raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
     generator.memory.define(scpi.integer(points))
     generator.memory_changed()
 
 
-def _ask_points(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
-    return str(len(generator.memory.codes(_memory(only(parameters))))).encode("ascii")
-
-
-def _copy_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
-    target, source = exactly(parameters, 2)
-    generator.memory.copy(_memory(source), _memory(target))
+def _copy_memory(generator: AFG1022, _: int, target: bytes, source: bytes) -> None:
+    generator.memory.copy(scpi.memory_name(source), scpi.memory_name(target))
     generator.memory_changed()
-
-
-def _catalogue(generator: AFG1022) -> bytes:
-    return ",".join(f'"{name}"' for name in generator.memory.catalogue).encode("ascii")
 
 
 def load_command(header: str) -> Command:
@@ -288,9 +246,9 @@ def load_command(header: str) -> Command:
         lambda _: (1.0, 10e3), default=50.0, decimals=0, largest=math.inf,
     )  # fmt: skip
 
-    def ask(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
+    def ask(generator: AFG1022, channel: int) -> bytes:
         assert row.ask is not None
-        reply = row.ask(generator, channel, parameters)
+        reply = row.ask(generator, channel)
         is_open = math.isinf(generator.settings(channel).declared_load_ohm)
         gbk_ohm_sign = b"\xa6\xb8"
         return reply + gbk_ohm_sign if is_open and generator.quirks.high_impedance_has_ohm_sign else reply
@@ -308,10 +266,10 @@ _DUTY = number(
 )  # fmt: skip
 
 
-def _write_duty(generator: AFG1022, channel: int, parameters: Parameters) -> None:
+def _write_duty(generator: AFG1022, channel: int, parameter: bytes) -> None:
     """Set the duty cycle and queue an error, as the instrument does."""
     assert _DUTY.write is not None
-    _DUTY.write(generator, channel, parameters)
+    _DUTY.write(generator, channel, parameter)
     raise scpi.ScpiError(scpi.ErrorCode.SYNTAX_ERROR)
 
 
@@ -326,7 +284,7 @@ def burst_cycles(most: int, channels: int) -> Command:
 # fmt: off
 LOAD = load_command("OUTPut#:IMPedance")
 SHARED_COMMANDS = (
-    switch("OUTPut#[:STATe]", "IVI",
+    setting("OUTPut#[:STATe]", "IVI",
         lambda s: s.relay is Relay.CLOSED,
         lambda s, on: replace(s, relay=Relay.CLOSED if on else Relay.OPEN)),
     number("[SOURce#:]FREQuency[:FIXed]", "IVI", "frequency_hz", scpi.FREQUENCY_UNITS,
@@ -339,27 +297,32 @@ SHARED_COMMANDS = (
 )
 COMMANDS = (
     *SHARED_COMMANDS,
-    Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, but for 45 built-in shapes", _write_shape, _ask_shape),
-    Command("[SOURce#:]PHASe[:ADJust]", "AFG1062", _write_phase, _ask_phase),
-    action("[SOURce#:]PHASe:INITiate", "AFG1062", lambda generator: generator.align_phases()),
-    Command(_DUTY.header, _DUTY.source, _write_duty, _DUTY.ask),
+    Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, but for 45 built-in shapes", _write_shape,
+        lambda generator, channel: generator.settings(channel).shape.encode("ascii")),
+    setting("[SOURce#:]PHASe[:ADJust]", "AFG1062",
+        lambda s: s.phase_deg, lambda s, deg: replace(s, phase_deg=deg),
+        parse=_whole_degrees, show=lambda deg: scpi.as_number(math.radians(deg))),
+    Command("[SOURce#:]PHASe:INITiate", "AFG1062", lambda generator, _: generator.align_phases(), takes=0),
+    replace(_DUTY, write=_write_duty),
     Command("[SOURce#:]FREQuency:CONCurrent[:STATe]", "drivers",
-        lambda each, channel, given: each.lock_frequencies(channel, locked=scpi.boolean(only(given))),
-        lambda generator, *_: b"1" if generator.frequencies_are_locked else b"0"),
+        lambda generator, channel, on: generator.lock_frequencies(channel, locked=scpi.boolean(on)),
+        lambda generator, _: b"1" if generator.frequencies_are_locked else b"0"),
     choice("[SOURce#:]FREQuency:MODE", "IVI; sweep: not simulated", ("CW", "SWEep"),
         lambda s: "SWEep" if s.mode is RunMode.SWEEP else "CW",
         lambda s, word: without_mode(RunMode.SWEEP, s, word == "SWEep")),
-    switch("[SOURce#:]BURSt[:STATe]", "IVI, drivers",
-        lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on), channels=1),
+    setting("[SOURce#:]BURSt[:STATe]", "IVI, drivers",
+        lambda s: s.mode is RunMode.BURST, partial(with_mode, RunMode.BURST), channels=1),
     burst_cycles(50_000, channels=1),
     choice("[SOURce#:]BURSt:MODE", "IVI, drivers", BurstMode,
         lambda s: s.burst_mode, lambda s, mode: replace(s, burst_mode=mode), channels=1),
     *(modulation_switch(mode) for mode in MODULATIONS),
-    Command("DATA[:DATA]", "IVI, drivers", _load_memory, _read_memory),
-    Command("DATA:DEFine", "IVI", _define_memory, None),
-    Command("DATA:POINts", "IVI, drivers", None, _ask_points),
-    Command("DATA:COPY", "IVI, drivers", _copy_memory, None),
-    report("DATA:CATalog", "IVI, drivers", _catalogue),
+    Command("DATA[:DATA]", "IVI, drivers", _load_memory, _read_memory, takes=2, query_takes=1),
+    Command("DATA:DEFine", "IVI", _define_memory, takes=2),
+    Command("DATA:POINts", "IVI, drivers", query_takes=1,
+        ask=lambda generator, _, name: b"%d" % len(generator.memory.codes(scpi.memory_name(name)))),
+    Command("DATA:COPY", "IVI, drivers", _copy_memory, takes=2),
+    Command("DATA:CATalog", "IVI, drivers",
+        ask=lambda each, _: ",".join(f'"{name}"' for name in each.memory.catalogue).encode("ascii")),
 )
 """Commands of an AFG1022, except the common commands and `LOAD`."""
 # fmt: on

@@ -6,10 +6,9 @@ Source: Keysight Trueform Series Operating and Service Guide, as used by public 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import scpi_message as scpi
 from .afg1022 import (
@@ -23,7 +22,7 @@ from .afg1022 import (
 )
 from .channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
 from .phase_course import Spacing
-from .scpi_instrument import Command, Parameters, Quirks, choice, none, number, only, switch
+from .scpi_instrument import Command, Quirks, choice, number, setting
 
 TOP_CODE = 65_534
 """Largest code; the codes -32767 to 32767 are shifted to start at zero."""
@@ -75,42 +74,32 @@ def _name(parameter: bytes) -> str:
     return scpi.text(parameter).strip('"').upper()
 
 
-def _write_dac(own: Keysight33500B, _: int, parameters: Parameters) -> None:
-    """Store a waveform from a binary block of 16-bit numbers, or from a list."""
-    if len(parameters) < 2:
-        raise scpi.ScpiError(scpi.ErrorCode.MISSING_PARAMETER)
-    name = _name(parameters[0])
-    if name in own.waveforms:
+def _write_dac(own: Keysight33500B, _: int, name: bytes, data: bytes) -> None:
+    """Store a waveform from a binary block of 16-bit numbers."""
+    if _name(name) in own.waveforms:
         raise scpi.ScpiError(scpi.ErrorCode.SETTINGS_CONFLICT)  # 786, "Specified arb waveform already exists"
-    values = _numbers(own, parameters[1:])
-    if not POINTS[0] <= values.size <= POINTS[1] or np.any(np.abs(values) > _MIDDLE):
+    packed, settings = scpi.block(data), own.settings(1)
+    assert isinstance(settings, _Settings)
+    if len(packed) % 2:
+        raise scpi.ScpiError(scpi.ErrorCode.INVALID_BLOCK_DATA)
+    codes = np.frombuffer(packed, dtype=">i2" if settings.order == "NORMal" else "<i2").astype(np.int32)
+    if not POINTS[0] <= codes.size <= POINTS[1] or np.any(np.abs(codes) > _MIDDLE):
         raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
-    if sum(map(len, own.waveforms.values())) + values.size > POINTS[1]:
+    if sum(map(len, own.waveforms.values())) + codes.size > POINTS[1]:
         raise scpi.ScpiError(scpi.ErrorCode.OUT_OF_MEMORY)
-    own.waveforms[name] = (values + _MIDDLE).astype(np.uint16)
+    own.waveforms[_name(name)] = (codes + _MIDDLE).astype(np.uint16)
 
 
-def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]:
-    if parameters[0].startswith(b"#"):
-        settings: Any = own.settings(1)
-        order = ">i2" if settings.order == "NORMal" else "<i2"
-        data = scpi.block(parameters[0])
-        if len(data) % 2:
-            raise scpi.ScpiError(scpi.ErrorCode.INVALID_BLOCK_DATA)
-        return np.frombuffer(data, dtype=order).astype(np.float64)
-    return np.array([float(scpi.integer(each)) for each in parameters])
-
-
-def _stored(own: Keysight33500B, parameters: Parameters) -> str:
+def _stored(own: Keysight33500B, parameter: bytes) -> str:
     """Return the name of a stored waveform."""
-    name = _name(only(parameters))
+    name = _name(parameter)
     if name not in own.waveforms:
         raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
     return name
 
 
-def _select(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    name = _stored(own, parameters)
+def _select(own: Keysight33500B, channel: int, parameter: bytes) -> None:
+    name = _stored(own, parameter)
     rate_hz = _rate_hz(own, channel)
     own.selected = name
     own.memory.hold(own.waveforms[name])
@@ -119,8 +108,7 @@ def _select(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
         _set_rate(own, channel, rate_hz)
 
 
-def _clear(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    none(parameters)
+def _clear(own: Keysight33500B, channel: int) -> None:
     if own.settings(channel).shape == scpi.EDIT_MEMORY:
         own.configure(channel, replace(own.settings(channel), shape=SINE))
     own.waveforms.clear()
@@ -130,10 +118,10 @@ def _clear(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
 def _attribute(node: str, of: Callable[[scpi.Codes], float]) -> Command:
     """Return the query for a number that describes a stored waveform."""
 
-    def ask(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
-        return scpi.as_number(of(own.waveforms[_stored(own, parameters)]))
+    def ask(own: Keysight33500B, _: int, name: bytes) -> bytes:
+        return scpi.as_number(of(own.waveforms[_stored(own, name)]))
 
-    return Command(f"[SOURce#:]DATA:ATTRibute:{node}", _GUIDE, None, ask)
+    return Command(f"[SOURce#:]DATA:ATTRibute:{node}", _GUIDE, ask=ask, query_takes=1)
 
 
 def _rate_hz(own: Keysight33500B, channel: int) -> float:
@@ -145,8 +133,8 @@ def _set_rate(own: Keysight33500B, channel: int, rate_hz: float) -> None:
     own.configure(channel, replace(own.settings(channel), frequency_hz=rate_hz / points))
 
 
-def _write_rate(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    rate_hz = scpi.number(only(parameters), scpi.NO_UNITS)
+def _write_rate(own: Keysight33500B, channel: int, parameter: bytes) -> None:
+    rate_hz = scpi.number(parameter, scpi.NO_UNITS)
     if not 0 < rate_hz <= HIGHEST_RATE_HZ:
         raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
     _set_rate(own, channel, rate_hz)
@@ -167,13 +155,13 @@ _COMMANDS = (
     choice("[SOURce#:]FUNCtion", _GUIDE, ("SINusoid", "ARB"),
         lambda s: "ARB" if s.shape == scpi.EDIT_MEMORY else "SINusoid",
         lambda s, word: replace(s, shape=scpi.EDIT_MEMORY if word == "ARB" else SINE)),
-    Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, *_: own.selected.encode()),
+    Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, _: own.selected.encode()),
     Command("[SOURce#:]FUNCtion:ARBitrary:SRATe", _GUIDE, _write_rate,
-        lambda own, channel, _: scpi.as_number(_rate_hz(own, channel))),
+        lambda own, channel: scpi.as_number(_rate_hz(own, channel))),
     choice("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, ("OFF", "STEP", "NORMal"),
         lambda s: s.filter, lambda s, word: replace(s, filter=word)),
-    Command("[SOURce#:]DATA:ARBitrary:DAC", _GUIDE, _write_dac, None),
-    Command("[SOURce#:]DATA:VOLatile:CLEar", _GUIDE, _clear, None),
+    Command("[SOURce#:]DATA:ARBitrary:DAC", _GUIDE, _write_dac, takes=2),
+    Command("[SOURce#:]DATA:VOLatile:CLEar", _GUIDE, _clear, takes=0),
     _attribute("POINts", len),
     _attribute("AVERage", lambda codes: float(np.mean(codes)) / _MIDDLE - 1),
     choice("FORMat:BORDer", _GUIDE, ("NORMal", "SWAPped"),
@@ -183,15 +171,15 @@ _COMMANDS = (
         lambda s: s.frequency_range_hz, default=100e3, decimals=6),
     number("[SOURce#:]FREQuency:STOP", _GUIDE, "sweep_stop_hz", scpi.FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=1e6, decimals=6),
-    switch("[SOURce#:]SWEep:STATe", _GUIDE, lambda s: s.mode is RunMode.SWEEP, _sweeping),
+    setting("[SOURce#:]SWEep:STATe", _GUIDE, lambda s: s.mode is RunMode.SWEEP, _sweeping),
     number("[SOURce#:]SWEep:TIME", _GUIDE, "sweep_s", _SECONDS, lambda _: SWEEP_S, default=1.0, decimals=6),
     number("[SOURce#:]SWEep:HTIMe", _GUIDE, "sweep_hold_s", _SECONDS, lambda _: HOLD_S,
         default=0.0, decimals=6),
     choice("[SOURce#:]SWEep:SPACing", _GUIDE, Spacing,
         lambda s: s.sweep_spacing, lambda s, word: replace(s, sweep_spacing=word)),
     choice("TRIGger#:SOURce", _GUIDE, Trigger, lambda s: s.trigger, lambda s, word: replace(s, trigger=word)),
-    switch("[SOURce#:]BURSt:STATe", _GUIDE,
-        lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on)),
+    setting("[SOURce#:]BURSt:STATe", _GUIDE, lambda s: s.mode is RunMode.BURST,
+        partial(with_mode, RunMode.BURST)),
     burst_cycles(MOST_BURST_CYCLES, channels=2),
     choice("[SOURce#:]BURSt:MODE", _GUIDE, BurstMode,
         lambda s: s.burst_mode, lambda s, mode: replace(s, burst_mode=mode)),

@@ -15,9 +15,10 @@ CHANNELS = 2
 _RANGE_ROUNDING = 1e-9
 """Relative tolerance at range limits, for numbers in other units."""
 
-Parameters = tuple[bytes, ...]
-Setter = Callable[[Any, int, Parameters], None]
-Query = Callable[[Any, int, Parameters], bytes]
+Setter = Callable[..., None]
+"""Function of instrument, channel and the parameters of a command."""
+Query = Callable[..., bytes]
+"""Function of instrument, channel and the parameters of a query, which returns the reply."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,12 @@ class Command:
     header: str
     """Header in the notation of manuals, see `header_pattern`."""
     source: str
-    write: Setter | None
-    ask: Query | None
+    write: Setter | None = None
+    ask: Query | None = None
+    takes: int = 1
+    """Number of parameters of the command."""
+    query_takes: int = 0
+    """Number of parameters of the query."""
     channels: int = CHANNELS
     """Highest numeric suffix."""
 
@@ -51,9 +56,9 @@ def number(
     ``scale`` is the ratio of displayed value to field. ``INFINITE`` selects ``largest``, if given.
     """
 
-    def write(generator: Any, channel: int, parameters: Parameters) -> None:
+    def write(generator: Any, channel: int, parameter: bytes) -> None:
         settings = generator.settings(channel)
-        shown = scpi.number(only(parameters), units)
+        shown = scpi.number(parameter, units)
         low, high = limits(settings)
         if shown >= scpi.INFINITE and not math.isnan(largest):
             shown = largest
@@ -65,13 +70,33 @@ def number(
             raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
         generator.configure(channel, replace(settings, **{field: shown / scale(settings)}))
 
-    def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
-        none(parameters)
+    def ask(generator: Any, channel: int) -> bytes:
         settings = generator.settings(channel)
         shown = getattr(settings, field) * scale(settings)
         return scpi.as_number(scpi.INFINITE if math.isinf(shown) else shown)
 
-    return Command(header, source, write, ask, channels)
+    return Command(header, source, write, ask, channels=channels)
+
+
+def setting(
+    header: str,
+    source: str,
+    get: Callable[[Any], Any],
+    put: Callable[[Any, Any], ChannelSettings],
+    *,
+    parse: Callable[[bytes], Any] = scpi.boolean,
+    show: Callable[[Any], bytes] = lambda is_on: b"1" if is_on else b"0",
+    channels: int = CHANNELS,
+) -> Command:
+    """Return the command of a setting that ``get`` reads and ``put`` replaces; by default it is on or off."""
+
+    def write(generator: Any, channel: int, parameter: bytes) -> None:
+        generator.configure(channel, put(generator.settings(channel), parse(parameter)))
+
+    def ask(generator: Any, channel: int) -> bytes:
+        return show(get(generator.settings(channel)))
+
+    return Command(header, source, write, ask, channels=channels)
 
 
 def choice(
@@ -84,78 +109,17 @@ def choice(
 ) -> Command:
     """Return the command of a setting whose values are words, with the short form in capitals."""
 
-    def write(generator: Any, channel: int, parameters: Parameters) -> None:
-        word = scpi.text(only(parameters))
+    def parse(parameter: bytes) -> str:
+        word = scpi.text(parameter)
         for candidate in words:
             if scpi.mnemonic_matches(word, candidate):
-                generator.configure(channel, put(generator.settings(channel), candidate))
-                return
+                return candidate
         raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
 
-    def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
-        none(parameters)
-        return scpi.short_form(get(generator.settings(channel))).encode("ascii")
+    def show(word: str) -> bytes:
+        return scpi.short_form(word).encode("ascii")
 
-    return Command(header, source, write, ask, channels)
-
-
-def switch(
-    header: str,
-    source: str,
-    get: Callable[[ChannelSettings], bool],
-    put: Callable[[ChannelSettings, bool], ChannelSettings],
-    channels: int = CHANNELS,
-) -> Command:
-    """Return the command of an on/off setting."""
-
-    def write(generator: Any, channel: int, parameters: Parameters) -> None:
-        generator.configure(channel, put(generator.settings(channel), scpi.boolean(only(parameters))))
-
-    def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
-        none(parameters)
-        return b"1" if get(generator.settings(channel)) else b"0"
-
-    return Command(header, source, write, ask, channels)
-
-
-def action(header: str, source: str, act: Callable[[Any], None]) -> Command:
-    """Return a command without parameters."""
-
-    def write(generator: Any, _: int, parameters: Parameters) -> None:
-        none(parameters)
-        act(generator)
-
-    return Command(header, source, write, None)
-
-
-def report(header: str, source: str, tell: Callable[[Any], bytes]) -> Command:
-    """Return a query without parameters."""
-
-    def ask(generator: Any, _: int, parameters: Parameters) -> bytes:
-        none(parameters)
-        return tell(generator)
-
-    return Command(header, source, None, ask)
-
-
-def exactly(parameters: Parameters, count: int) -> Parameters:
-    """Return the parameters if their number is correct; -109 or -108 otherwise."""
-    if len(parameters) < count or not all(parameters):
-        raise scpi.ScpiError(scpi.ErrorCode.MISSING_PARAMETER)
-    if len(parameters) > count:
-        raise scpi.ScpiError(scpi.ErrorCode.PARAMETER_NOT_ALLOWED)
-    return parameters
-
-
-def only(parameters: Parameters) -> bytes:
-    """Return the only parameter of a command."""
-    return exactly(parameters, 1)[0]
-
-
-def none(parameters: Parameters) -> None:
-    """Refuse parameters of a command that takes none."""
-    if parameters:
-        raise scpi.ScpiError(scpi.ErrorCode.PARAMETER_NOT_ALLOWED)
+    return setting(header, source, get, put, parse=parse, show=show, channels=channels)
 
 
 LONGEST_REPLY = 1 << 20
@@ -231,7 +195,8 @@ class ScpiInstrument:
             delay_s, self._next_delay_s = self._next_delay_s, 0.0
             if self._next_is_corrupted:
                 self._next_is_corrupted = False
-                data = _spoil(data)
+                spoilt = (byte if place % 2 else byte ^ scpi.BYTE for place, byte in enumerate(data[:-1]))
+                data = bytes(spoilt) + data[-1:]
             return Reply(data, delay_s)
 
     def report(self, code: scpi.ErrorCode) -> None:
@@ -258,6 +223,11 @@ class ScpiInstrument:
         """Clear error queue and event register."""
         self.status.clear()
         self._identity_is_due_empty = self.quirks.first_identity_after_clear_is_empty
+
+    def next_error(self) -> bytes:
+        """Return and remove the oldest error of the queue."""
+        code = self.status.next_error()
+        return f'{int(code)},"{code.text}"'.encode("ascii")
 
     def reset(self) -> None:
         """Restore the defaults."""
@@ -292,7 +262,8 @@ class ScpiInstrument:
 
     def _obey(self, header: str, unit: scpi.Unit) -> list[bytes]:
         command, suffix = self._find(header)
-        if command is None or (command.ask if unit.asks else command.write) is None:
+        act = None if command is None else command.ask if unit.asks else command.write
+        if command is None or act is None:
             # Refuse an unknown header as the firmware does.
             if not self.quirks.unknown_is_syntax_error:
                 raise scpi.ScpiError(scpi.ErrorCode.UNDEFINED_HEADER)
@@ -300,11 +271,13 @@ class ScpiInstrument:
             return [b""] if unit.asks else []
         if not 1 <= suffix <= command.channels:
             raise scpi.ScpiError(scpi.ErrorCode.HEADER_SUFFIX_OUT_OF_RANGE)
-        if unit.asks and command.ask is not None:
-            return [command.ask(self, suffix, unit.parameters)]
-        if command.write is not None:
-            command.write(self, suffix, unit.parameters)
-        return []
+        takes = command.query_takes if unit.asks else command.takes
+        if len(unit.parameters) < takes or not all(unit.parameters[:takes]):
+            raise scpi.ScpiError(scpi.ErrorCode.MISSING_PARAMETER)
+        if len(unit.parameters) > takes:
+            raise scpi.ScpiError(scpi.ErrorCode.PARAMETER_NOT_ALLOWED)
+        answer = act(self, suffix, *unit.parameters)
+        return [] if answer is None else [answer]
 
     def _find(self, header: str) -> tuple[Command | None, int]:
         """Return the command of a header, and its numeric suffix."""
@@ -314,27 +287,21 @@ class ScpiInstrument:
         return None, 1
 
 
-def _spoil(reply: bytes) -> bytes:
-    """Invert every second byte, from the first on, except the final newline."""
-    return (
-        bytes(byte if place % 2 else byte ^ scpi.BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]
-    )
-
-
-def _next_error(instrument: ScpiInstrument) -> bytes:
-    code = instrument.status.next_error()
-    return f'{int(code)},"{code.text}"'.encode("ascii")
-
-
 COMMON_COMMANDS = (
-    report("*IDN", "IEEE 488.2, 10.14", lambda instrument: instrument.identity()),
-    action("*RST", "IEEE 488.2, 10.32", lambda instrument: instrument.reset()),
-    action("*CLS", "IEEE 488.2, 10.3", lambda instrument: instrument.clear_status()),
-    action("*TRG", "IEEE 488.2, 10.37", lambda instrument: instrument.trigger()),
-    action("*WAI", "IEEE 488.2, 10.39", lambda _: None),
-    Command("*OPC", "IEEE 488.2, 10.18", lambda each, *_: each.status.operation_complete(), lambda *_: b"1"),
-    report("*ESR", "IEEE 488.2, 10.12", lambda instrument: b"%d" % int(instrument.status.take_events())),
-    report("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", _next_error),
+    Command("*IDN", "IEEE 488.2, 10.14", ask=lambda each, _: each.identity()),
+    Command("*RST", "IEEE 488.2, 10.32", lambda each, _: each.reset(), takes=0),
+    Command("*CLS", "IEEE 488.2, 10.3", lambda each, _: each.clear_status(), takes=0),
+    Command("*TRG", "IEEE 488.2, 10.37", lambda each, _: each.trigger(), takes=0),
+    Command("*WAI", "IEEE 488.2, 10.39", lambda *_: None, takes=0),
+    Command(
+        "*OPC",
+        "IEEE 488.2, 10.18",
+        lambda each, _: each.status.operation_complete(),
+        lambda *_: b"1",
+        takes=0,
+    ),
+    Command("*ESR", "IEEE 488.2, 10.12", ask=lambda each, _: b"%d" % each.status.take_events()),
+    Command("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", ask=lambda each, _: each.next_error()),
 )
 
 

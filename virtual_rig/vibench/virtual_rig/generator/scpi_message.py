@@ -419,17 +419,15 @@ class ArbitraryMemory:
         self._waveforms[name] = codes
 
 
-def memory_name(word: str) -> str | None:
-    """Return the canonical name of a memory; None for other words."""
-    upper = word.upper()
-    if upper in ("EMEM", "EMEMORY"):
+def memory_name(parameter: bytes) -> str:
+    """Return the canonical name of a memory; -224 for other words."""
+    word = text(parameter).upper()
+    if word in ("EMEM", "EMEMORY"):
         return EDIT_MEMORY
-    number = upper.removeprefix("USER")
-    if upper == "USER":
-        return "USER0"
-    if number != upper and number.isdigit() and int(number) < USER_MEMORIES:
+    number = word.removeprefix("USER") or "0"
+    if word.startswith("USER") and number.isdigit() and int(number) < USER_MEMORIES:
         return f"USER{int(number)}"
-    return None
+    raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
 
 
 def _blank(points: int) -> Codes:
