@@ -169,7 +169,7 @@ class AFG1022(ScpiInstrument):
     def jump_clock(self, by_s: float) -> None:
         """Shift the generator's clock, and thus the phase of its output [s]."""
         with self.lock:
-            self._output.jump_clock(by_s)
+            self._output.jump(by_s)
 
 
 # Special commands

@@ -5,15 +5,11 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from operator import attrgetter
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase
 from .scpi_message import ArbitraryMemory, ErrorCode, ScpiError, mnemonic_matches
 from .terminal_voltage import (
     OUTPUT_RESISTANCE_OHM,
     Burst,
-    Flat,
     PeriodicShape,
     Rectangle,
     Relay,
@@ -150,14 +146,14 @@ _PERCENT = 100.0
 
 
 def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShape | None:
-    """Return the selected shape; None for noise. An empty user memory is refused."""
+    """Return the selected shape; None for noise and DC. An empty user memory is refused."""
     duty = settings.duty_percent / _PERCENT
     computed: dict[str, PeriodicShape | None] = {
         SINE: Sine(),
         SQUARE: Rectangle(),
         PULSE: Rectangle(duty),
         RAMP: Triangle(),
-        DC: Flat(),
+        DC: None,
         NOISE: None,
     }
     if settings.shape in computed:
@@ -165,22 +161,14 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
     return Table(memory.codes(settings.shape), memory.top_code)
 
 
-class ChannelOutput:
+class ChannelOutput(Timeline):
     """Output that plays the settings; a change acts at its rig time."""
 
     def __init__(self, terminal: Terminal, memory: ArbitraryMemory, power_on: ChannelSettings) -> None:
         self.relay_is_stuck = False
         self._memory = memory
         carrier = SteadyPhase(round(power_on.frequency_hz * UHZ_PER_HZ), 0.0)
-        self._timeline = Timeline(terminal, Signal(course=carrier, amplitude_vpp=power_on.amplitude_vpp))
-
-    def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
-        """Return the mean terminal voltage over consecutive intervals, shape (count,) [V]."""
-        return self._timeline.render(start_s, interval_s, count)
-
-    def jump_clock(self, by_s: float) -> None:
-        """Shift the phase of the output as if ``by_s`` had passed."""
-        self._timeline.jump(by_s)
+        super().__init__(terminal, Signal(course=carrier, amplitude_vpp=power_on.amplitude_vpp))
 
     def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
         """Apply new settings at a rig time.
@@ -189,18 +177,18 @@ class ChannelOutput:
         continues. The built-in DC shape stays at zero for any offset (AFG1062, drivers).
         """
         at_s, own_s = self._when(now_s)
-        latest = self._timeline.latest
+        latest, is_flat = self.latest, settings.shape == DC
         waits = settings.mode is RunMode.BURST
         waiting = Burst(math.inf, math.inf, settings.phase_deg / _DEGREES) if waits else None
         signal = Signal(
             relay=Relay.CLOSED if self.relay_is_stuck else settings.relay,
             course=self._course_after(previous, settings, own_s),
             shape=shape_of(settings, self._memory) or latest.shape,
-            amplitude_vpp=settings.amplitude_vpp,
-            offset_v=0.0 if settings.shape == DC else settings.offset_v,
+            amplitude_vpp=0.0 if is_flat else settings.amplitude_vpp,
+            offset_v=0.0 if is_flat else settings.offset_v,
             burst=latest.burst if settings.mode is previous.mode else waiting,
         )
-        self._timeline.change(signal, at_s)
+        self.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
         """Start a waiting burst or sweep; without one, or during a burst, do nothing.
@@ -208,34 +196,34 @@ class ChannelOutput:
         A gated burst never starts, because nothing is connected to the gate input.
         """
         at_s, own_s = self._when(now_s)
-        latest = self._timeline.latest
+        latest = self.latest
         if settings.mode is RunMode.SWEEP:
             course = self._swept(settings, latest.course.phase(own_s), own_s, own_s)
-            self._timeline.change(replace(latest, course=course), at_s)
+            self.change(replace(latest, course=course), at_s)
             return
         is_waiting = latest.burst is not None and not latest.burst.begin_s <= own_s < latest.burst.end_s
         if settings.mode is RunMode.BURST and settings.burst_mode is BurstMode.TRIGGERED and is_waiting:
             start_phase = settings.phase_deg / _DEGREES
             burst = Burst(own_s, own_s + settings.burst_cycles / settings.frequency_hz, start_phase)
             course = self._course(settings, start_phase % 1.0, own_s)
-            self._timeline.change(replace(latest, course=course, burst=burst), at_s)
+            self.change(replace(latest, course=course, burst=burst), at_s)
 
     def align(self, settings: ChannelSettings, now_s: float) -> None:
         """Set the phase to the start phase now."""
         at_s, own_s = self._when(now_s)
         course = self._course(settings, settings.phase_deg / _DEGREES % 1.0, own_s)
-        self._timeline.change(replace(self._timeline.latest, course=course), at_s)
+        self.change(replace(self.latest, course=course), at_s)
 
     def _when(self, now_s: float) -> tuple[float, float]:
         """Return when a command acts, in rig time and in the generator's time."""
-        at_s = self._timeline.effective(now_s)
-        return at_s, self._timeline.own_time(at_s)
+        at_s = self.effective(now_s)
+        return at_s, self.own_time(at_s)
 
     def _course_after(
         self, previous: ChannelSettings, settings: ChannelSettings, own_s: float
     ) -> PhaseCourse:
         """Return the phase course; the same object if it is unchanged."""
-        running = self._timeline.latest.course
+        running = self.latest.course
         if _course_key(previous) == _course_key(settings):
             return running
         turn = (settings.phase_deg - previous.phase_deg) / _DEGREES

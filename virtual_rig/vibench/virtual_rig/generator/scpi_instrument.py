@@ -319,7 +319,7 @@ class ScpiDevice(Protocol):
         """Execute one complete message and return its reply."""
 
 
-class ScpiSocket:
+class ScpiSocket(socketserver.ThreadingTCPServer):
     """A server for this computer only, since SCPI has no password; a context manager.
 
     Parameters
@@ -330,64 +330,57 @@ class ScpiSocket:
         0 selects a free one; see ``port`` and ``resource_name``.
     """
 
+    daemon_threads = True  # a thread per client, which does not keep the process alive
+    allow_reuse_address = True
+    block_on_close = False
+
     def __init__(self, device: ScpiDevice, port: int = 0) -> None:
-        self._closing = threading.Event()
-        self._server = _server(device, (LOOPBACK, port), self._closing)
-        self.port = int(self._server.server_address[1])
+        super().__init__((LOOPBACK, port), _Session)
+        self.device = device
+        self.closing = threading.Event()
+        self.port = int(self.server_address[1])
         """The port of the server."""
         self.resource_name = f"TCPIP0::{LOOPBACK}::{self.port}::SOCKET"
         """The VISA address of the socket."""
-        self._thread = threading.Thread(target=self._server.serve_forever, name="scpi-socket", daemon=True)
+        self._thread = threading.Thread(target=self.serve_forever, name="scpi-socket", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """Stop the server; allowed at any time."""
-        self._closing.set()
-        self._server.shutdown()
-        self._server.server_close()
+        self.closing.set()
+        self.shutdown()
+        self.server_close()
         self._thread.join()
-
-    def __enter__(self) -> "ScpiSocket":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
 
-class _Server(socketserver.ThreadingTCPServer):
-    """One thread per client; the threads do not keep the process alive."""
+class _Session(socketserver.BaseRequestHandler):
+    """One client: collects bytes until a message is complete, and answers it."""
 
-    daemon_threads = True
-    allow_reuse_address = True
-    block_on_close = False
+    server: ScpiSocket
 
+    def handle(self) -> None:
+        """Serve until the client disconnects or exceeds the message length."""
+        pending = b""
+        while len(pending) < scpi.LONGEST_MESSAGE:  # disconnect a client that never ends its message
+            try:
+                received = self.request.recv(_RECEIVE_BYTES)
+            except ConnectionError:
+                return
+            if not received:
+                return
+            pending += received
+            while (end := scpi.message_end(pending)) is not None:
+                message, pending = pending[:end], pending[end:]
+                self._answer(message)
 
-def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Event) -> _Server:
-    class Session(socketserver.BaseRequestHandler):
-        """One client: collects bytes until a message is complete, and answers it."""
-
-        def handle(self) -> None:
-            """Serve until the client disconnects or exceeds the message length."""
-            pending = b""
-            while len(pending) < scpi.LONGEST_MESSAGE:  # disconnect a client that never ends its message
-                try:
-                    received = self.request.recv(_RECEIVE_BYTES)
-                except ConnectionError:
-                    return
-                if not received:
-                    return
-                pending += received
-                while (end := scpi.message_end(pending)) is not None:
-                    message, pending = pending[:end], pending[end:]
-                    self._answer(message)
-
-        def _answer(self, message: bytes) -> None:
-            reply = device.execute(message)
-            if reply.delay_s and closing.wait(reply.delay_s):
-                return  # the server closed during the delay
-            if reply.data:
-                # A disconnected client needs no reply.
-                with suppress(ConnectionError):
-                    self.request.sendall(reply.data)
-
-    return _Server(address, Session)
+    def _answer(self, message: bytes) -> None:
+        reply = self.server.device.execute(message)
+        if reply.delay_s and self.server.closing.wait(reply.delay_s):
+            return  # the server closed during the delay
+        if reply.data:
+            # A disconnected client needs no reply.
+            with suppress(ConnectionError):
+                self.request.sendall(reply.data)

@@ -5,7 +5,6 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from decimal import Decimal
 from enum import IntEnum
 
 import numpy as np
@@ -327,13 +326,9 @@ def boolean(parameter: bytes) -> bool:
 
 def block(parameter: bytes) -> bytes:
     """Return the data of a binary block of definite length (IEEE 488.2-1992, 7.7.6)."""
-    if not parameter.startswith(b"#") or not parameter[1:2].isdigit():
+    if not parameter.startswith(b"#") or block_length(parameter, 0) != len(parameter):
         raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
-    digits = int(parameter[1:2])
-    number = parameter[2 : 2 + digits]
-    if not number.isdigit() or len(parameter) != 2 + digits + int(number):
-        raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
-    return parameter[2 + digits :]
+    return parameter[2 + int(parameter[1:2]) :]
 
 
 def as_block(data: bytes) -> bytes:
@@ -344,12 +339,9 @@ def as_block(data: bytes) -> bytes:
 
 def as_number(value: float) -> bytes:
     """Return a number in the instrument's format: ``1.5E+03``, ``9.9E+37``, ``0.0E+00``."""
-    sign, digits, exponent = Decimal(repr(float(f"{value:.12g}"))).normalize().as_tuple()
-    if not isinstance(exponent, int) or not any(digits):
-        return b"0.0E+00"
-    mantissa = "".join(map(str, digits))
-    power = exponent + len(mantissa) - 1
-    return f"{'-' if sign else ''}{mantissa[0]}.{mantissa[1:] or '0'}E{power:+03d}".encode("ascii")
+    mantissa, exponent = f"{value + 0.0:.11E}".split("E")  # -0.0 + 0.0 is 0.0
+    whole, _, decimals = mantissa.partition(".")
+    return f"{whole}.{decimals.rstrip('0') or '0'}E{int(exponent):+03d}".encode("ascii")
 
 
 Codes = NDArray[np.uint16]

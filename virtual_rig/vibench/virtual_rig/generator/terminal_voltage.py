@@ -36,15 +36,6 @@ class Sine:
 
 
 @dataclass(frozen=True)
-class Flat:
-    """Zero at every phase: the built-in DC shape, whose level is only the offset."""
-
-    def mean(self, start: Samples, span: Samples) -> Samples:  # noqa: ARG002 - every mean is zero
-        """Return zeros."""
-        return np.zeros_like(start)
-
-
-@dataclass(frozen=True)
 class Rectangle:
     """1 for the first ``duty`` of the cycle, then -1."""
 
