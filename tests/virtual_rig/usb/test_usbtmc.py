@@ -81,16 +81,6 @@ def test_a_transfer_larger_than_the_hosts_buffer_continues_in_the_next_read(buff
     assert transfer[12 : 12 + len(identity)] == identity
 
 
-def test_a_termination_character_ends_a_transfer_early():
-    host = Host()
-    host.write(b"*OPC?;*OPC?")
-    host.tag += 1
-    host.device.bulk_out(struct.pack("<BBBBIBB2x", 2, host.tag, ~host.tag & 255, 0, 100, 2, ord(";")))
-    transfer = host.device.bulk_in(100, TIMEOUT_MS)
-    assert transfer[12:14] == b"1;"
-    assert host.read() == (b"1\n", True)
-
-
 def test_a_new_message_discards_an_unread_reply_and_queues_an_error():
     host = Host()
     host.write(b"*IDN?")

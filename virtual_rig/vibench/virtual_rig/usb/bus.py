@@ -12,13 +12,14 @@ USB devices; only a new process sees the machine's devices again.
 import errno
 import importlib
 import itertools
+import json
 import os
 import struct
 import sys
 import threading
 from array import array
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from types import SimpleNamespace
 
 import grpc
@@ -45,8 +46,6 @@ _NEVER_MS = 2**32 - 1
 _ERRNO = struct.Struct(">i")
 _READ = struct.Struct(">II")
 _SETUP = struct.Struct(">BBHHH")
-_IDENTIFICATION = struct.Struct(">HHI")
-_TEXT_SEPARATOR = "\0"
 
 _Method = Callable[[bytes], bytes]
 
@@ -55,9 +54,7 @@ def usb_service(device: UsbTmcInstrument) -> grpc.GenericRpcHandler:
     """Return the handler that serves one device on a ``grpc.Server``."""
 
     def identify(_: bytes) -> bytes:
-        found = device.identification
-        texts = _TEXT_SEPARATOR.join((found.maker, found.product, found.serial)).encode()
-        return _IDENTIFICATION.pack(found.vendor_id, found.product_id, found.packet_bytes) + texts
+        return json.dumps(astuple(device.identification)).encode()
 
     def bulk_out(request: bytes) -> bytes:
         device.bulk_out(request)
@@ -104,7 +101,6 @@ class RemoteUsbDevice:
     def __init__(self, address: str) -> None:
         self._channel = grpc.insecure_channel(address)
         self._metadata = ((TOKEN_KEY, given_token()),)
-        self._methods: dict[str, grpc.UnaryUnaryMultiCallable] = {}
         try:
             answer = self._method("Identify")(b"", timeout=CONNECT_TIMEOUT_S, metadata=self._metadata)
         except grpc.RpcError as error:
@@ -114,10 +110,7 @@ class RemoteUsbDevice:
                 "start it with 'vibench serve-rig', or give the address it prints."
             )
             raise InstrumentLost(message) from error
-        body = answer[_ERRNO.size :]
-        vendor_id, product_id, packet_bytes = _IDENTIFICATION.unpack_from(body)
-        maker, product, serial = body[_IDENTIFICATION.size :].decode().split(_TEXT_SEPARATOR)
-        self.identification = Identification(vendor_id, product_id, maker, product, serial, packet_bytes)
+        self.identification = Identification(*json.loads(answer[_ERRNO.size :]))
         """The device's descriptors at the time of the connection."""
 
     def bulk_out(self, data: bytes) -> None:
@@ -138,9 +131,7 @@ class RemoteUsbDevice:
         self._channel.close()
 
     def _method(self, name: str) -> grpc.UnaryUnaryMultiCallable:
-        if name not in self._methods:
-            self._methods[name] = self._channel.unary_unary(f"/{SERVICE}/{name}")
-        return self._methods[name]
+        return self._channel.unary_unary(f"/{SERVICE}/{name}")
 
     def _call(self, name: str, request: bytes, timeout_ms: int = 0) -> bytes:
         """Call a method; a lost server or connection counts as a disconnected device."""
@@ -362,11 +353,12 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
 def _standard_reply(device: UsbDevice, setup: Setup) -> bytes:
     """Answer GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); stall other requests, which PyUSB does not use."""
     kind, index = divmod(setup.value, 256)
-    if setup.request == _GET_DESCRIPTOR and kind == usb.util.DESC_TYPE_STRING:
-        descriptor = string_descriptor(device.identification, index)
-        if descriptor is not None:
-            return descriptor[: setup.length]
-    raise usb.core.USBError("Pipe error", errno=errno.EPIPE)
+    found = device.identification
+    texts = {_MAKER: found.maker, _PRODUCT: found.product, _SERIAL: found.serial}
+    bodies = {0: _ENGLISH} | {number: text.encode("utf-16-le") for number, text in texts.items()}
+    if setup.request != _GET_DESCRIPTOR or kind != usb.util.DESC_TYPE_STRING or index not in bodies:
+        raise usb.core.USBError("Pipe error", errno=errno.EPIPE)
+    return (bytes([len(bodies[index]) + 2, kind]) + bodies[index])[: setup.length]
 
 
 def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
@@ -394,21 +386,16 @@ class _usb_errors:  # noqa: N801 - reads as a verb where it is used
 _BUS = UsbBus()
 
 
-def install() -> None:
-    """Make PyUSB, and thus pyvisa-py, use the virtual bus in this process.
+def plug_in(device: UsbDevice) -> None:
+    """Connect a device to the virtual bus, which PyUSB, and thus pyvisa-py, uses from then on.
 
     Without libusb, pyvisa-py registers no USB sessions at its first import; in that case they are registered
-    now. May be called repeatedly; ``plug_in`` calls it.
+    now.
     """
+    _BUS.plug_in(device)
     usb.backend.libusb1.get_backend = lambda find_library=None: _BUS  # noqa: ARG005 - PyUSB's signature
     if "pyvisa_py" in sys.modules and "pyvisa_py.usb" not in sys.modules:
         importlib.import_module("pyvisa_py.usb")
-
-
-def plug_in(device: UsbDevice) -> None:
-    """Connect a device to the virtual bus, so that pyvisa lists and opens it."""
-    _BUS.plug_in(device)
-    install()
 
 
 def unplug(device: UsbDevice) -> None:
@@ -433,25 +420,9 @@ def plug_in_remote(address: str) -> RemoteUsbDevice:
 
 _TMC_CLASS, _TMC_SUBCLASS, _USB488_PROTOCOL = 0xFE, 3, 1
 _MAKER, _PRODUCT, _SERIAL = 1, 2, 3
-_ENGLISH = 0x0409
+_ENGLISH = (0x0409).to_bytes(2, "little")
 _HIGH_SPEED = 3
 _CONTROL_PACKET_BYTES = 64
 _DEVICE_BYTES, _CONFIGURATION_BYTES, _INTERFACE_BYTES, _ENDPOINT_BYTES = 18, 9, 9, 7
 _SELF_POWERED = 0xC0
 _ENDPOINTS = (BULK_OUT, BULK_IN)
-
-
-def string_descriptor(identification: Identification, index: int) -> bytes | None:
-    """Return a string descriptor (table 9-16), or None for an unknown number."""
-    texts = {
-        _MAKER: identification.maker,
-        _PRODUCT: identification.product,
-        _SERIAL: identification.serial,
-    }
-    if index == 0:
-        body = _ENGLISH.to_bytes(2, "little")
-    elif index in texts:
-        body = texts[index].encode("utf-16-le")
-    else:
-        return None
-    return bytes([len(body) + 2, usb.util.DESC_TYPE_STRING]) + body

@@ -10,7 +10,7 @@ import struct
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from typing import NoReturn
 
 from ..generator.afg1022 import AFG1022
@@ -58,7 +58,7 @@ VENDOR_ID = 0x0699
 PRODUCT_ID = 0x0353
 """USB product number, the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
-"""Message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
+"""Message id, tag, inverted tag, length, attributes, unused termination character (table 1 to 4)."""
 ALIGNMENT = 4
 NEVER_MS = 2**32 - 1
 
@@ -70,32 +70,25 @@ class MessageId(IntEnum):
     REQUEST_IN = 2
 
 
-class Attributes(IntFlag):
-    """Attributes of a bulk header (tables 3, 4 and 9)."""
-
-    END_OF_MESSAGE = 1
-    TERMINATION_CHARACTER = 2
-
-
+END_OF_MESSAGE = 1
+"""Attribute of a bulk header (tables 3 and 9)."""
 SUCCESS = 1
 TRANSFER_NOT_IN_PROGRESS = 0x81
 """Values of the first byte of the response to a class request (table 16)."""
 
-_CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 1, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
-"""Reply to GET_CAPABILITIES: USBTMC 1.0 with termination character, USB488 1.0 with 488.2, reserved bytes."""
+_CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 0, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
+"""Reply to GET_CAPABILITIES: USBTMC 1.0 without options, USB488 1.0 with 488.2, reserved bytes."""
 
 
 @dataclass(frozen=True)
 class _Request:
     tag: int
     length: int
-    terminator: bytes
-    """Empty, or the character that ends the transfer."""
 
 
 @dataclass
 class _Flight:
-    """Pending data between host and instrument; a device clear replaces it."""
+    """Pending data between host and instrument, lost when the cable or the instrument was out of order."""
 
     message: bytes = b""
     """Received parts of an incomplete message."""
@@ -150,15 +143,14 @@ class UsbTmcInstrument:
             self._check_cable()
             if len(data) < HEADER.size:
                 _stall()
-            message_id, tag, inverse, length, attributes, terminator = HEADER.unpack_from(data)
+            message_id, tag, inverse, length, attributes, _ = HEADER.unpack_from(data)
             if tag == 0 or tag ^ inverse != BYTE:
                 _stall()
             if message_id == MessageId.OUT:
                 payload = data[HEADER.size : HEADER.size + length]
-                self._take(payload, Attributes(attributes & Attributes.END_OF_MESSAGE))
+                self._take(payload, attributes)
             elif message_id == MessageId.REQUEST_IN:
-                stops = bool(attributes & Attributes.TERMINATION_CHARACTER)
-                self._flight.request = _Request(tag, length, bytes([terminator]) if stops else b"")
+                self._flight.request = _Request(tag, length)
             else:
                 _stall()
 
@@ -198,12 +190,12 @@ class UsbTmcInstrument:
 
     # Internal functions
 
-    def _take(self, payload: bytes, attributes: Attributes) -> None:
+    def _take(self, payload: bytes, attributes: int) -> None:
         self._flight.message += payload
         if len(self._flight.message) > LONGEST_MESSAGE:
             self._flight.message = b""
             _stall()
-        if Attributes.END_OF_MESSAGE in attributes:
+        if attributes & END_OF_MESSAGE:
             message, self._flight.message = self._flight.message, b""
             # Execute a message; an unread earlier reply is lost, with -410 (IEEE 488.2, 6.3.2.3).
             if self._flight.reply or self._flight.rest:
@@ -215,12 +207,9 @@ class UsbTmcInstrument:
 
     def _transfer(self, request: _Request) -> bytes:
         """Return a transfer with the requested part of the reply; the last part has the end bit."""
-        end = min(request.length, len(self._flight.reply))
-        if request.terminator:
-            found = self._flight.reply.find(request.terminator, 0, end)
-            end = found + 1 if found >= 0 else end
-        payload, self._flight.reply = self._flight.reply[:end], self._flight.reply[end:]
-        attributes = Attributes(0) if self._flight.reply else Attributes.END_OF_MESSAGE
+        reply, end = self._flight.reply, request.length
+        payload, self._flight.reply = reply[:end], reply[end:]
+        attributes = 0 if self._flight.reply else END_OF_MESSAGE
         padding = bytes(-len(payload) % ALIGNMENT)
         header = HEADER.pack(
             MessageId.REQUEST_IN, request.tag, request.tag ^ BYTE, len(payload), attributes, 0
