@@ -10,12 +10,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
+from inspect import signature
+from operator import or_
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from nidaqmx.error_codes import DAQmxErrors
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, create_model
 
 from vibench.acquisition import load_toml, named
 from vibench.acquisition.recording import DiskTrouble
@@ -51,7 +53,7 @@ def nothing_to_heal() -> None:
 class RigFaults:
     """Faults of a running virtual rig: each method starts a fault and returns a function to end it.
 
-    The methods have the names and parameters of scripted faults. Thread-safe.
+    A scripted fault has the name and parameters of its method. Thread-safe.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class RigFaults:
         for fault in script.faults:
             self._world.at(fault.at_s, partial(self._start, fault))
 
-    def _start(self, fault: "FaultKind") -> None:
+    def _start(self, fault: "ScriptedFault") -> None:
         heal = fault.begin(self)
         self.played.append(PlayedFault(fault.fault, self._world.time_s))
         if fault.for_s is not None:
@@ -97,11 +99,11 @@ class RigFaults:
         return self._until(self._cable.wake)
 
     def jump_clock(self, by_s: float) -> Heal:
-        """Shift the generator's clock [s], and thus the phase of its output."""
+        """Shift the generator's clock, forwards if positive [s], and thus the phase of its output."""
         self._generator.jump_clock(by_s)
         return nothing_to_heal
 
-    def delay_reply(self, delay_s: float) -> Heal:
+    def delay_reply(self, delay_s: PositiveFloat) -> Heal:
         """Delay the generator's next reply."""
         self._generator.delay_next_reply(delay_s)
         return nothing_to_heal
@@ -116,22 +118,22 @@ class RigFaults:
         self._generator.stick_output_relay(is_stuck=True)
         return self._until(lambda: self._generator.stick_output_relay(is_stuck=False))
 
-    def turn_amplifier_gain(self, gain_db: float) -> Heal:
+    def turn_amplifier_gain(self, gain_db: Annotated[float, Field(ge=-60, le=60)]) -> Heal:
         """Set the amplifier's gain to a value other than the configured one."""
         self._world.set_amplifier_gain_db(gain_db)
         return self._until(self._world.restore_amplifier_gain)
 
-    def widen_gaps(self, by_m: float) -> Heal:
+    def widen_gaps(self, by_m: Annotated[float, Field(ge=-1e-4, le=1e-3)]) -> Heal:
         """Move the specimen's stops away from m1, or closer [m], as by a loose screw or wear."""
         self._world.widen_gaps(by_m)
         return self._until(lambda: self._world.widen_gaps(0.0))
 
-    def drop_laser(self, for_s: float) -> Heal:
+    def drop_laser(self, for_s: PositiveFloat) -> Heal:
         """Set the output of the m0 sensor to zero for a while, like a vibrometer without light."""
         self._world.disturb_response(for_s, DROPOUT_LEVEL)
         return nothing_to_heal
 
-    def over_range(self, for_s: float) -> Heal:
+    def over_range(self, for_s: PositiveFloat) -> Heal:
         """Hold the sensor of m0 at full scale for a while."""
         self._world.disturb_response(for_s, OVER_RANGE_LEVEL)
         return nothing_to_heal
@@ -168,11 +170,11 @@ class RigFaults:
         """Stop the DAQ server from answering."""
         return self._in_force(ServerGone())
 
-    def fill_disk(self, refusals: int | None = None) -> Heal:
+    def fill_disk(self, refusals: PositiveInt | None = None) -> Heal:
         """Make writes of recordings fail as on a full disk, ``refusals`` times or until the fault ends."""
         return self._until(self._disk.fill() if refusals is None else self._disk.fill(refusals))
 
-    def slow_disk(self, delay_s: float) -> Heal:
+    def slow_disk(self, delay_s: PositiveFloat) -> Heal:
         """Delay every write of recordings of this process, in wall-clock time [s]."""
         return self._until(self._disk.slow_down(delay_s))
 
@@ -188,7 +190,7 @@ class RigFaults:
 
 
 class ScriptedFault(FrozenModel):
-    """Start and duration of a fault; a subclass has the parameters of the method that its ``fault`` names."""
+    """Start and duration of a fault, and the parameters of the method of `RigFaults` that ``fault`` names."""
 
     at_s: NonNegativeFloat
     """Rig time since switch-on [s]."""
@@ -198,110 +200,51 @@ class ScriptedFault(FrozenModel):
 
     def begin(self, rig: RigFaults) -> Heal:
         """Start the fault; return the function that ends it."""
-        parameters = {name: getattr(self, name) for name in type(self).__annotations__ if name != "fault"}
-        heal: Heal = getattr(rig, self.fault)(**parameters)
+        start = getattr(rig, self.fault)
+        heal: Heal = start(**{name: getattr(self, name) for name in signature(start).parameters})
         return heal
 
 
-class SimpleFault(ScriptedFault):
-    """A fault without parameters."""
-
-    fault: Literal[
-        "pull_usb_cable",
-        "hang_generator",
-        "stick_output",
-        "corrupt_reply",
-        "overrun",
-        "reserve_device",
-        "lose_daq_server",
-    ]
-
-
-class DelayReply(ScriptedFault):
-    """One reply of the generator comes late."""
-
-    fault: Literal["delay_reply"]
-    delay_s: PositiveFloat
-
-
-class JumpClock(ScriptedFault):
-    """The generator's clock jumps, and with it the phase of its output."""
-
-    fault: Literal["jump_clock"]
-    by_s: float
-    """Positive: forwards [s]."""
-
-
-class Disturbed(ScriptedFault):
-    """The sensor of m0 shows nothing, like a vibrometer without light, or stays at full scale."""
-
-    fault: Literal["drop_laser", "over_range"]
-    for_s: PositiveFloat
-
-
-class TurnGain(ScriptedFault):
-    """The amplifier's gain is changed."""
-
-    fault: Literal["turn_amplifier_gain"]
-    gain_db: float = Field(ge=-60, le=60)
-
-
-class WidenGaps(ScriptedFault):
-    """Both stops of the specimen move away from m1, or towards it."""
-
-    fault: Literal["widen_gaps"]
-    by_m: float = Field(ge=-1e-4, le=1e-3)
-    """Change of the configured gaps [m]."""
-
-
-class Disconnect(ScriptedFault):
-    """An input of the converter is disconnected."""
-
-    fault: Literal["disconnect"]
-    channel: str
-    """Name of the input, such as ``"cDAQ1Mod1/ai2"``."""
-
-
-class FailDaq(ScriptedFault):
-    """A call of the DAQmx driver fails with a code."""
-
-    fault: Literal["fail_daq"]
-    call: str
-    code: int
-
-
-class FillDisk(ScriptedFault):
-    """The disk of the recording program is full."""
-
-    fault: Literal["fill_disk"]
-    refusals: PositiveInt | None = None
-    """Number of failing writes; absent: until the fault ends."""
-
-
-class SlowDisk(ScriptedFault):
-    """Every write to the disk is slow."""
-
-    fault: Literal["slow_disk"]
-    delay_s: PositiveFloat
-    """Delay in wall-clock time, as for any disk [s]."""
+def _scripted(fault: Callable[..., Heal]) -> type[ScriptedFault]:
+    """Return the model of a fault in a script; the parameters of the fault's method are its keys."""
+    keys = {
+        name: (each.annotation, ... if each.default is each.empty else each.default)
+        for name, each in signature(fault).parameters.items()
+        if name != "self"
+    }
+    name = fault.__name__
+    model: type[ScriptedFault] = create_model(  # type: ignore[call-overload]
+        name, __base__=ScriptedFault, __doc__=fault.__doc__, fault=(Literal[name], ...), **keys
+    )
+    return model
 
 
 DISK_FAULTS = frozenset({"fill_disk", "slow_disk"})
 """Faults of the recording program, not of the rig."""
 
-FaultKind = Annotated[
-    SimpleFault
-    | DelayReply
-    | JumpClock
-    | Disturbed
-    | TurnGain
-    | WidenGaps
-    | Disconnect
-    | FailDaq
-    | FillDisk
-    | SlowDisk,
-    Field(discriminator="fault"),
-]
+_SCRIPTED = (
+    RigFaults.pull_usb_cable,
+    RigFaults.hang_generator,
+    RigFaults.stick_output,
+    RigFaults.delay_reply,
+    RigFaults.corrupt_reply,
+    RigFaults.jump_clock,
+    RigFaults.turn_amplifier_gain,
+    RigFaults.widen_gaps,
+    RigFaults.drop_laser,
+    RigFaults.over_range,
+    RigFaults.disconnect,
+    RigFaults.overrun,
+    RigFaults.reserve_device,
+    RigFaults.fail_daq,
+    RigFaults.lose_daq_server,
+    RigFaults.fill_disk,
+    RigFaults.slow_disk,
+)
+if TYPE_CHECKING:
+    FaultKind = ScriptedFault
+else:
+    FaultKind = Annotated[reduce(or_, map(_scripted, _SCRIPTED)), Field(discriminator="fault")]
 
 
 class FaultScript(FrozenModel):
