@@ -10,8 +10,8 @@ from nidaqmx.system import System
 
 from tests.virtual_rig.conftest import refused
 from vibench.acquisition import ConfigurationError
-from vibench.virtual_rig.daqmx.channels import channel_names, expand
-from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with
+from vibench.virtual_rig.daqmx.channels import channel_names
+from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with, expand
 
 
 @pytest.fixture

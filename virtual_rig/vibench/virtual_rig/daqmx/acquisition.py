@@ -3,13 +3,9 @@
 import math
 from dataclasses import dataclass
 from enum import Enum, auto
-from pathlib import Path
 
 import numpy as np
-from nidaqmx.constants import (
-    AcquisitionType,
-    SampleTimingType,
-)
+from nidaqmx.constants import AcquisitionType, SampleTimingType
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
@@ -71,14 +67,6 @@ class Overflow(Enum):
     """The oldest samples are overwritten, as on the real device."""
 
 
-@dataclass(frozen=True)
-class LogSettings:
-    """The TDMS log file of a task."""
-
-    path: Path
-    group: str
-
-
 def check_memory(samples: int, channels: int) -> None:
     """Refuse more samples than the simulated computer has memory for (-50352)."""
     if samples * channels > MOST_SAMPLES:
@@ -106,6 +94,10 @@ class Stream:
     def is_done(self) -> bool:
         """Whether all samples are transferred, or never will be."""
         return self.transferred >= self.total or self.failure is not None
+
+    def reaches(self, count: int) -> bool:
+        """Return whether ``count`` samples are transferred."""
+        return self.transferred >= count
 
     def time_of(self, count: float) -> float:
         """Return the rig time at which ``count`` samples are transferred [s]; infinite for more than all."""

@@ -4,9 +4,10 @@ Names are as in NI's protocol file (`nidaqmx.proto`); the NI-DAQmx help describe
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property, partial
 from typing import Any
 
 from nidaqmx._stubs import nidaqmx_pb2
@@ -23,7 +24,7 @@ from nidaqmx.error_codes import DAQmxErrors
 
 from ..world.wiring import Coupling
 from .acquisition import Acquisition, check_memory
-from .calls import DaqmxSystem
+from .calls import DaqmxSystem, Fields
 from .channels import OutputChannel
 from .data_calls import count_available, default_samples, newest
 from .devices import AnalogInputs, Device
@@ -52,11 +53,32 @@ class Group:
 
     name: str
     """Prefix of the property names in the protocol."""
-    subjects: Callable[[DaqmxSystem, Any], Sequence[Any]]
+    subjects: Callable[[DaqmxSystem, Any], list[Any]]
     """Function that returns the objects of a request; a query reads the first, setting applies to all."""
     attributes: Callable[[Any], Attributes]
     is_set_at_rest: bool = False
     """Whether these properties cannot be set while the task runs."""
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """Names of the properties by their numbers in the protocol."""
+        return {
+            value.number: value.name.rpartition("_ATTRIBUTE_")[2]
+            for name, numbers in nidaqmx_pb2.DESCRIPTOR.enum_types_by_name.items()
+            if name.startswith(self.name)
+            and name.endswith("Attribute")
+            and not name.endswith("ResetAttribute")
+            for value in numbers.values
+        }
+
+    def find(self, subject: Any, request: Any) -> tuple[str, Attribute]:
+        """Return name and property of the number in a request (-200197 if the subject does not have it)."""
+        number = int(request.attribute_raw or request.attribute)
+        name = self.names.get(number, f"0x{number:X}")
+        attributes = self.attributes(subject)
+        if name not in attributes:
+            raise not_supported(f"{self.name}.{name}", "The simulated driver does not have it.")
+        return f"{self.name}.{name}", attributes[name]
 
 
 # Functions that read and write properties
@@ -154,7 +176,7 @@ def _channel_names(task: Task) -> str:
 
 # fmt: off
 SYSTEM: Attributes = {
-    "DEV_NAMES": Attribute(lambda system: ", ".join(each.name for each in system.catalogue.devices)),
+    "DEV_NAMES": Attribute(lambda system: ", ".join(each.name for each in system.rig.catalogue.devices)),
     "NIDAQ_MAJOR_VERSION": Attribute(lambda _: DRIVER_VERSION[0]),
     "NIDAQ_MINOR_VERSION": Attribute(lambda _: DRIVER_VERSION[1]),
     "NIDAQ_UPDATE_VERSION": Attribute(lambda _: DRIVER_VERSION[2]),
@@ -223,13 +245,13 @@ OUTPUT: Attributes = {
     "CHAN_TYPE": Attribute(lambda _: ChannelType.ANALOG_OUTPUT),
     "AO_MAX": Attribute(lambda channel: channel.maximum, _field("maximum")),
     "AO_MIN": Attribute(lambda channel: channel.minimum, _field("minimum")),
-    "AO_IDLE_OUTPUT_BEHAVIOR": Attribute(lambda channel: channel.outputs.idle,
-        _require("AO_IdleOutputBehavior", lambda channel: channel.outputs.idle)),
+    "AO_IDLE_OUTPUT_BEHAVIOR": Attribute(lambda channel: channel.side.idle,
+        _require("AO_IdleOutputBehavior", lambda channel: channel.side.idle)),
 }
 # fmt: on
 
 
-def _task(system: DaqmxSystem, request: Any) -> list[Task]:
+def _task(system: DaqmxSystem, request: Any) -> list[Any]:
     return [system.task(request.task.name)]
 
 
@@ -241,7 +263,9 @@ def _channels(system: DaqmxSystem, request: Any) -> list[Any]:
 
 GROUPS = {
     "SystemInfo": Group("System", lambda system, _: [system], lambda _: SYSTEM),
-    "Device": Group("Device", lambda system, request: [system.device(request.device_name)], lambda _: DEVICE),
+    "Device": Group(
+        "Device", lambda system, request: [system.rig.catalogue.device(request.device_name)], lambda _: DEVICE
+    ),
     "Task": Group("Task", _task, lambda _: TASK),
     "Timing": Group("Timing", _task, lambda _: TIMING, is_set_at_rest=True),
     "Trig": Group("Trigger", _task, lambda _: TRIGGER, is_set_at_rest=True),
@@ -264,64 +288,34 @@ SERVICE = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
 _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")
 
 
-def attribute_calls(system: DaqmxSystem) -> dict[str, Callable[[Any], Mapping[str, object]]]:
+def attribute_calls(system: DaqmxSystem) -> dict[str, Callable[[Any], Fields]]:
     """Return the calls that get and set properties of these groups, by their names in the protocol."""
-    made: dict[str, Callable[[Any], Mapping[str, object]]] = {}
+    calls: dict[str, Callable[[Any], Fields]] = {}
     for method in SERVICE.methods:
         found = _CALL.match(method.name)
         if found and found["scope"] in GROUPS:
             group = GROUPS[found["scope"]]
-            is_read = found["verb"] == "Get"
-            made[method.name] = (
-                _getter(system, group, method.output_type) if is_read else _setter(system, group)
-            )
-    return made
+            if found["verb"] == "Set":
+                calls[method.name] = partial(_set, system, group)
+            else:
+                has_raw = "value_raw" in method.output_type.fields_by_name
+                calls[method.name] = partial(_get, system, group, "value_raw" if has_raw else "value")
+    return calls
 
 
-def _getter(system: DaqmxSystem, group: Group, response: Any) -> Callable[[Any], Mapping[str, object]]:
-    find = _finder(group)
-    field = "value_raw" if "value_raw" in response.fields_by_name else "value"
-
-    def get(request: Any) -> Mapping[str, object]:
-        subject = group.subjects(system, request)[0]
-        value = find(subject, request)[1].get(subject)
-        return {field: value.value if isinstance(value, Enum) else value}
-
-    return get
+def _get(system: DaqmxSystem, group: Group, field: str, request: Any) -> Fields:
+    subject = group.subjects(system, request)[0]
+    value = group.find(subject, request)[1].get(subject)
+    return {field: value.value if isinstance(value, Enum) else value}
 
 
-def _setter(system: DaqmxSystem, group: Group) -> Callable[[Any], Mapping[str, object]]:
-    find = _finder(group)
-
-    def write(request: Any) -> Mapping[str, object]:
-        if group.is_set_at_rest:
-            system.task(request.task.name).require_stopped()
-        for subject in group.subjects(system, request):
-            name, attribute = find(subject, request)
-            if attribute.set is None:
-                raise not_supported(name, "It can only be read.")
-            has_raw = "value_raw" in request.DESCRIPTOR.fields_by_name
-            attribute.set(subject, (has_raw and request.value_raw) or request.value)
-        return {}
-
-    return write
-
-
-def _finder(group: Group) -> Callable[[Any, Any], tuple[str, Attribute]]:
-    """Return a function that finds a property by its number in a request (-200197 if it is missing)."""
-    names = {
-        value.number: value.name.rpartition("_ATTRIBUTE_")[2]
-        for name, descriptor in nidaqmx_pb2.DESCRIPTOR.enum_types_by_name.items()
-        if name.startswith(group.name) and name.endswith("Attribute") and not name.endswith("ResetAttribute")
-        for value in descriptor.values
-    }
-
-    def find(subject: Any, request: Any) -> tuple[str, Attribute]:
-        number = int(request.attribute_raw or request.attribute)
-        name = names.get(number, f"0x{number:X}")
-        attributes = group.attributes(subject)
-        if name not in attributes:
-            raise not_supported(f"{group.name}.{name}", "The simulated driver does not have it.")
-        return f"{group.name}.{name}", attributes[name]
-
-    return find
+def _set(system: DaqmxSystem, group: Group, request: Any) -> Fields:
+    if group.is_set_at_rest:
+        system.task(request.task.name).require_stopped()
+    for subject in group.subjects(system, request):
+        name, attribute = group.find(subject, request)
+        if attribute.set is None:
+            raise not_supported(name, "It can only be read.")
+        has_raw = "value_raw" in request.DESCRIPTOR.fields_by_name
+        attribute.set(subject, (has_raw and request.value_raw) or request.value)
+    return {}

@@ -1,4 +1,4 @@
-"""Table of the calls on tasks, channels, clocks, triggers and devices.
+"""Table of the calls on tasks, channels, clocks and triggers.
 
 Names are as in NI's protocol file (`nidaqmx.proto`); with the prefix ``DAQmx``, the NI-DAQmx C reference
 describes them.
@@ -6,7 +6,7 @@ describes them.
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +26,12 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .acquisition import Acquisition, LogSettings, Overflow, ReferenceTrigger, Stream
-from .channels import InputChannel, OutputChannel, channel_names, expand
+from .acquisition import Acquisition, Overflow, ReferenceTrigger, Stream
+from .channels import InputChannel, OutputChannel, channel_names
 from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
 from .rig import QUESTION_S, Rig
-from .tasks import Task
+from .tasks import Task, TdmsLog
 
 
 class DaqmxSystem:
@@ -39,11 +39,8 @@ class DaqmxSystem:
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
-        self.catalogue = rig.catalogue
         self.tasks: dict[str, Task] = {}
         self._unnamed = 0
-
-    # --- tasks ---------------------------------------------------------------------------
 
     def create_task(self, name: str) -> Task:
         """Create a task; an empty name selects an unused one (-200089 for a name in use)."""
@@ -73,58 +70,11 @@ class DaqmxSystem:
         for name in tuple(self.tasks):
             self.clear_task(name)
 
-    # --- devices -------------------------------------------------------------------------
-
-    def device(self, name: str) -> Device:
-        """Return a device by its name or the name of one of its channels (-200220 if there is none)."""
-        device = self.catalogue.find(name.strip("/").partition("/")[0])
-        if device is None:
-            known = ", ".join(known.name for known in self.catalogue.devices)
-            raise DaqmxRefusal(DAQmxErrors.INVALID_DEVICE_ID, f"Device Specified: {name}\nDevices: {known}")
-        return device
-
-    def inputs(self, names: str) -> tuple[str, ...]:
-        """Return the physical inputs in a list of names and ranges."""
-        return self._of_side(names, lambda device: device.input_names)
-
-    def outputs(self, names: str) -> tuple[str, ...]:
-        """Return the physical outputs in a list of names and ranges."""
-        return self._of_side(names, lambda device: device.output_names)
-
-    def _of_side(self, names: str, side: Callable[[Device], tuple[str, ...]]) -> tuple[str, ...]:
-        """Return channel names as their devices spell them (-200220, -200170, -200096 if unknown)."""
-        found = []
-        for name in _with_devices(expand(names)):
-            device = self.device(name)
-            known = {each.lower(): each for each in (*device.input_names, *device.output_names)}
-            if name.lower() not in known:
-                detail = f"Physical Channel: {name}\nPhysical Channels: {', '.join(known.values()) or 'none'}"
-                raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, detail)
-            if known[name.lower()] not in side(device):
-                raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {name}")
-            found.append(known[name.lower()])
-        if not found:
-            raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, "No physical channel was given.")
-        return tuple(found)
-
-
-def _with_devices(names: Iterable[str]) -> Iterable[str]:
-    """Add the device to names without a device: in ``"Dev1/ai0, ai2"`` both channels are on Dev1."""
-    device = ""
-    for name in names:
-        if "/" in name.strip("/"):
-            device = name.rpartition("/")[0]
-            yield name
-        else:
-            yield f"{device}/{name}" if device else name
-
 
 Fields = Mapping[str, object]
 """The fields of a response; status 0 is omitted."""
-Call = Callable[[DaqmxSystem, Any], Fields]
-"""Function of system and request that returns the fields of the response."""
-
-NOTHING: Fields = {}
+TaskCall = Callable[[Task, Any], Fields | None]
+"""Function of task and request that returns the fields of the response, if any."""
 
 
 def pick(request: Any, field: str) -> int:
@@ -135,17 +85,6 @@ def pick(request: Any, field: str) -> int:
 def deadline(timeout_s: float) -> float:
     """Return the time of the monotonic clock at which a timeout ends; infinite for a negative one [s]."""
     return math.inf if timeout_s < 0 else time.monotonic() + timeout_s
-
-
-def task_of(system: DaqmxSystem, request: Any) -> Task:
-    """Return the task that a request names."""
-    return system.task(request.task.name)
-
-
-def _stopped_task(system: DaqmxSystem, request: Any) -> Task:
-    task = task_of(system, request)
-    task.require_stopped()
-    return task
 
 
 def _create(system: DaqmxSystem, request: Any) -> Fields:
@@ -160,44 +99,40 @@ def _create(system: DaqmxSystem, request: Any) -> Fields:
     return {"task": Session(name=task.name), "new_session_initialized": True}
 
 
-def _is_done(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _clear(system: DaqmxSystem, request: Any) -> Fields:
+    system.clear_task(request.task.name)
+    return {}
+
+
+def _is_done(task: Task, _: Any) -> Fields:
     if not task.is_done():
         task.rig.pace.pass_time(task.rig, QUESTION_S)
     return {"is_task_done": task.is_done()}
 
 
-def _require_volts(request: Any) -> None:
+def _add_inputs(task: Task, request: Any) -> None:
+    terminal = member(TerminalConfiguration, pick(request, "terminal_config"), "AI_TermCfg")
+    for channel in _new_channels(task, request, lambda device: device.input_names):
+        task.add(InputChannel(*channel, request.min_val, request.max_val, terminal))
+
+
+def _add_outputs(task: Task, request: Any) -> None:
+    for channel in _new_channels(task, request, lambda device: device.output_names):
+        task.add(OutputChannel(*channel, request.min_val, request.max_val))
+
+
+def _new_channels(
+    task: Task, request: Any, side: Callable[[Device], tuple[str, ...]]
+) -> list[tuple[str, str, Device]]:
+    """Return name, physical name and device of the voltage channels that a request creates."""
     if pick(request, "units") not in (0, VoltageUnits.VOLTS.value):
         raise unsupported_value("units", pick(request, "units"), "VOLTS")
+    found = task.rig.catalogue.physical(request.physical_channel, side)
+    names = channel_names(request.name_to_assign_to_channel, tuple(place for place, _ in found))
+    return [(name, place, device) for name, (place, device) in zip(names, found, strict=True)]
 
 
-def _add_inputs(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
-    _require_volts(request)
-    terminal = member(TerminalConfiguration, pick(request, "terminal_config"), "AI_TermCfg")
-    places = system.inputs(request.physical_channel)
-    for place, name in zip(places, channel_names(request.name_to_assign_to_channel, places), strict=True):
-        device = system.device(place)
-        assert device.inputs is not None
-        limits = request.min_val, request.max_val
-        task.add(InputChannel(name, place, device, device.inputs, *limits, terminal))
-    return NOTHING
-
-
-def _add_outputs(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
-    _require_volts(request)
-    places = system.outputs(request.physical_channel)
-    for place, name in zip(places, channel_names(request.name_to_assign_to_channel, places), strict=True):
-        device = system.device(place)
-        assert device.outputs is not None
-        task.add(OutputChannel(name, place, device, device.outputs, request.min_val, request.max_val))
-    return NOTHING
-
-
-def _set_clock(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _set_clock(task: Task, request: Any) -> None:
     task.require_channels()
     task.require_stopped()
     mode = pick(request, "sample_mode")
@@ -211,26 +146,23 @@ def _set_clock(system: DaqmxSystem, request: Any) -> Fields:
     task.timing.mode = AcquisitionType(mode)
     task.timing.samples = request.samps_per_chan
     task.timing.clock_source = request.source
-    return NOTHING
 
 
-def _set_start_trigger(system: DaqmxSystem, request: Any) -> Fields:
+def _set_start_trigger(task: Task, request: Any) -> None:
     member(Edge, pick(request, "trigger_edge"), "DigEdge_StartTrig_Edge")
-    task = _stopped_task(system, request)
+    task.require_stopped()
     task.timing.trigger_source = task.full_terminal(request.trigger_source)
-    return NOTHING
 
 
-def _set_reference_trigger(system: DaqmxSystem, request: Any) -> Fields:
+def _set_reference_trigger(task: Task, request: Any) -> None:
     member(Edge, pick(request, "trigger_edge"), "DigEdge_RefTrig_Edge")
-    task = _stopped_task(system, request)
+    task.require_stopped()
     terminal = task.full_terminal(request.trigger_source)
     task.timing.reference = ReferenceTrigger(terminal, request.pretrigger_samples)
-    return NOTHING
 
 
-def _set_logging(system: DaqmxSystem, request: Any) -> Fields:
-    task = _stopped_task(system, request)
+def _set_logging(task: Task, request: Any) -> None:
+    task.require_stopped()
     if task.outputs:
         raise DaqmxRefusal(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS, f"Task Name: {task.name}")
     mode = member(LoggingMode, pick(request, "logging_mode"), "Logging_Mode")
@@ -239,34 +171,25 @@ def _set_logging(system: DaqmxSystem, request: Any) -> Fields:
         raise unsupported_value("Logging_Mode", mode.name, "OFF, LOG_AND_READ")
     if mode is LoggingMode.LOG_AND_READ and operation is not LoggingOperation.CREATE_OR_REPLACE:
         raise unsupported_value("Logging_TDMS_Operation", operation.name, "CREATE_OR_REPLACE")
-    settings = LogSettings(Path(request.file_path), request.group_name or task.name)
-    task.logging = None if mode is LoggingMode.OFF else settings
-    return NOTHING
+    group = request.group_name or task.name
+    task.log = None if mode is LoggingMode.OFF else TdmsLog(Path(request.file_path), group)
 
 
-def _does(act: Callable[[DaqmxSystem, Any], object]) -> Call:
-
-    def call(system: DaqmxSystem, request: Any) -> Fields:
-        act(system, request)
-        return NOTHING
-
-    return call
-
-
-def _control(system: DaqmxSystem, request: Any) -> None:
-    task_of(system, request).control(member(TaskMode, pick(request, "action"), "task action"))
-
+CALLS: Mapping[str, Callable[[DaqmxSystem, Any], Fields]] = {
+    "CreateTask": _create,
+    "ClearTask": _clear,
+    "GetErrorString": lambda _, request: {"error_string": sentence(request.error_code)},
+}
+"""Calls on the driver, keyed by their names in the protocol."""
 
 # fmt: off
-CALLS: Mapping[str, Call] = {
-    "CreateTask": _create,
-    "ClearTask": _does(lambda system, request: system.clear_task(request.task.name)),
-    "StartTask": _does(lambda system, request: task_of(system, request).start()),
-    "StopTask": _does(lambda system, request: task_of(system, request).stop()),
-    "TaskControl": _does(_control),
+TASK_CALLS: Mapping[str, TaskCall] = {
+    "StartTask": lambda task, _: task.start(),
+    "StopTask": lambda task, _: task.stop(),
+    "TaskControl": lambda task, request: task.control(
+        member(TaskMode, pick(request, "action"), "task action")),
     "IsTaskDone": _is_done,
-    "WaitUntilTaskDone": _does(
-        lambda system, request: task_of(system, request).wait_until_done(deadline(request.time_to_wait))),
+    "WaitUntilTaskDone": lambda task, request: task.wait_until_done(deadline(request.time_to_wait)),
     "CreateAIVoltageChan": _add_inputs,
     "CreateAOVoltageChan": _add_outputs,
     "CfgSampClkTiming": _set_clock,
@@ -274,10 +197,9 @@ CALLS: Mapping[str, Call] = {
     "CfgDigEdgeRefTrig": _set_reference_trigger,
     "ConfigureLogging": _set_logging,
     # The client has already closed the event stream; nothing else needs to be undone.
-    "UnregisterEveryNSamplesEvent": _does(task_of),
-    "GetErrorString": lambda _, request: {"error_string": sentence(request.error_code)},
+    "UnregisterEveryNSamplesEvent": lambda *_: None,
 }
-"""Calls, keyed by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
+"""Calls on a task, keyed by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
 # fmt: on
 
 
@@ -295,7 +217,7 @@ def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerCon
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
     )
-    task = task_of(system, request)
+    task = system.task(request.task.name)
     if request.n_samples < 1:
         raise DaqmxRefusal(DAQmxErrors.EVERY_N_SAMPS_EVENT_INTERVAL_ZERO_NOT_SUPPORTED)
     is_input = kind is EveryNSamplesEventType.ACQUIRED_INTO_BUFFER
@@ -359,8 +281,8 @@ class _Subscription:
                 due_s = stream.time_of(count)
                 if self._rig.pace.overflow is Overflow.GROW:
                     self._wait(_BY_OTHERS, lambda: stream.position >= announced or self._is_over(stream))
-            self._wait(due_s, lambda: stream.transferred >= count or self._is_over(stream))
-            return stream.transferred >= count and not self._has_gone
+            self._wait(due_s, lambda: stream.reaches(count) or self._is_over(stream))
+            return stream.reaches(count) and not self._has_gone
 
     def _is_over(self, stream: Stream) -> bool:
         return stream.is_done or self._task.stream is not stream

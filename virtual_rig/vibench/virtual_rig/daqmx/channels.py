@@ -1,7 +1,5 @@
 """Channels of a simulated DAQmx task: conversion, coupling and limits."""
 
-import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +8,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..world.wiring import Coupling, Input
-from .devices import AnalogInputs, AnalogOutputs, Device
+from .devices import AnalogInputs, AnalogOutputs, Device, expand
 from .errors import DaqmxRefusal, unsupported_value
 
 _SHORT_BITS, _LONG_BITS = 16, 32
@@ -19,20 +17,31 @@ _SLACK = 1 + 1e-9
 
 
 @dataclass
-class InputChannel:
-    """Configuration of one voltage input of a task."""
+class _VoltageChannel:
+    """Configuration of one voltage input or output of a task."""
 
     name: str
     physical: str
     device: Device
-    inputs: AnalogInputs
     minimum: float
     maximum: float
+
+
+@dataclass
+class InputChannel(_VoltageChannel):
+    """Configuration of one voltage input."""
+
     terminal: TerminalConfiguration = TerminalConfiguration.DEFAULT
     coupling: Coupling | None = None
     """None: the device's default (AC with excitation, DC without)."""
     excitation: ExcitationSource = ExcitationSource.NONE
     excitation_a: float = 0.0
+
+    @property
+    def side(self) -> AnalogInputs:
+        """Capabilities of the device's inputs."""
+        assert self.device.inputs is not None
+        return self.device.inputs
 
     @property
     def iepe_current_a(self) -> float:
@@ -45,27 +54,27 @@ class InputChannel:
         if self.coupling is not None:
             return self.coupling
         wants = Coupling.AC if self.iepe_current_a else Coupling.DC
-        return wants if wants in self.inputs.couplings else self.inputs.couplings[0]
+        return wants if wants in self.side.couplings else self.side.couplings[0]
 
     @property
     def range_v(self) -> float:
         """Smallest full scale that contains the expected values [V]; NaN if none does."""
         wanted_v = max(abs(self.minimum), abs(self.maximum))
-        return next((each for each in self.inputs.ranges_v if wanted_v <= each * _SLACK), float("nan"))
+        return next((each for each in self.side.ranges_v if wanted_v <= each * _SLACK), float("nan"))
 
     @property
     def volts_per_count(self) -> float:
         """Quantisation step [V]."""
-        return float(self.range_v / 2 ** (self.inputs.bits - 1))
+        return float(self.range_v / 2 ** (self.side.bits - 1))
 
     @property
     def raw_bits(self) -> int:
         """Bits of an unscaled sample in transfers."""
-        return _SHORT_BITS if self.inputs.bits <= _SHORT_BITS else _LONG_BITS
+        return _SHORT_BITS if self.side.bits <= _SHORT_BITS else _LONG_BITS
 
     def verify(self) -> None:
         """Refuse settings that the device does not support: range, terminal, coupling, excitation."""
-        inputs, where = self.inputs, f"on {self.physical}"
+        inputs, where = self.side, f"on {self.physical}"
         if self.minimum >= self.maximum:
             raise unsupported_value("AI_Min", self.minimum, f"below AI_Max = {self.maximum:g}")
         if not np.isfinite(self.range_v):
@@ -87,21 +96,20 @@ class InputChannel:
 
 
 @dataclass
-class OutputChannel:
-    """One voltage output of a task."""
+class OutputChannel(_VoltageChannel):
+    """Configuration of one voltage output."""
 
-    name: str
-    physical: str
-    device: Device
-    outputs: AnalogOutputs
-    minimum: float
-    maximum: float
+    @property
+    def side(self) -> AnalogOutputs:
+        """Capabilities of the device's outputs."""
+        assert self.device.outputs is not None
+        return self.device.outputs
 
     def verify(self) -> None:
         """Refuse limits that the device cannot output."""
         if self.minimum >= self.maximum:
             raise unsupported_value("AO_Min", self.minimum, f"below AO_Max = {self.maximum:g}")
-        range_v = self.outputs.range_v
+        range_v = self.side.range_v
         for name, value in (("AO_Min", self.minimum), ("AO_Max", self.maximum)):
             if abs(value) > range_v * _SLACK:
                 raise unsupported_value(name, value, f"-{range_v:g} to {range_v:g} V on {self.physical}")
@@ -118,28 +126,6 @@ class OutputChannel:
 
 
 Channel = InputChannel | OutputChannel
-
-
-_RANGE = re.compile(r"^(?P<stem>.*?)(?P<first>\d+):(?P<stem_again>.*?)(?P<last>\d+)$")
-
-
-def expand(text: str) -> tuple[str, ...]:
-    """Return all names in a list of names and ranges, in order.
-
-    ``"Dev1/ai0:2"`` and ``"Dev1/ai0:Dev1/ai2"`` both give three names; ``"ai2:0"`` counts down.
-    """
-    return tuple(name for part in text.split(",") for name in _expand_one(part.strip()))
-
-
-def _expand_one(part: str) -> Iterable[str]:
-    if not part:
-        return ()
-    found = _RANGE.match(part)
-    if found is None or found["stem_again"] not in ("", found["stem"], found["stem"].rpartition("/")[2]):
-        return (part,)
-    first, last = int(found["first"]), int(found["last"])
-    step = 1 if last >= first else -1
-    return (f"{found['stem']}{number}" for number in range(first, last + step, step))
 
 
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:

@@ -1,8 +1,9 @@
 """Calls that transfer samples between a program and a task, with their protobuf encoding."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,9 @@ from nidaqmx.constants import AcquisitionType, FillMode, SampleTimingType, Wavef
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from .acquisition import Acquisition, check_memory
-from .calls import Call, DaqmxSystem, Fields, deadline, pick, task_of
+from .acquisition import Acquisition, Stream, check_memory
+from .calls import Fields, TaskCall, deadline, pick
 from .errors import DaqmxRefusal, unsupported_value
-from .generation import Generation
 from .rig import QUESTION_S
 from .tasks import Task
 
@@ -127,7 +127,9 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
     blocks, taken = [], 0
     while taken < count:
         piece = min(count - taken, acquisition.buffer_size)
-        has_come = _await_samples(task, acquisition, first + taken + piece, deadline_s)
+        end = first + taken + piece
+        is_there = partial(acquisition.reaches, end)
+        has_come = _await(task, acquisition, acquisition.time_of(end), is_there, deadline_s)
         if not has_come:
             piece = max(0, min(piece, acquisition.transferred - first - taken))
             status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE)
@@ -139,7 +141,7 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
     volts = np.concatenate(blocks, axis=1) if blocks else np.empty((len(task.inputs), 0))
     began_s = acquisition.began_s + first / acquisition.rate_hz
     if task.log is not None and volts.size:
-        task.log.write(volts, began_s)
+        task.log.write(task, volts, began_s)
     return Reading(volts, status, began_s)
 
 
@@ -148,17 +150,18 @@ def _nothing_in_time(task: Task, wanted: int) -> Reading:
     return Reading(np.empty((len(task.inputs), 0)), status)
 
 
-def _await_samples(task: Task, acquisition: Acquisition, end: int, deadline_s: float) -> bool:
-    def is_there() -> bool:
-        return (
-            acquisition.transferred >= end
-            or acquisition.failure is not None
-            or task.acquisition is not acquisition
-        )
+def _await(
+    task: Task, stream: Stream, until_s: float, is_there: Callable[[], bool], deadline_s: float
+) -> bool:
+    """Wait for samples of a run; return whether they came in time. Refused if the run is stopped (-88709)."""
 
-    has_come = task.rig.pace.ask(task.rig, acquisition.time_of(end), is_there, deadline_s)
-    if task.acquisition is not acquisition:
-        raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_read=0)
+    def has_ended() -> bool:
+        return stream.failure is not None or task.stream is not stream
+
+    has_come = task.rig.pace.ask(task.rig, until_s, lambda: is_there() or has_ended(), deadline_s)
+    if task.stream is not stream:
+        transferred = "samples_read" if isinstance(stream, Acquisition) else "samples_written"
+        raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", **{transferred: 0})
     return has_come
 
 
@@ -197,7 +200,7 @@ def _write_on_demand(task: Task, volts: NDArray[np.float64], *, starts_task: boo
         task.start()
     for channel, row in zip(task.outputs, volts, strict=True):
         task.rig.world.silence(channel.physical)
-        task.rig.world.play(channel.physical, row, channel.outputs.rates.maximum_hz)
+        task.rig.world.play(channel.physical, row, channel.side.rates.maximum_hz)
 
 
 def _write_stopped(task: Task, volts: NDArray[np.float64]) -> None:
@@ -218,33 +221,24 @@ def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) ->
     count, written = volts.shape[1], 0
     while written < count:
         piece = min(count - written, task.output_buffer.size)
-        if task.generation is not None and not _await_space(task, task.generation, piece, deadline_s):
-            raise DaqmxRefusal(
-                DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN, f"Task Name: {task.name}", samples_written=written
-            )
+        if (generation := task.generation) is not None:
+            is_there, until_s = partial(generation.has_room, piece), generation.time_of_room(piece)
+            has_come = _await(task, generation, until_s, is_there, deadline_s)
+            if generation.failure is not None:
+                raise generation.failure
+            if not has_come:
+                code = DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN
+                raise DaqmxRefusal(code, f"Task Name: {task.name}", samples_written=written)
         task.output_buffer.write(volts[:, written : written + piece])
         written += piece
-
-
-def _await_space(task: Task, generation: Generation, samples: int, deadline_s: float) -> bool:
-    def is_there() -> bool:
-        has_ended = generation.failure is not None or task.generation is not generation
-        return generation.space >= samples or has_ended
-
-    has_come = task.rig.pace.ask(task.rig, generation.time_of_room(samples), is_there, deadline_s)
-    if generation.failure is not None:
-        raise generation.failure
-    if task.generation is not generation:
-        raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_written=0)
-    return has_come
 
 
 _SECONDS_1904_TO_1970 = 2_082_844_800
 """Seconds from 1904, where NI's time stamps start, to 1970."""
 
 
-def _read_scaled(system: DaqmxSystem, request: Any) -> Fields:
-    reading = _read_what_fits(task_of(system, request), request)
+def _read_scaled(task: Task, request: Any) -> Fields:
+    reading = _read_what_fits(task, request)
     return _response(reading, _lay_out(reading.volts, request))
 
 
@@ -256,8 +250,7 @@ def _response(reading: Reading, values: NDArray[Any]) -> Fields:
     }
 
 
-def _read_waveforms(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _read_waveforms(task: Task, request: Any) -> Fields:
     reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
     mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
     waveforms = [_waveform(task, row, reading, mode) for row in range(len(task.inputs))]
@@ -277,8 +270,7 @@ def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMod
     return waveform
 
 
-def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _read_raw(task: Task, request: Any) -> Fields:
     reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
     if reading.status:  # the caller cannot use a part of the requested samples
         raise DaqmxRefusal(reading.status, samples_read=reading.samples)
@@ -287,14 +279,12 @@ def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
     return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
 
 
-def _read_counts(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _read_counts(task: Task, request: Any) -> Fields:
     reading = _read_what_fits(task, request)
     return _response(reading, _lay_out(_counts(task, reading), request).astype(np.int64))
 
 
-def _write(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _write(task: Task, request: Any) -> Fields:
     require_outputs(task)
     values = np.array(request.write_array, dtype=np.float64)
     samples = request.num_samps_per_chan
@@ -304,8 +294,7 @@ def _write(system: DaqmxSystem, request: Any) -> Fields:
     return write(task, rows, request)
 
 
-def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
+def _write_waveforms(task: Task, request: Any) -> Fields:
     require_outputs(task)
     rows = [np.array(waveform.y_data) for waveform in request.waveforms]
     if len({row.size for row in rows}) != 1:
@@ -342,7 +331,7 @@ def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
 
 def _counts(task: Task, reading: Reading) -> NDArray[np.float64]:
     steps = np.array([[channel.volts_per_count] for channel in task.inputs])
-    largest = 2 ** (task.inputs[0].inputs.bits - 1)
+    largest = 2 ** (task.inputs[0].side.bits - 1)
     counts: NDArray[np.float64] = np.clip(np.rint(reading.volts / steps), -largest, largest - 1)
     return counts
 
@@ -355,7 +344,7 @@ def _check_size(task: Task, size: int, samples: int) -> None:
         raise DaqmxRefusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, detail, samples_written=0)
 
 
-DATA_CALLS: Mapping[str, Call] = {
+DATA_CALLS: Mapping[str, TaskCall] = {
     "ReadAnalogF64": _read_scaled,
     "ReadAnalogWaveforms": _read_waveforms,
     "ReadRaw": _read_raw,

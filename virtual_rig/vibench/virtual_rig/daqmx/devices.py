@@ -6,13 +6,17 @@ and the output memory of the USB-4431, the default couplings, and the USB-6211's
 """
 
 import math
+import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from nidaqmx.constants import AOIdleOutputBehavior, ProductCategory, SampleTimingType, TerminalConfiguration
+from nidaqmx.error_codes import DAQmxErrors
 
 from vibench.acquisition import ConfigurationError
 
 from ..world.wiring import Coupling
+from .errors import DaqmxRefusal
 
 _NI_9234_RATE_HZ = 13.1072e6 / 256
 _NI_9234_MAX_DIVISOR = 31
@@ -23,31 +27,18 @@ _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
-class AnyRate:
-    """Any rate within an interval."""
+class Rates:
+    """Sample rates within an interval; with a clock, only those that divide it by an integer."""
 
     minimum_hz: float
     maximum_hz: float
+    clock_hz: float | None = None
 
     def next_up(self, rate_hz: float) -> float:
-        """Return the rate unchanged, because any rate is possible."""
-        return rate_hz
-
-
-@dataclass(frozen=True)
-class DividedRate:
-    """A clock divided by an integer; a requested rate is rounded up to the next possible rate."""
-
-    clock_hz: float
-    minimum_hz: float
-    maximum_hz: float
-
-    def next_up(self, rate_hz: float) -> float:
-        """Return the smallest ``clock_hz / n`` not below ``rate_hz``, except for rounding errors."""
+        """Return the smallest possible rate not below ``rate_hz``, except for rounding errors."""
+        if self.clock_hz is None:
+            return rate_hz
         return self.clock_hz / math.floor(self.clock_hz / rate_hz * (1 + _ROUNDING))
-
-
-Rates = AnyRate | DividedRate
 
 
 @dataclass(frozen=True)
@@ -137,7 +128,7 @@ NI_9234 = Device(
     category=ProductCategory.C_SERIES_MODULE, chassis="cDAQ1",
     inputs=AnalogInputs(
         count=4, ranges_v=(5.0,), bits=24,
-        rates=DividedRate(_NI_9234_RATE_HZ, _NI_9234_RATE_HZ / _NI_9234_MAX_DIVISOR, _NI_9234_RATE_HZ),
+        rates=Rates(_NI_9234_RATE_HZ / _NI_9234_MAX_DIVISOR, _NI_9234_RATE_HZ, _NI_9234_RATE_HZ),
         couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.002,),
         terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=SampleTimingType.SAMPLE_CLOCK,
     ),
@@ -147,23 +138,24 @@ USB_4431 = Device(
     name="Dev1", product_type="USB-4431", serial=0x01D04431,
     category=ProductCategory.DSA, pfi_lines=8,
     inputs=AnalogInputs(
-        count=4, ranges_v=(10.0,), bits=24, rates=AnyRate(1000.0, 102.4e3),
+        count=4, ranges_v=(10.0,), bits=24, rates=Rates(1000.0, 102.4e3),
         couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.0021,),
         terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=SampleTimingType.SAMPLE_CLOCK,
         detects_overloads=True,
     ),
     outputs=AnalogOutputs(
-        count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), idle=AOIdleOutputBehavior.ZERO_VOLTS,
+        count=1, range_v=3.5, rates=Rates(1000.0, 96e3), idle=AOIdleOutputBehavior.ZERO_VOLTS,
         untimed=SampleTimingType.SAMPLE_CLOCK, memory=1023,
     ),
 )  # fmt: skip
 
+_M_SERIES_RATES = Rates(_M_SERIES_TIMEBASE_HZ / 2**32, 250e3, _M_SERIES_TIMEBASE_HZ)
 USB_6211 = Device(
     name="Dev2", product_type="USB-6211", serial=0x01D06211,
     category=ProductCategory.M_SERIES_DAQ, pfi_lines=8,
     inputs=AnalogInputs(
         count=16, ranges_v=(0.2, 1.0, 5.0, 10.0), bits=16,
-        rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
+        rates=_M_SERIES_RATES,
         couplings=(Coupling.DC,), iepe_currents_a=(),
         terminals=(TerminalConfiguration.DIFF, TerminalConfiguration.RSE, TerminalConfiguration.NRSE),
         untimed=SampleTimingType.ON_DEMAND, is_multiplexed=True,
@@ -171,7 +163,7 @@ USB_6211 = Device(
     outputs=AnalogOutputs(
         count=2, range_v=10.0, idle=AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE,
         untimed=SampleTimingType.ON_DEMAND, memory=8191,
-        rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
+        rates=_M_SERIES_RATES,
     ),
 )  # fmt: skip
 
@@ -182,10 +174,62 @@ class Catalogue:
 
     devices: tuple[Device, ...] = (CDAQ1, NI_9234, USB_4431, USB_6211)
 
-    def find(self, name: str) -> Device | None:
-        """Return a device by name; a leading slash is ignored."""
-        wanted = name.strip("/").lower()
-        return next((device for device in self.devices if device.name.lower() == wanted), None)
+    def device(self, name: str) -> Device:
+        """Return a device by its name or the name of one of its channels (-200220 if there is none)."""
+        wanted = name.strip("/").partition("/")[0].lower()
+        for device in self.devices:
+            if device.name.lower() == wanted:
+                return device
+        known = ", ".join(device.name for device in self.devices)
+        raise DaqmxRefusal(DAQmxErrors.INVALID_DEVICE_ID, f"Device Specified: {name}\nDevices: {known}")
+
+    def physical(
+        self, names: str, side: Callable[[Device], tuple[str, ...]]
+    ) -> tuple[tuple[str, Device], ...]:
+        """Return each channel in a list of names and ranges, as its device spells it, with the device.
+
+        ``side`` returns the inputs or the outputs of a device. -200220, -200170 or -200096 for unknown names.
+        """
+        found, prefix = [], ""
+        for given in expand(names):
+            # A name without a device is on the device of the name before: ``"Dev1/ai0, ai2"``.
+            if "/" in given.strip("/"):
+                prefix, name = given.rpartition("/")[0], given
+            else:
+                name = f"{prefix}/{given}" if prefix else given
+            device = self.device(name)
+            known = {each.lower(): each for each in (*device.input_names, *device.output_names)}
+            if name.lower() not in known:
+                detail = f"Physical Channel: {name}\nPhysical Channels: {', '.join(known.values()) or 'none'}"
+                raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, detail)
+            if known[name.lower()] not in side(device):
+                raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {name}")
+            found.append((known[name.lower()], device))
+        if not found:
+            raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, "No physical channel was given.")
+        return tuple(found)
+
+
+_RANGE = re.compile(r"^(?P<stem>.*?)(?P<first>\d+):(?P<stem_again>.*?)(?P<last>\d+)$")
+
+
+def expand(text: str) -> tuple[str, ...]:
+    """Return all names in a list of names and ranges, in order.
+
+    ``"Dev1/ai0:2"`` and ``"Dev1/ai0:Dev1/ai2"`` both give three names; ``"ai2:0"`` counts down.
+    """
+    return tuple(name for part in text.split(",") for name in _expand_one(part.strip()))
+
+
+def _expand_one(part: str) -> Iterable[str]:
+    if not part:
+        return ()
+    found = _RANGE.match(part)
+    if found is None or found["stem_again"] not in ("", found["stem"], found["stem"].rpartition("/")[2]):
+        return (part,)
+    first, last = int(found["first"]), int(found["last"])
+    step = 1 if last >= first else -1
+    return (f"{found['stem']}{number}" for number in range(first, last + step, step))
 
 
 def catalogue_with(product_type: str, name: str) -> Catalogue:

@@ -79,13 +79,12 @@ class Generation(Stream):
         self._recent = np.empty((len(outputs), 0))
         self._is_open = True
 
-    @property
-    def space(self) -> int:
-        """Samples per channel that can be written now; a repeated buffer can always be rewritten."""
+    def has_room(self, samples: int) -> bool:
+        """Return whether ``samples`` can be written now; a repeated buffer can always be rewritten."""
         if self.repeats:
-            return self.buffer.size
+            return True
         self._fetch(self.delivered + self._most_in_memory)
-        return self.buffer.size - (self.buffer.written - self._fetched)
+        return samples <= self.buffer.size - (self.buffer.written - self._fetched)
 
     def time_of_room(self, samples: int) -> float:
         """Return the rig time at which ``samples`` can be written [s]."""

@@ -17,7 +17,7 @@ from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 
 from ..world.world import World
 from .attributes import SERVICE, attribute_calls
-from .calls import CALLS, EVENTS, DaqmxSystem, Fields, Listener
+from .calls import CALLS, EVENTS, TASK_CALLS, DaqmxSystem, Fields, Listener, TaskCall
 from .data_calls import DATA_CALLS
 from .devices import Catalogue
 from .errors import DaqmxRefusal, Faults, Unavailable
@@ -43,14 +43,12 @@ class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships 
         given = dict(details.invocation_metadata).get(TOKEN_KEY, "")
         if hmac.compare_digest(str(given).encode(), self._token.encode()):
             return continuation(details)
-        return grpc.unary_unary_rpc_method_handler(_refuse)
-
-
-def _refuse(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
-    context.abort(
-        grpc.StatusCode.UNAUTHENTICATED,
-        f"this rig needs a token: set {TOKEN_VARIABLE} to the token that 'vibench serve-rig' printed",
-    )
+        reason = (
+            f"this rig is served with a token: put what 'vibench serve-rig' printed into {TOKEN_VARIABLE}"
+        )
+        return grpc.unary_unary_rpc_method_handler(
+            lambda _, context: context.abort(grpc.StatusCode.UNAUTHENTICATED, reason)
+        )
 
 
 LOOPBACK = "127.0.0.1:0"
@@ -158,10 +156,13 @@ class DaqServer:
     # --- requests and responses -----------------------------------------------------------
 
     def _unary_calls(self) -> dict[str, Handler]:
-        calls: dict[str, Callable[[Any], Fields]] = {**attribute_calls(self._system)}
-        for name, call in {**CALLS, **DATA_CALLS}.items():
-            calls[name] = partial(call, self._system)
+        calls = attribute_calls(self._system)
+        calls |= {name: partial(call, self._system) for name, call in CALLS.items()}
+        calls |= {name: partial(self._on_task, call) for name, call in {**TASK_CALLS, **DATA_CALLS}.items()}
         return {name: self._answer(name, call) for name, call in calls.items()}
+
+    def _on_task(self, call: TaskCall, request: Any) -> Fields:
+        return call(self._system.task(request.task.name), request) or {}
 
     def _answer(self, name: str, call: Callable[[Any], Fields]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Fields:
@@ -256,12 +257,9 @@ class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
         def serialise(answer: Fields) -> bytes:
             return bytes(response(**answer).SerializeToString())
 
-        handler = self._unary.get(name) or _not_simulated(name)
+        handler = self._unary.get(name) or partial(_not_simulated, name)
         return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
 
 
-def _not_simulated(name: str) -> Handler:
-    def handle(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
-        context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not part of the simulated DAQmx driver.")
-
-    return handle
+def _not_simulated(name: str, request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - not read
+    context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not part of the simulated DAQmx driver.")

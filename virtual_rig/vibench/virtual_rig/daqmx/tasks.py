@@ -2,9 +2,9 @@
 
 import math
 import time
-from collections.abc import Callable
 from enum import IntEnum
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 from nidaqmx.constants import AcquisitionType, RegenerationMode, SampleTimingType, TaskMode
@@ -13,58 +13,49 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 
-from .acquisition import Acquisition, LogSettings, Timing, check_memory
-from .channels import Channel, InputChannel, OutputChannel, expand
-from .devices import AnalogInputs, AnalogOutputs, Device
+from .acquisition import Acquisition, Timing, check_memory
+from .channels import Channel, InputChannel, OutputChannel
+from .devices import AnalogInputs, AnalogOutputs, Device, expand
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation, OutputBuffer
 from .rig import Rig
 
 
 class TdmsLog:
-    """TDMS file of one run of a task; needs npTDMS."""
+    """TDMS file of the runs of a task; each run replaces the file. Needs npTDMS."""
 
-    def __init__(
-        self,
-        settings: LogSettings,
-        inputs: list[InputChannel],
-        rate_hz: float,
-        wall_s: Callable[[float], float],
-    ) -> None:
-        """Create the file; an existing one is replaced."""
+    def __init__(self, path: Path, group: str) -> None:
         if find_spec("nptdms") is None:
             raise ConfigurationError(
                 "Logging needs npTDMS on the computer of the virtual rig: pip install 'vibench[exchange]'"
             )
-        self._settings = settings
-        self._inputs = inputs
-        self._interval_s = 1 / rate_hz
-        self._wall_s = wall_s
+        self._path = path
+        self._group = group
         self._began: np.datetime64 | None = None
-        try:
-            settings.path.write_bytes(b"")
-        except OSError as error:
-            raise DaqmxRefusal(DAQmxErrors.GENERIC_FILE_IO, f"File: {settings.path}\n{error}") from error
 
-    def write(self, volts: NDArray[np.float64], began_s: float) -> None:
+    def begin(self) -> None:
+        """Create the file of a run."""
+        self._began = None
+        try:
+            self._path.write_bytes(b"")
+        except OSError as error:
+            raise DaqmxRefusal(DAQmxErrors.GENERIC_FILE_IO, f"File: {self._path}\n{error}") from error
+
+    def write(self, task: "Task", volts: NDArray[np.float64], began_s: float) -> None:
         """Append samples, shape (channels, samples) [V]; ``began_s`` is the rig time of the first."""
         from nptdms import ChannelObject, TdmsWriter  # noqa: PLC0415 - an extra; few programs log
 
-        self._began = self._began or np.datetime64(round(self._wall_s(began_s) * 1e6), "us")
-        with TdmsWriter(self._settings.path, mode="a") as file:
+        self._began = self._began or np.datetime64(round(task.rig.wall_s(began_s) * 1e6), "us")
+        about = {
+            "wf_start_time": self._began,
+            "wf_increment": 1 / task.rate_hz,
+            "unit_string": "Volts",
+        }
+        with TdmsWriter(self._path, mode="a") as file:
             file.write_segment(
                 [
-                    ChannelObject(
-                        self._settings.group,
-                        channel.name,
-                        row,
-                        {
-                            "wf_start_time": self._began,
-                            "wf_increment": self._interval_s,
-                            "unit_string": "Volts",
-                        },
-                    )
-                    for channel, row in zip(self._inputs, volts, strict=True)
+                    ChannelObject(self._group, channel.name, row, about)
+                    for channel, row in zip(task.inputs, volts, strict=True)
                 ]
             )
 
@@ -95,7 +86,7 @@ class Task:
         self.timing = Timing()
         self.input_size: int | None = None
         """Buffer size in samples per channel; None: chosen from rate and samples."""
-        self.logging: LogSettings | None = None
+        self.log: TdmsLog | None = None
         self.output_size = 0
         """Buffer size in samples per channel; 0: the size of the first writes."""
         self.regeneration = RegenerationMode.ALLOW_REGENERATION
@@ -104,7 +95,6 @@ class Task:
         self.acquisition: Acquisition | None = None
         self.generation: Generation | None = None
         self.buffer: OutputBuffer | None = None
-        self.log: TdmsLog | None = None
         self._rests_in = TaskState.UNVERIFIED
 
     # --- configuration -------------------------------------------------------------------
@@ -123,7 +113,7 @@ class Task:
     def side(self) -> AnalogInputs | AnalogOutputs:
         """Capabilities of the device's inputs or outputs, whichever the task uses."""
         self.require_channels()
-        return self.inputs[0].inputs if self.inputs else self.outputs[0].outputs
+        return (self.inputs or self.outputs)[0].side
 
     @property
     def stream(self) -> Acquisition | Generation | None:
@@ -326,8 +316,8 @@ class Task:
         self.rig.edge(self.start_terminal)
 
     def _acquire(self) -> Acquisition:
-        if self.logging is not None:
-            self.log = TdmsLog(self.logging, self.inputs, self.rate_hz, self.rig.wall_s)
+        if self.log is not None:
+            self.log.begin()
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
@@ -361,7 +351,7 @@ class Task:
         physical = tuple(channel.physical for channel in self.outputs)
         return Generation(
             self.rig.world, physical, self.rate_hz, self.rig.now_s, self.timing.total,
-            self.output_buffer, self.regeneration, self.outputs[0].outputs,
+            self.output_buffer, self.regeneration, self.outputs[0].side,
         )  # fmt: skip
 
     def is_done(self) -> bool:
@@ -391,7 +381,7 @@ class Task:
             self.rig.end(self.stream)
         if self.generation is not None and not self.generation.repeats:
             self.buffer = None
-        self.acquisition = self.generation = self.log = None
+        self.acquisition = self.generation = None
         self.state = self._rests_in
         if self.state < TaskState.RESERVED:
             self.rig.release(self)
