@@ -10,12 +10,13 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..world.conversion import Conversion, SampleQueue
-from .errors import DaqmxRefusal, unsupported_value
+from .errors import DaqmxRefusal
 
 MOST_SAMPLES = 1 << 27
 """Largest number of values in a buffer or a read: 1 GiB."""
 
-_LEAST_PRETRIGGER = 2
+LEAST_PRETRIGGER = 2
+"""Smallest number of samples before and after a reference trigger."""
 
 
 @dataclass(frozen=True)
@@ -46,17 +47,6 @@ class Timing:
     def total(self) -> float:
         """Number of samples to acquire; infinite for a continuous task."""
         return self.samples if self.mode is AcquisitionType.FINITE else math.inf
-
-    def verify_reference(self) -> None:
-        """Refuse a reference trigger in a continuous task, or with too few samples on one side of it."""
-        if self.reference is None:
-            return
-        if self.mode is not AcquisitionType.FINITE:
-            raise DaqmxRefusal(DAQmxErrors.REF_TRIG_WHEN_CONTINUOUS)
-        most = self.samples - _LEAST_PRETRIGGER
-        if not _LEAST_PRETRIGGER <= self.reference.pretrigger <= most:
-            allowed = f"{_LEAST_PRETRIGGER} to {most} of {self.samples} samples"
-            raise unsupported_value("RefTrig_PretrigSamples", self.reference.pretrigger, allowed)
 
 
 class Overflow(Enum):

@@ -55,16 +55,11 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
     else:
         wanted = default_samples(task) if samples < 0 else samples
         reading = _read_buffered(task, wanted, deadline_s)
-    if has_to_start and _is_used_up(task):
+    acquisition = task.acquisition
+    is_used_up = acquisition is not None and acquisition.is_done and acquisition.available == 0
+    if has_to_start and (is_used_up or task.kind is SampleTimingType.ON_DEMAND):
         task.stop()
     return reading
-
-
-def _is_used_up(task: Task) -> bool:
-    if task.kind is SampleTimingType.ON_DEMAND:
-        return True
-    acquisition = task.acquisition
-    return acquisition is not None and acquisition.is_done and acquisition.available == 0
 
 
 def default_samples(task: Task) -> int:
@@ -237,12 +232,22 @@ _SECONDS_1904_TO_1970 = 2_082_844_800
 """Seconds from 1904, where NI's time stamps start, to 1970."""
 
 
-def _read_scaled(task: Task, request: Any) -> Fields:
-    reading = _read_what_fits(task, request)
-    return _response(reading, _lay_out(reading.volts, request))
-
-
-def _response(reading: Reading, values: NDArray[Any]) -> Fields:
+def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDArray[Any]]) -> Fields:
+    """Read samples, converted and in the caller's layout; "all" is limited by the caller's array."""
+    channels = max(1, len(task.channels))
+    room = request.array_size_in_samps // channels
+    wanted = request.num_samps_per_chan
+    if wanted == READ_ALL:
+        wanted = room if not task.is_running else min(room, default_samples(task))
+    if wanted > room:
+        detail = f"Room for {room} samples per channel, {wanted} requested"
+        raise DaqmxRefusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, detail, samples_read=0)
+    reading = read(task, wanted, deadline(request.timeout))
+    values = convert(task, reading)
+    if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
+        values = values.T
+    elif reading.samples < room and channels > 1:  # rows are spaced as in the caller's array
+        values = np.pad(values, ((0, 0), (0, room - reading.samples)))
     return {
         "status": reading.status,
         "read_array": values.ravel().tolist(),
@@ -279,11 +284,6 @@ def _read_raw(task: Task, request: Any) -> Fields:
     return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
 
 
-def _read_counts(task: Task, request: Any) -> Fields:
-    reading = _read_what_fits(task, request)
-    return _response(reading, _lay_out(_counts(task, reading), request).astype(np.int64))
-
-
 def _write(task: Task, request: Any) -> Fields:
     require_outputs(task)
     values = np.array(request.write_array, dtype=np.float64)
@@ -303,37 +303,11 @@ def _write_waveforms(task: Task, request: Any) -> Fields:
     return write(task, np.stack(rows), request)
 
 
-def _read_what_fits(task: Task, request: Any) -> Reading:
-    """Read the requested samples; "all" is limited by the caller's array."""
-    channels = max(1, len(task.channels))
-    room = request.array_size_in_samps // channels
-    wanted = request.num_samps_per_chan
-    if wanted == READ_ALL:
-        wanted = room if not task.is_running else min(room, default_samples(task))
-    if wanted > room:
-        detail = f"Room for {room} samples per channel, {wanted} requested"
-        raise DaqmxRefusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, detail, samples_read=0)
-    return read(task, wanted, deadline(request.timeout))
-
-
-def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
-    """Return the values by channel or by scan; rows of channels are spaced as in the caller's array."""
-    if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
-        return values.T
-    channels, samples = values.shape
-    width = request.array_size_in_samps // channels
-    if samples == width or channels == 1:
-        return values
-    rows = np.zeros((channels, width))
-    rows[:, :samples] = values
-    return rows
-
-
-def _counts(task: Task, reading: Reading) -> NDArray[np.float64]:
+def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
     steps = np.array([[channel.volts_per_count] for channel in task.inputs])
     largest = 2 ** (task.inputs[0].side.bits - 1)
-    counts: NDArray[np.float64] = np.clip(np.rint(reading.volts / steps), -largest, largest - 1)
-    return counts
+    counts = np.clip(np.rint(reading.volts / steps), -largest, largest - 1)
+    return np.asarray(counts, dtype=np.int64)
 
 
 def _check_size(task: Task, size: int, samples: int) -> None:
@@ -345,10 +319,10 @@ def _check_size(task: Task, size: int, samples: int) -> None:
 
 
 DATA_CALLS: Mapping[str, TaskCall] = {
-    "ReadAnalogF64": _read_scaled,
+    "ReadAnalogF64": lambda task, request: _read_array(task, request, lambda _, reading: reading.volts),
     "ReadAnalogWaveforms": _read_waveforms,
     "ReadRaw": _read_raw,
-    "ReadBinaryI32": _read_counts,
+    "ReadBinaryI32": lambda task, request: _read_array(task, request, _counts),
     "WriteAnalogF64": _write,
     "WriteAnalogWaveforms": _write_waveforms,
 }

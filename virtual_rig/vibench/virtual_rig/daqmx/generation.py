@@ -128,14 +128,12 @@ class Generation(Stream):
                 DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, samples_written=0
             )
         if self.is_done:
-            self._rest()
+            self.close()
 
     def close(self) -> None:
-        """End the generation now, and discard the samples not yet played."""
-        if self._is_open:
-            self._rest()
-
-    def _rest(self) -> None:
+        """End the generation, and discard the samples not yet played; allowed at any time."""
+        if not self._is_open:
+            return
         self._is_open = False
         for output in self._outputs:
             self._world.silence(output)

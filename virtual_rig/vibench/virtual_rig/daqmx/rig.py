@@ -95,15 +95,13 @@ class Rig:
                 generation.advance_to(reached_s)
         self.changed.notify_all()
 
-    def run_acquisition(self, acquisition: Acquisition) -> None:
-        """Include an acquisition in the advance of time."""
-        self._acquisitions.append(acquisition)
-        self.changed.notify_all()
-
-    def run_generation(self, generation: Generation) -> None:
-        """Include a generation in the advance of time; it starts now."""
-        generation.prepare(self.now_s)
-        self._generations.append(generation)
+    def run(self, stream: Acquisition | Generation) -> None:
+        """Include a stream in the advance of time; it starts now."""
+        if isinstance(stream, Generation):
+            stream.prepare(self.now_s)
+            self._generations.append(stream)
+        else:
+            self._acquisitions.append(stream)
         self.changed.notify_all()
 
     def end(self, stream: Acquisition | Generation) -> None:

@@ -68,7 +68,6 @@ _OPTIONS = (
 )
 
 Handler = Callable[[Any, grpc.ServicerContext], Any]
-Metadata = tuple[tuple[str, str], ...]
 
 
 class DaqServer:
@@ -208,7 +207,14 @@ def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
         except ConfigurationError as error:  # the simulated world lacks a capability of the device
             raise DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error)) from error
     except DaqmxRefusal as refusal:
-        context.set_trailing_metadata(_metadata(refusal))
+        entries = (
+            ("ni-error", refusal.code),
+            ("ni-samps-per-chan-read", refusal.samples_read),
+            ("ni-samps-per-chan-written", refusal.samples_written),
+        )
+        context.set_trailing_metadata(
+            tuple((key, str(number)) for key, number in entries if number is not None)
+        )
         context.abort(grpc.StatusCode.UNKNOWN, str(refusal))
     except Unavailable as error:
         context.abort(grpc.StatusCode.UNAVAILABLE, str(error))
@@ -222,15 +228,6 @@ def _require_address(address: str) -> None:
             f"{address!r} is not an address to listen on; nothing was started, give HOST:PORT with a port up "
             f"to {LAST_PORT}, such as 127.0.0.1:31763; port 0 selects a free port"
         )
-
-
-def _metadata(refusal: DaqmxRefusal) -> Metadata:
-    entries = (
-        ("ni-error", refusal.code),
-        ("ni-samps-per-chan-read", refusal.samples_read),
-        ("ni-samps-per-chan-written", refusal.samples_written),
-    )
-    return tuple((key, str(value)) for key, value in entries if value is not None)
 
 
 class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 
-from .acquisition import Acquisition, Timing, check_memory
+from .acquisition import LEAST_PRETRIGGER, Acquisition, Timing, check_memory
 from .channels import Channel, InputChannel, OutputChannel
 from .devices import AnalogInputs, AnalogOutputs, Device, expand
 from .errors import DaqmxRefusal, unsupported_value
@@ -70,10 +70,8 @@ class TaskState(IntEnum):
     """States of a task (NI-DAQmx Help, "Task State Model"); each state includes the previous states."""
 
     UNVERIFIED = 0
-    VERIFIED = 1
-    RESERVED = 2
-    COMMITTED = 3
-    RUNNING = 4
+    RESERVED = 1
+    RUNNING = 2
 
 
 class Task:
@@ -205,11 +203,9 @@ class Task:
             raise DaqmxRefusal(code, f"Task Name: {self.name}")
 
     def require_stopped(self) -> None:
-        """Refuse changes of a running task (-200479), and require a new verification."""
+        """Refuse changes of a running task (-200479)."""
         if self.is_running:
             raise DaqmxRefusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING, f"Task Name: {self.name}")
-        if self.state is TaskState.VERIFIED:
-            self.state = TaskState.UNVERIFIED
 
     def add(self, channel: Channel) -> None:
         """Add a channel; a task has one direction and, except on a chassis, one device."""
@@ -236,25 +232,17 @@ class Task:
             case TaskMode.TASK_STOP:
                 self.stop()
             case TaskMode.TASK_VERIFY:
-                self._rise(TaskState.VERIFIED)
-            case TaskMode.TASK_RESERVE:
-                self._rise(TaskState.RESERVED)
-            case TaskMode.TASK_COMMIT:
-                self._rise(TaskState.COMMITTED)
+                self._verify()
+            case TaskMode.TASK_RESERVE | TaskMode.TASK_COMMIT:
+                self._verify()
+                self._reserve()
+                if not self.is_running:
+                    self.state = self._rests_in = TaskState.RESERVED
             case _:
                 self.abort()
 
-    def _rise(self, state: TaskState) -> None:
-        self.require_channels()
-        if self.state < state:
-            self._verify()
-            if state >= TaskState.RESERVED:
-                self._reserve()
-            self.state = state
-        if not self.is_running:
-            self._rests_in = self.state
-
     def _verify(self) -> None:
+        self.require_channels()
         for channel in self.channels:
             channel.verify()
         if self.kind is not SampleTimingType.ON_DEMAND:
@@ -263,9 +251,14 @@ class Task:
                 self.rig.require_terminal(awaited)
             if self.inputs:
                 check_memory(self.buffer_size, len(self.inputs))
-        self.timing.verify_reference()
-        if self.timing.reference is not None:
-            self.rig.require_terminal(self.timing.reference.terminal)
+        if (reference := self.timing.reference) is not None:
+            if self.timing.mode is not AcquisitionType.FINITE:
+                raise DaqmxRefusal(DAQmxErrors.REF_TRIG_WHEN_CONTINUOUS)
+            most = self.timing.samples - LEAST_PRETRIGGER
+            if not LEAST_PRETRIGGER <= reference.pretrigger <= most:
+                allowed = f"{LEAST_PRETRIGGER} to {most} of {self.timing.samples} samples"
+                raise unsupported_value("RefTrig_PretrigSamples", reference.pretrigger, allowed)
+            self.rig.require_terminal(reference.terminal)
 
     def _reserve(self) -> None:
         for device in self.devices:
@@ -278,7 +271,6 @@ class Task:
 
     def start(self) -> None:
         """Start, or wait for the trigger."""
-        self.require_channels()
         self.require_stopped()
         self._verify()
         if self.outputs and self.kind is not SampleTimingType.ON_DEMAND and not self.output_buffer.filled:
@@ -308,11 +300,11 @@ class Task:
     def _begin(self) -> None:
         if self.inputs:
             self.acquisition = self._acquire()
-            self.rig.run_acquisition(self.acquisition)
+            self.rig.run(self.acquisition)
             self._await_reference_edge()
         else:
             self.generation = self._generate()
-            self.rig.run_generation(self.generation)
+            self.rig.run(self.generation)
         self.rig.edge(self.start_terminal)
 
     def _acquire(self) -> Acquisition:
