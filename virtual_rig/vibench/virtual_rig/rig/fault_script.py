@@ -121,7 +121,7 @@ class RigFaults:
     def turn_amplifier_gain(self, gain_db: Annotated[float, Field(ge=-60, le=60)]) -> Heal:
         """Set the amplifier's gain to a value other than the configured one."""
         self._world.set_amplifier_gain_db(gain_db)
-        return self._until(self._world.restore_amplifier_gain)
+        return self._until(lambda: self._world.set_amplifier_gain_db(self._world.configured_gain_db))
 
     def widen_gaps(self, by_m: Annotated[float, Field(ge=-1e-4, le=1e-3)]) -> Heal:
         """Move the specimen's stops away from m1, or closer [m], as by a loose screw or wear."""

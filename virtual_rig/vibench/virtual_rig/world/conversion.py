@@ -1,7 +1,7 @@
 """A running conversion: from signals of the world to quantised samples of the configured inputs."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, floor
@@ -14,7 +14,7 @@ from vibench.sim.engine.run import native_engine
 
 from .sensors import IEPE_BIAS_V, NoiseStream
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
-from .wiring import Behind, Cable, Coupling, Input
+from .wiring import OPEN_INPUT, Behind, Cable, Coupling, Input
 
 # The converter's anti-alias filter computes samples at any lower rate from means over the world's steps. A
 # linear-phase windowed sinc (Kaiser window) limits the band, with a correction of the means' droop. Integer
@@ -161,31 +161,32 @@ def clip_v(range_v: float) -> float:
 class InputStage:
     """One input from its connector to the converter, computed together with the world."""
 
-    def __init__(self, configured: Input, cable: Cable, grid: TimeGrid = USUAL_GRID) -> None:
+    def __init__(self, configured: Input, cables: Mapping[str, Cable], grid: TimeGrid = USUAL_GRID) -> None:
+        """``cables`` are those of all inputs, by name; they may be replaced at any time."""
         self.configured = configured
-        self.cable = cable
-        self._offset_v, self._gain = _operating_point(configured, cable)
+        self._cables = cables
         self._clip_v = clip_v(configured.range_v)
         half_turn = np.pi * AC_CUT_HZ * grid.step_s
         self._capacitor = RecursiveFilter(
             np.array([1.0, -1.0]) / (1 + half_turn), [1.0, -(1 - half_turn) / (1 + half_turn)]
         )
 
-    def plug(self, cable: Cable) -> None:
-        """Replace the connection of the input."""
-        self.cable = cable
-        self._offset_v, self._gain = _operating_point(self.configured, cable)
+    @property
+    def cable(self) -> Cable:
+        """The present connection of the input."""
+        return self._cables.get(self.configured.physical_channel, OPEN_INPUT)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
         """Return volts at the converter, and whether they clip, for signals of shape (signals, steps)."""
+        offset_v, gain = _operating_point(self.configured, self.cable)
         signal = signals[self.cable.signal]
         match self.configured.coupling:
             case Coupling.AC:
                 # At the start of a conversion, the capacitor is already charged to the constant part.
-                volts = self._capacitor.run(signal * self._gain)
+                volts = self._capacitor.run(signal * gain)
             case Coupling.DC:
-                volts = signal * self._gain
-                volts += self._offset_v
+                volts = signal * gain
+                volts += offset_v
         clips = bool(np.abs(volts).max(initial=0.0) > self._clip_v)
         return np.clip(volts, -self._clip_v, self._clip_v) if clips else volts, clips
 
@@ -219,7 +220,10 @@ class ConverterInput:
     def __init__(
         self, stage: InputStage, steps_per_sample: float, start_step: int, noise_v: float, noise: NoiseStream
     ) -> None:
-        """Begin at a step of the world; ``noise_v`` is the rms noise of the converter, in its band."""
+        """Begin at a step of the world; ``noise_v`` is the rms noise of the converter, in its band.
+
+        The filter keeps the delay of the present cable.
+        """
         self.has_clipped = False
         self._stage = stage
         self._filter = decimator(steps_per_sample, start_step, stage.cable.delay_steps)
@@ -228,11 +232,6 @@ class ConverterInput:
         self._count_v = volts_per_count(stage.configured.range_v)
         self._means = np.empty(0)
         self._means_first_step = 0
-
-    def plug(self, physical_channel: str, cable: Cable) -> None:
-        """Replace the connection of this channel; the filter keeps its delay."""
-        if self._stage.configured.physical_channel == physical_channel:
-            self._stage.plug(cable)
 
     def begin(self, history: FloatArray, first_step: int) -> None:
         """Process the signals before the conversion; clipping in them is ignored."""
@@ -318,11 +317,6 @@ class Conversion:
         for channel in self._inputs:
             channel.has_clipped = False
         return clipped
-
-    def plug(self, physical_channel: str, cable: Cable) -> None:
-        """Replace the connection of one input from now on."""
-        for channel in self._inputs:
-            channel.plug(physical_channel, cable)
 
     def close(self) -> None:
         """Stop the conversion; allowed at any time."""

@@ -117,11 +117,6 @@ class LowPass:
     poles: tuple[complex, ...]
     """Poles in the left half plane, complex poles in conjugate pairs [rad/s]."""
 
-    @property
-    def delay_s(self) -> float:
-        """Group delay at zero hertz [s]."""
-        return float(-sum(1 / pole for pole in self.poles).real) if self.poles else 0.0
-
     def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the complex gain, with the shape of ``frequency_hz``."""
         s = 2j * np.pi * np.asarray(frequency_hz)

@@ -34,7 +34,7 @@ from .sensors import (
     SensorParts,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
-from .wiring import OPEN_INPUT, Cable, Input, Signal, amplifier_input, cables_of, signal_rows
+from .wiring import OPEN_INPUT, Input, Signal, amplifier_input, cables_of, signal_rows
 
 
 class AnalogueOutput:
@@ -83,39 +83,14 @@ class AnalogueOutput:
         touched = self._queue[: max(int(np.ceil(edges[-1])), 0)]
         integral = np.concatenate([[0.0], np.cumsum(touched)])
         means = np.diff(np.interp(edges, np.arange(len(integral)), integral)) * self._steps_per_sample
-        self._forget(int(max(edges[-1], 0.0) + _ROUNDING))
-        return np.asarray(means)
-
-    def _forget(self, played: int) -> None:
-        played = min(played, len(self._queue))
+        played = min(int(max(edges[-1], 0.0) + _ROUNDING), len(self._queue))
         self._queue = self._queue[played:]
         self._begin_step += played * self._steps_per_sample
+        return np.asarray(means)
 
 
 _ROUNDING = 1e-6
 """Tolerance in samples, for samples that end on a step."""
-
-
-class EventSchedule:
-    """Actions sorted by due step; actions of the same step keep their order."""
-
-    def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
-        self._grid = grid
-        self._due: list[tuple[int, int, Callable[[], None]]] = []
-        self._number = count()
-
-    def add(self, time_s: float, action: Callable[[], None]) -> None:
-        """Schedule ``action`` at a rig time; a past time means the next step."""
-        heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._number), action))
-
-    def run_due(self, step: int) -> None:
-        """Run all actions that are due at a step."""
-        while self._due and self._due[0][0] <= step:
-            heapq.heappop(self._due)[2]()
-
-    def stop_before(self, step: int) -> int:
-        """Return the step up to which the world may be computed: ``step``, or that of an earlier action."""
-        return min(step, self._due[0][0]) if self._due else step
 
 
 LOWEST_RATE_HZ = 500.0
@@ -184,7 +159,7 @@ class World:
         self._specimen = specimen or specimen_of(rig)
         self.plant = LoadedShaker(amplifier_of(rig), shaker_of(rig), self._specimen, step_s)
         self._terminal = terminal
-        self._gain_db = rig.amplifier.gain_db
+        self.configured_gain_db = rig.amplifier.gain_db
         self._amplifier_noise = noise("amplifier")
         self._amplifier_noise_v = grid.rms_per_step(virtual.amplifier_noise_v)
         self._noise = noise
@@ -197,7 +172,9 @@ class World:
         self._conversions: list[Conversion] = []
         slowest = history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz)
         self._history = np.zeros((len(self._rows), slowest + 2))
-        self._schedule = EventSchedule(grid)
+        self._due: list[tuple[int, int, Callable[[], None]]] = []
+        """Scheduled actions by due step; actions of the same step keep their order."""
+        self._scheduled = count()
         self._step = 0
         self._unspent_steps = 0.0
         self._last_end = np.zeros((1, len(MOTION_COLUMNS)))
@@ -221,7 +198,7 @@ class World:
     def at(self, time_s: float, action: Callable[[], None]) -> None:
         """Schedule an action at a rig time, rounded to steps; a past time means the next step."""
         with self._turn:
-            self._schedule.add(time_s, action)
+            heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._scheduled), action))
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Start a conversion now.
@@ -242,9 +219,7 @@ class World:
             ratio = round(ratio) if abs(ratio - round(ratio)) < PPM else ratio
             channels = tuple(
                 ConverterInput(
-                    InputStage(
-                        configured, self._cables.get(configured.physical_channel, OPEN_INPUT), self._grid
-                    ),
+                    InputStage(configured, self._cables, self._grid),
                     ratio,
                     self._step,
                     self._converter_noise_v,
@@ -254,7 +229,7 @@ class World:
             )
             for channel in channels:
                 channel.begin(self._history, self._step - self._history.shape[1])
-            conversion = Conversion(channels, ratio, self._step, self._go_on_to, self._end)
+            conversion = Conversion(channels, ratio, self._step, self._compute_to, self._end)
             self._conversions.append(conversion)
             return conversion
 
@@ -272,10 +247,6 @@ class World:
         """Set the amplifier's gain."""
         with self._turn:
             self.plant.gain = 10 ** (gain_db / 20)
-
-    def restore_amplifier_gain(self) -> None:
-        """Restore the amplifier's configured gain."""
-        self.set_amplifier_gain_db(self._gain_db)
 
     def widen_gaps(self, by_m: float) -> None:
         """Set both gaps to their initial size plus ``by_m`` [m]."""
@@ -300,16 +271,19 @@ class World:
 
     def connect(self, physical_channel: str) -> None:
         """Connect an input as described by the rig."""
-        self._plug(physical_channel, self._plan.get(physical_channel, OPEN_INPUT))
+        with self._turn:
+            self._cables[physical_channel] = self._plan.get(physical_channel, OPEN_INPUT)
 
     def disconnect(self, physical_channel: str) -> None:
         """Disconnect an input; it then measures zero, or the voltage of its own excitation."""
-        self._plug(physical_channel, OPEN_INPUT)
+        with self._turn:
+            self._cables[physical_channel] = OPEN_INPUT
 
     def reverse(self, physical_channel: str) -> None:
         """Swap the two wires of an input, which inverts its sign."""
         cable = self._plan.get(physical_channel, OPEN_INPUT)
-        self._plug(physical_channel, replace(cable, attenuation=-cable.attenuation))
+        with self._turn:
+            self._cables[physical_channel] = replace(cable, attenuation=-cable.attenuation)
 
     def keep_truth(self) -> None:
         """Start recording the true motion: 72 bytes per step, 7.4 MB per second."""
@@ -325,28 +299,20 @@ class World:
             kept, self._truth = self._truth or [], []
             return np.concatenate(kept) if kept else np.empty((0, len(MOTION_COLUMNS)))
 
-    def _plug(self, physical_channel: str, cable: Cable) -> None:
-        with self._turn:
-            self._cables[physical_channel] = cable
-            for conversion in self._conversions:
-                conversion.plug(physical_channel, cable)
-
     def _output(self, physical_channel: str) -> AnalogueOutput:
         return self._outputs.setdefault(physical_channel, AnalogueOutput(self._grid))
-
-    def _go_on_to(self, step: int) -> None:
-        with self._turn:
-            self._compute_to(step)
 
     def _end(self, conversion: Conversion) -> None:
         with self._turn:
             self._conversions = [other for other in self._conversions if other is not conversion]
 
     def _compute_to(self, step: int) -> None:
-        while self._step < step:
-            self._schedule.run_due(self._step)
-            stop = self._schedule.stop_before(step)
-            self._compute(min(stop - self._step, _STRETCH_STEPS))
+        with self._turn:
+            while self._step < step:
+                while self._due and self._due[0][0] <= self._step:
+                    heapq.heappop(self._due)[2]()
+                stop = min(step, self._due[0][0]) if self._due else step
+                self._compute(min(stop - self._step, _STRETCH_STEPS))
 
     def _compute(self, steps: int) -> None:
         first, step_s = self._step, self._grid.step_s
@@ -359,7 +325,7 @@ class World:
         signals[Signal.DRIVE] = drive
         self._move(first, signals)
         self._step = first + steps
-        self._remember(signals)
+        self._history = np.concatenate([self._history, signals], axis=1)[:, -self._history.shape[1] :]
         for conversion in self._conversions:
             conversion.take(signals, first)
 
@@ -414,14 +380,6 @@ class World:
                 pull += self._specimen.dampings[0] * (column["vx"] - velocity)
                 means = self._fixture_mass_kg * np.diff(velocity) / h - 0.5 * (pull[:-1] + pull[1:])
         return np.asarray(means)
-
-    def _remember(self, signals: FloatArray) -> None:
-        steps, kept = signals.shape[1], self._history.shape[1]
-        if steps >= kept:
-            self._history[:] = signals[:, -kept:]
-        else:
-            self._history[:, :-steps] = self._history[:, steps:]
-            self._history[:, -steps:] = signals
 
 
 _LOOP_ROLES = (Role.BASE_ACCELERATION, Role.M0_VELOCITY)
