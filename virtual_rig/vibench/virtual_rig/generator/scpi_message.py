@@ -131,7 +131,6 @@ BLOCK = ord("#")
 QUOTES = frozenset(b"\"'")
 LONGEST_MESSAGE = 1 << 22
 """Largest message in bytes (assumed); the longest useful one, a million-point waveform, has 2 MB."""
-WHITE_SPACE = frozenset(b" \t\r")
 DIGITS = frozenset(b"0123456789")
 
 
@@ -207,45 +206,32 @@ def units(message: bytes) -> list[Unit]:
     begin = 0
     starts_line = True
     for position, byte in [*_marks(message), (len(message), NEWLINE)]:
-        pieces.append(message[begin:position])
+        pieces.append(_trim(message[begin:position]))
         begin = position + 1
         if byte == COMMA:
             continue
-        unit = _unit(pieces, starts_line=starts_line)
-        pieces = []
-        if unit is not None:
-            found.append(unit)
+        if pieces != [b""]:
+            header, *first = pieces[0].split(maxsplit=1) or [b""]
+            parameters = (b"".join(first), *pieces[1:])
+            found.append(
+                Unit(
+                    header=header.decode("ascii", errors="replace").removesuffix("?"),
+                    asks=header.endswith(b"?"),
+                    parameters=() if parameters == (b"",) else parameters,
+                    starts_line=starts_line,
+                )
+            )
             starts_line = False
-        if byte == NEWLINE:
-            starts_line = True
+        pieces = []
+        starts_line |= byte == NEWLINE
     return found
 
 
-def _unit(pieces: list[bytes], *, starts_line: bool) -> Unit | None:
-    """Return header and parameters of the text between two separators."""
-    first = _trim(pieces[0])
-    if not first and len(pieces) == 1:
-        return None
-    header_end = next((i for i, byte in enumerate(first) if byte in WHITE_SPACE), len(first))
-    header = first[:header_end].decode("ascii", errors="replace")
-    parameters = [_trim(first[header_end:]), *(_trim(piece) for piece in pieces[1:])]
-    if parameters == [b""]:
-        parameters = []
-    return Unit(
-        header=header.removesuffix("?"),
-        asks=header.endswith("?"),
-        parameters=tuple(parameters),
-        starts_line=starts_line,
-    )
-
-
 def _trim(piece: bytes) -> bytes:
-    """Remove white space around a parameter, but no bytes of a block's data."""
+    """Remove white space around a header or parameter, but no bytes of a block's data."""
     piece = piece.lstrip(b" \t\r")
-    if piece.startswith(b"#"):
-        length = block_length(piece, 0) or len(piece)
-        return piece[: max(length, 1)] if length > 1 else piece.rstrip(b" \t\r")
-    return piece.rstrip(b" \t\r")
+    length = (block_length(piece, 0) or 0) if piece.startswith(b"#") else 0
+    return piece[:length] if length > 1 else piece.rstrip(b" \t\r")
 
 
 INFINITE = 9.9e37
