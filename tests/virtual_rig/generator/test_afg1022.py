@@ -118,10 +118,10 @@ def test_a_refused_command_queues_its_error_number_and_changes_nothing(command, 
     *before, last = command.split(";")
     device.execute(";".join(before).encode())
     assert errors(device) == []
-    settings = (device.settings(1), device.settings(2), device.memory.catalogue)
+    settings = (device.settings(1), device.settings(2), device.memory.names)
     device.execute((last if last.startswith((":", "*")) else ":" + last).encode())
     assert errors(device) == [code]
-    assert (device.settings(1), device.settings(2), device.memory.catalogue) == settings
+    assert (device.settings(1), device.settings(2), device.memory.names) == settings
 
 
 def test_the_peak_limit_is_10_v_open_and_5_v_into_50_ohm():

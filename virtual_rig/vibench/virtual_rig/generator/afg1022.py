@@ -219,7 +219,7 @@ def _whole_degrees(parameter: bytes) -> int:
 
 
 def _load_memory(generator: AFG1022, _: int, target: bytes, data: bytes) -> None:
-    generator.memory.load(scpi.memory_name(target), scpi.block(data))
+    generator.memory.store(scpi.memory_name(target), scpi.numbers(data, ">u2"))
     generator.memory_changed()
 
 
@@ -237,6 +237,12 @@ def _define_memory(generator: AFG1022, _: int, target: bytes, points: bytes) -> 
 def _copy_memory(generator: AFG1022, _: int, target: bytes, source: bytes) -> None:
     generator.memory.copy(scpi.memory_name(source), scpi.memory_name(target))
     generator.memory_changed()
+
+
+def _ask_catalogue(generator: AFG1022, _: int) -> bytes:
+    edit, *users = generator.memory.names
+    names = [edit, *sorted(users, key=lambda name: int(name.removeprefix("USER")))]
+    return ",".join(f'"{name}"' for name in names).encode("ascii")
 
 
 def load_command(header: str) -> Command:
@@ -321,8 +327,7 @@ COMMANDS = (
     Command("DATA:POINts", "IVI, drivers", query_takes=1,
         ask=lambda generator, _, name: b"%d" % len(generator.memory.codes(scpi.memory_name(name)))),
     Command("DATA:COPY", "IVI, drivers", _copy_memory, takes=2),
-    Command("DATA:CATalog", "IVI, drivers",
-        ask=lambda each, _: ",".join(f'"{name}"' for name in each.memory.catalogue).encode("ascii")),
+    Command("DATA:CATalog", "IVI, drivers", ask=_ask_catalogue),
 )
 """Commands of an AFG1022, except the common commands and `LOAD`."""
 # fmt: on

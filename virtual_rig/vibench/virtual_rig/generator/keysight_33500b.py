@@ -56,11 +56,10 @@ class Keysight33500B(AFG1022):
 
     def __init__(self, *arguments: object, **options: object) -> None:
         super().__init__(*arguments, **{"serial": DEFAULT_SERIAL, **options, "quirks": _QUIRKS})  # type: ignore[arg-type]
-        self.waveforms: dict[str, scpi.Codes] = {}
         self.selected = ""
 
     def _new_memory(self) -> scpi.ArbitraryMemory:
-        return scpi.ArbitraryMemory(POINTS[1], TOP_CODE)
+        return scpi.ArbitraryMemory(POINTS, TOP_CODE)
 
     def _power_on(self) -> ChannelSettings:
         return _Settings()
@@ -71,38 +70,28 @@ class Keysight33500B(AFG1022):
 
 
 def _name(parameter: bytes) -> str:
-    return scpi.text(parameter).strip('"').upper()
+    """Return the quoted name of a waveform, which no other memory has."""
+    bare = scpi.text(parameter).strip('"').upper()
+    return f'"{bare}"'
 
 
 def _write_dac(own: Keysight33500B, _: int, name: bytes, data: bytes) -> None:
     """Store a waveform from a binary block of 16-bit numbers."""
-    if _name(name) in own.waveforms:
-        raise scpi.ScpiError(scpi.ErrorCode.SETTINGS_CONFLICT)  # 786, "Specified arb waveform already exists"
-    packed, settings = scpi.block(data), own.settings(1)
+    settings = own.settings(1)
     assert isinstance(settings, _Settings)
-    if len(packed) % 2:
-        raise scpi.ScpiError(scpi.ErrorCode.INVALID_BLOCK_DATA)
-    codes = np.frombuffer(packed, dtype=">i2" if settings.order == "NORMal" else "<i2").astype(np.int32)
-    if not POINTS[0] <= codes.size <= POINTS[1] or np.any(np.abs(codes) > _MIDDLE):
-        raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
-    if sum(map(len, own.waveforms.values())) + codes.size > POINTS[1]:
+    codes = scpi.numbers(data, ">i2" if settings.order == "NORMal" else "<i2") + _MIDDLE
+    stored = own.memory.names[1:]
+    if _name(name) in stored:
+        raise scpi.ScpiError(scpi.ErrorCode.SETTINGS_CONFLICT)  # 786, "Specified arb waveform already exists"
+    if sum(own.memory.codes(each).size for each in stored) + codes.size > POINTS[1]:
         raise scpi.ScpiError(scpi.ErrorCode.OUT_OF_MEMORY)
-    own.waveforms[_name(name)] = (codes + _MIDDLE).astype(np.uint16)
-
-
-def _stored(own: Keysight33500B, parameter: bytes) -> str:
-    """Return the name of a stored waveform."""
-    name = _name(parameter)
-    if name not in own.waveforms:
-        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    return name
+    own.memory.store(_name(name), codes)
 
 
 def _select(own: Keysight33500B, channel: int, parameter: bytes) -> None:
-    name = _stored(own, parameter)
     rate_hz = _rate_hz(own, channel)
-    own.selected = name
-    own.memory.hold(own.waveforms[name])
+    own.memory.copy(_name(parameter), scpi.EDIT_MEMORY)
+    own.selected = _name(parameter)
     own.memory_changed()
     if own.settings(channel).shape == scpi.EDIT_MEMORY:
         _set_rate(own, channel, rate_hz)
@@ -111,17 +100,16 @@ def _select(own: Keysight33500B, channel: int, parameter: bytes) -> None:
 def _clear(own: Keysight33500B, channel: int) -> None:
     if own.settings(channel).shape == scpi.EDIT_MEMORY:
         own.configure(channel, replace(own.settings(channel), shape=SINE))
-    own.waveforms.clear()
+    own.memory.clear()
     own.selected = ""
 
 
 def _attribute(node: str, of: Callable[[scpi.Codes], float]) -> Command:
     """Return the query for a number that describes a stored waveform."""
-
-    def ask(own: Keysight33500B, _: int, name: bytes) -> bytes:
-        return scpi.as_number(of(own.waveforms[_stored(own, name)]))
-
-    return Command(f"[SOURce#:]DATA:ATTRibute:{node}", _GUIDE, ask=ask, query_takes=1)
+    return Command(
+        f"[SOURce#:]DATA:ATTRibute:{node}", _GUIDE, query_takes=1,
+        ask=lambda own, _, name: scpi.as_number(of(own.memory.codes(_name(name)))),
+    )  # fmt: skip
 
 
 def _rate_hz(own: Keysight33500B, channel: int) -> float:
@@ -155,7 +143,7 @@ _COMMANDS = (
     choice("[SOURce#:]FUNCtion", _GUIDE, ("SINusoid", "ARB"),
         lambda s: "ARB" if s.shape == scpi.EDIT_MEMORY else "SINusoid",
         lambda s, word: replace(s, shape=scpi.EDIT_MEMORY if word == "ARB" else SINE)),
-    Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, _: own.selected.encode()),
+    Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, _: own.selected.strip('"').encode()),
     Command("[SOURce#:]FUNCtion:ARBitrary:SRATe", _GUIDE, _write_rate,
         lambda own, channel: scpi.as_number(_rate_hz(own, channel))),
     choice("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, ("OFF", "STEP", "NORMal"),

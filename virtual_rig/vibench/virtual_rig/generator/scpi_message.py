@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -317,6 +318,14 @@ def block(parameter: bytes) -> bytes:
     return parameter[2 + int(parameter[1:2]) :]
 
 
+def numbers(parameter: bytes, order: str) -> NDArray[np.int32]:
+    """Return the 16-bit numbers of a binary block; ``order`` is their type for numpy, such as ``">u2"``."""
+    data = block(parameter)
+    if len(data) % 2:
+        raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
+    return np.frombuffer(data, dtype=order).astype(np.int32)
+
+
 def as_block(data: bytes) -> bytes:
     """Return data as a definite-length block."""
     count = str(len(data))
@@ -344,15 +353,23 @@ _POWER_ON_POINTS = 1000
 
 
 class ArbitraryMemory:
-    """Edit memory and user memories; stored waveforms are immutable."""
+    """Edit memory and further memories by name; stored waveforms are immutable."""
 
-    def __init__(self, most_points: int = MOST_POINTS, top_code: int = TOP_CODE) -> None:
+    def __init__(
+        self, points: tuple[int, int] = (FEWEST_POINTS, MOST_POINTS), top_code: int = TOP_CODE
+    ) -> None:
         self.top_code = top_code
-        self._most_points = most_points
-        self._waveforms: dict[str, Codes] = {EDIT_MEMORY: _blank(_POWER_ON_POINTS)}
+        self._points = points
+        self._waveforms: dict[str, Codes] = {}
+        self.define(_POWER_ON_POINTS)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all non-empty memories, the edit memory first."""
+        return tuple(self._waveforms)
 
     def codes(self, name: str) -> Codes:
-        """Return the codes of a memory; an empty user memory is refused with -224."""
+        """Return the codes of a memory; an empty memory is refused with -224."""
         try:
             return self._waveforms[name]
         except KeyError:
@@ -360,41 +377,29 @@ class ArbitraryMemory:
 
     def define(self, points: int) -> None:
         """Set the edit memory to ``points`` points at zero volts."""
-        self._store(EDIT_MEMORY, _blank(self._checked_length(points)))
+        self._check_length(points)
+        self.store(EDIT_MEMORY, np.full(points, _MIDDLE_CODE))
 
-    def load(self, name: str, data: bytes) -> None:
-        """Store big-endian 16-bit codes in a memory."""
-        if len(data) % 2:
-            raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
-        self._checked_length(len(data) // 2)
-        codes = np.frombuffer(data, dtype=">u2").astype(np.uint16)
-        if codes.max() > self.top_code:
+    def store(self, name: str, codes: NDArray[np.integer[Any]]) -> None:
+        """Store codes from 0 to ``top_code`` in a memory."""
+        self._check_length(codes.size)
+        if codes.min() < 0 or codes.max() > self.top_code:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-        self._store(name, codes)
+        self._waveforms[name] = codes.astype(np.uint16)
+        self._waveforms[name].flags.writeable = False
 
     def copy(self, source: str, target: str) -> None:
         """Copy a memory to another."""
         self._waveforms[target] = self.codes(source)
 
-    @property
-    def catalogue(self) -> tuple[str, ...]:
-        """Names of all non-empty memories, the edit memory first."""
-        users = [name for name in self._waveforms if name != EDIT_MEMORY]
-        return (EDIT_MEMORY, *sorted(users, key=lambda name: int(name.removeprefix("USER"))))
+    def clear(self) -> None:
+        """Empty all memories except the edit memory."""
+        self._waveforms = {EDIT_MEMORY: self._waveforms[EDIT_MEMORY]}
 
-    def hold(self, codes: Codes) -> None:
-        """Store codes in the edit memory, without checking their range."""
-        self._checked_length(len(codes))
-        self._store(EDIT_MEMORY, codes)
-
-    def _checked_length(self, points: int) -> int:
-        if not FEWEST_POINTS <= points <= self._most_points:
+    def _check_length(self, points: int) -> None:
+        fewest, most = self._points
+        if not fewest <= points <= most:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-        return points
-
-    def _store(self, name: str, codes: Codes) -> None:
-        codes.flags.writeable = False
-        self._waveforms[name] = codes
 
 
 def memory_name(parameter: bytes) -> str:
@@ -406,9 +411,3 @@ def memory_name(parameter: bytes) -> str:
     if word.startswith("USER") and number.isdigit() and int(number) < USER_MEMORIES:
         return f"USER{int(number)}"
     raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-
-
-def _blank(points: int) -> Codes:
-    codes = np.full(points, _MIDDLE_CODE, dtype=np.uint16)
-    codes.flags.writeable = False
-    return codes
