@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.scpi_message import TOP_CODE
 from vibench.virtual_rig.generator.terminal_voltage import Rectangle, Sine, Table, Triangle
 
-TABLE = Table(np.random.default_rng(5).integers(0, TOP_CODE + 1, 37).astype(np.uint16))
+TOP_CODE = 16_383
+TABLE = Table(np.random.default_rng(5).integers(0, TOP_CODE + 1, 37).astype(np.uint16), TOP_CODE)
 SHAPES = {
     "sine": Sine(),
     "square": Rectangle(),
@@ -48,7 +48,7 @@ def test_a_waveform_mean_over_whole_points_is_the_mean_of_its_codes(first, count
 
 
 def test_the_lowest_and_highest_codes_are_minus_one_and_plus_one():
-    table = Table(np.array([0, TOP_CODE], dtype=np.uint16))
+    table = Table(np.array([0, TOP_CODE], dtype=np.uint16), TOP_CODE)
     values = table.mean(np.array([0.1, 0.6]), np.zeros(2))
     assert values.tolist() == [-1.0, 1.0]
 

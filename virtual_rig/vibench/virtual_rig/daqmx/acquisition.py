@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from enum import Enum, auto
 
 import numpy as np
 from nidaqmx.constants import AcquisitionType, SampleTimingType
@@ -47,14 +46,6 @@ class Timing:
     def total(self) -> float:
         """Number of samples to acquire; infinite for a continuous task."""
         return self.samples if self.mode is AcquisitionType.FINITE else math.inf
-
-
-class Overflow(Enum):
-    """Handling of new samples when the buffer is full."""
-
-    GROW = auto()
-    LOSE = auto()
-    """The oldest samples are overwritten, as on the real device."""
 
 
 def check_memory(samples: int, channels: int) -> None:
@@ -109,9 +100,11 @@ class Acquisition(Stream):
         began_s: float,
         total: float,
         buffer_size: int,
-        overflow: Overflow,
-        reference: ReferenceTrigger | None = None,
+        reference: ReferenceTrigger | None,
+        *,
+        loses_samples: bool,
     ) -> None:
+        """``loses_samples``: whether new samples overwrite the oldest in a full buffer; if not, it grows."""
         super().__init__(rate_hz, began_s, total if reference is None else math.inf)
         self.position = 0
         """Number of samples read by the program."""
@@ -121,7 +114,7 @@ class Acquisition(Stream):
         self._sampler = sampler
         self._unread = SampleQueue(channels)
         self.buffer_size = max(1, buffer_size)
-        self._capacity = MOST_SAMPLES // channels if overflow is Overflow.GROW else self.buffer_size
+        self._capacity = self.buffer_size if loses_samples else MOST_SAMPLES // channels
         self._samples = total
         self._reference = reference
         self._is_open = True

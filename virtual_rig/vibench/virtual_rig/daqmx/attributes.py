@@ -120,9 +120,9 @@ def _output_range(device: Device) -> list[float]:
 
 def _start_terminal(task: Task) -> str:
     terminal = task.start_terminal
-    if task.is_on_chassis and task.state < TaskState.RESERVED:
-        code = DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING
-        raise DaqmxRefusal(code, f"Task Name: {task.name}\nReserve the task first.")
+    # A chassis assigns a timing engine only at reservation.
+    if any(device.chassis for device in task.devices) and task.state < TaskState.RESERVED:
+        raise task.refusal(DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING)
     return terminal
 
 
@@ -137,7 +137,7 @@ def _running_acquisition(task: Task) -> Acquisition:
         device = task.devices[0]
         raise not_supported("Read.OVERLOADED_CHANS_EXIST", f"Device: {device.name} ({device.product_type})")
     if task.acquisition is None:
-        raise DaqmxRefusal(DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING, f"Task Name: {task.name}")
+        raise task.refusal(DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING)
     return task.acquisition
 
 

@@ -26,7 +26,7 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .acquisition import Acquisition, Overflow, ReferenceTrigger, Stream
+from .acquisition import Acquisition, ReferenceTrigger, Stream
 from .channels import InputChannel, OutputChannel, channel_names
 from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
@@ -164,7 +164,7 @@ def _set_reference_trigger(task: Task, request: Any) -> None:
 def _set_logging(task: Task, request: Any) -> None:
     task.require_stopped()
     if task.outputs:
-        raise DaqmxRefusal(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS, f"Task Name: {task.name}")
+        raise task.refusal(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS)
     mode = member(LoggingMode, pick(request, "logging_mode"), "Logging_Mode")
     operation = member(LoggingOperation, pick(request, "operation"), "Logging_TDMS_Operation")
     if mode is LoggingMode.LOG:
@@ -279,7 +279,7 @@ class _Subscription:
             due_s = _BY_OTHERS  # a listener to a repeated buffer must not advance time
             if isinstance(stream, Acquisition):
                 due_s = stream.time_of(count)
-                if self._rig.pace.overflow is Overflow.GROW:
+                if not self._rig.pace.loses_samples:
                     self._wait(_BY_OTHERS, lambda: stream.position >= announced or self._is_over(stream))
             self._wait(due_s, lambda: stream.reaches(count) or self._is_over(stream))
             return stream.reaches(count) and not self._has_gone

@@ -45,7 +45,7 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
     """
     if not task.inputs:
         task.require_channels()
-        raise DaqmxRefusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
+        raise task.refusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK)
     check_memory(samples, len(task.inputs))
     has_to_start = not task.is_running
     if has_to_start:
@@ -111,14 +111,14 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
         return _nothing_in_time(task, wanted)
     acquisition = task.acquisition
     if acquisition is None:
-        raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_read=0)
+        raise task.refusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, samples_read=0)
     if not task.await_reference(deadline_s):
         return _nothing_in_time(task, wanted)
     first = acquisition.position
     count = int(min(wanted, max(0, acquisition.total - first)))
     status = 0 if count == wanted else int(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE)
     if status and not count:
-        raise DaqmxRefusal(status, f"Task Name: {task.name}", samples_read=0)
+        raise task.refusal(status, samples_read=0)
     blocks, taken = [], 0
     while taken < count:
         piece = min(count - taken, acquisition.buffer_size)
@@ -156,7 +156,7 @@ def _await(
     has_come = task.rig.pace.ask(task.rig, until_s, lambda: is_there() or has_ended(), deadline_s)
     if task.stream is not stream:
         transferred = "samples_read" if isinstance(stream, Acquisition) else "samples_written"
-        raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", **{transferred: 0})
+        raise task.refusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, **{transferred: 0})
     return has_come
 
 
@@ -180,18 +180,11 @@ def write(task: Task, volts: NDArray[np.float64], request: Any) -> Fields:
     return {"samps_per_chan_written": volts.shape[1]}
 
 
-def require_outputs(task: Task) -> None:
-    """Refuse to write to a task without outputs."""
-    if not task.outputs:
-        task.require_channels()
-        raise DaqmxRefusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
-
-
 def _write_on_demand(task: Task, volts: NDArray[np.float64], *, starts_task: bool) -> None:
     if not task.is_running:
         if not starts_task:
             code = DAQmxErrors.CANNOT_WRITE_WHEN_AUTO_START_FALSE_AND_TASK_NOT_RUNNING
-            raise DaqmxRefusal(code, f"Task Name: {task.name}", samples_written=0)
+            raise task.refusal(code, samples_written=0)
         task.start()
     for channel, row in zip(task.outputs, volts, strict=True):
         task.rig.world.silence(channel.physical)
@@ -222,8 +215,7 @@ def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) ->
             if generation.failure is not None:
                 raise generation.failure
             if not has_come:
-                code = DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN
-                raise DaqmxRefusal(code, f"Task Name: {task.name}", samples_written=written)
+                raise task.refusal(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN, samples_written=written)
         task.output_buffer.write(volts[:, written : written + piece])
         written += piece
 
@@ -285,7 +277,6 @@ def _read_raw(task: Task, request: Any) -> Fields:
 
 
 def _write(task: Task, request: Any) -> Fields:
-    require_outputs(task)
     values = np.array(request.write_array, dtype=np.float64)
     samples = request.num_samps_per_chan
     _check_size(task, values.size, samples)
@@ -295,7 +286,6 @@ def _write(task: Task, request: Any) -> Fields:
 
 
 def _write_waveforms(task: Task, request: Any) -> Fields:
-    require_outputs(task)
     rows = [np.array(waveform.y_data) for waveform in request.waveforms]
     if len({row.size for row in rows}) != 1:
         raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
@@ -311,6 +301,10 @@ def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
 
 
 def _check_size(task: Task, size: int, samples: int) -> None:
+    """Refuse to write to a task without outputs, or another number of values than its channels need."""
+    if not task.outputs:
+        task.require_channels()
+        raise task.refusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK)
     if size != samples * len(task.outputs):
         detail = (
             f"{size} values for {len(task.outputs)} channels of {samples} samples\nTask Name: {task.name}"

@@ -11,7 +11,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from vibench.acquisition import AcquisitionError
 
 from ..world.world import World
-from .acquisition import Acquisition, Overflow
+from .acquisition import Acquisition
 from .devices import Catalogue
 from .errors import DaqmxRefusal
 from .generation import Generation
@@ -158,7 +158,7 @@ def _wait(rig: "Rig", is_there: Callable[[], bool], deadline_s: float) -> bool:
 class OnDemandPace:
     """FREE: samples exist when requested. Nothing waits or is lost, and runs are reproducible bit for bit."""
 
-    overflow = Overflow.GROW
+    loses_samples = False
 
     def open(self, rig: "Rig") -> None:
         """Do nothing, because time advances only on request."""
@@ -190,7 +190,7 @@ class WallPace:
     If the world is computed too slowly, samples come late but stay correct.
     """
 
-    overflow = Overflow.LOSE
+    loses_samples = True
 
     def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
         """Follow ``clock`` [s], any monotonic clock."""

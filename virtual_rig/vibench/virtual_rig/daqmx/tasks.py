@@ -154,11 +154,6 @@ class Task:
         return self.state is TaskState.RUNNING
 
     @property
-    def is_on_chassis(self) -> bool:
-        """Whether the task uses a chassis, which assigns a timing engine only at reservation."""
-        return any(device.chassis for device in self.devices)
-
-    @property
     def _side_name(self) -> str:
         return "ai" if self.inputs else "ao"
 
@@ -196,16 +191,19 @@ class Task:
                 raise DaqmxRefusal(DAQmxErrors.INVALID_CHAN_NAME, f"Channel: {name}\nTask Name: {self.name}")
         return [by_name[name] for name in wanted]
 
+    def refusal(self, code: int, **transferred: int) -> DaqmxRefusal:
+        """Return the error for a call on this task; ``transferred`` is as in `DaqmxRefusal`."""
+        return DaqmxRefusal(code, f"Task Name: {self.name}", **transferred)
+
     def require_channels(self) -> None:
         """Refuse a task without channels (-200478)."""
         if not self.channels:
-            code = DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
-            raise DaqmxRefusal(code, f"Task Name: {self.name}")
+            raise self.refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK)
 
     def require_stopped(self) -> None:
         """Refuse changes of a running task (-200479)."""
         if self.is_running:
-            raise DaqmxRefusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING, f"Task Name: {self.name}")
+            raise self.refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING)
 
     def add(self, channel: Channel) -> None:
         """Add a channel; a task has one direction and, except on a chassis, one device."""
@@ -274,7 +272,7 @@ class Task:
         self.require_stopped()
         self._verify()
         if self.outputs and self.kind is not SampleTimingType.ON_DEMAND and not self.output_buffer.filled:
-            raise DaqmxRefusal(DAQmxErrors.OUTPUT_BUFFER_EMPTY, f"Task Name: {self.name}")
+            raise self.refusal(DAQmxErrors.OUTPUT_BUFFER_EMPTY)
         self._reserve()
         self.state = TaskState.RUNNING
         if self.kind is SampleTimingType.ON_DEMAND:
@@ -313,7 +311,7 @@ class Task:
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
-            self.buffer_size, self.rig.pace.overflow, self.timing.reference,
+            self.buffer_size, self.timing.reference, loses_samples=self.rig.pace.loses_samples,
         )  # fmt: skip
 
     def _await_reference_edge(self) -> None:
@@ -360,8 +358,7 @@ class Task:
         self.await_reference(deadline_s)
         until_s = self.stream.time_of(self.stream.total) if self.stream else math.inf
         if not self.rig.pace.ask(self.rig, until_s, self.is_done, deadline_s):
-            code = DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
-            raise DaqmxRefusal(code, f"Task Name: {self.name}")
+            raise self.refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE)
 
     def stop(self) -> None:
         """End the run and return to the state before the start; allowed in every state."""

@@ -56,6 +56,8 @@ class AFG1022(ScpiInstrument):
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
+    points, top_code = (2, 8192), 16383  # 14 bits (IVI; public drivers read them back)
+    defaults = ChannelSettings()
 
     def __init__(
         self,
@@ -68,20 +70,14 @@ class AFG1022(ScpiInstrument):
         identity = f"{self.maker},{self.model},{serial},{self.firmware}"
         super().__init__(clock, identity, quirks, self._table(quirks))
         self.serial = serial
-        self.memory = self._new_memory()
-        power_on = self._power_on()
-        self._channels: dict[int, ChannelSettings] = dict.fromkeys(range(1, CHANNELS + 1), power_on)
-        self._output = ChannelOutput(terminal, self.memory, power_on)
+        self.memory = scpi.ArbitraryMemory(self.points, self.top_code)
+        self._power_on = replace(self.defaults, declared_load_ohm=quirks.panel_load_ohm or 50.0)
+        self._channels = dict.fromkeys(range(1, CHANNELS + 1), self._power_on)
+        self._output = ChannelOutput(terminal, self.memory, self._power_on)
         self.frequencies_are_locked = False
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
         return (*COMMANDS, LOAD) if quirks.panel_load_ohm is None else COMMANDS
-
-    def _new_memory(self) -> scpi.ArbitraryMemory:
-        return scpi.ArbitraryMemory()
-
-    def _power_on(self) -> ChannelSettings:
-        return ChannelSettings(declared_load_ohm=self.quirks.panel_load_ohm or 50.0)
 
     def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
         """Return the mean voltage at channel 1's terminal over consecutive intervals.
@@ -133,7 +129,7 @@ class AFG1022(ScpiInstrument):
         """Restore the defaults, except a load that only the panel can set."""
         self.frequencies_are_locked = False
         for channel in self._channels:
-            self._replace(channel, self._power_on())
+            self._replace(channel, self._power_on)
 
     def trigger(self) -> None:
         """Start a waiting burst or sweep."""

@@ -176,7 +176,7 @@ class ChannelOutput(Timeline):
         The phase is continuous unless the start phase was changed. If noise is selected, the previous shape
         continues. The built-in DC shape stays at zero for any offset (AFG1062, drivers).
         """
-        at_s, own_s = self._when(now_s)
+        at_s, own_s = self.effective(now_s)
         latest, is_flat = self.latest, settings.shape == DC
         waits = settings.mode is RunMode.BURST
         waiting = Burst(math.inf, math.inf, settings.phase_deg / _DEGREES) if waits else None
@@ -195,7 +195,7 @@ class ChannelOutput(Timeline):
 
         A gated burst never starts, because nothing is connected to the gate input.
         """
-        at_s, own_s = self._when(now_s)
+        at_s, own_s = self.effective(now_s)
         latest = self.latest
         if settings.mode is RunMode.SWEEP:
             course = self._swept(settings, latest.course.phase(own_s), own_s, own_s)
@@ -210,14 +210,9 @@ class ChannelOutput(Timeline):
 
     def align(self, settings: ChannelSettings, now_s: float) -> None:
         """Set the phase to the start phase now."""
-        at_s, own_s = self._when(now_s)
+        at_s, own_s = self.effective(now_s)
         course = self._course(settings, settings.phase_deg / _DEGREES % 1.0, own_s)
         self.change(replace(self.latest, course=course), at_s)
-
-    def _when(self, now_s: float) -> tuple[float, float]:
-        """Return when a command acts, in rig time and in the generator's time."""
-        at_s = self.effective(now_s)
-        return at_s, self.own_time(at_s)
 
     def _course_after(
         self, previous: ChannelSettings, settings: ChannelSettings, own_s: float

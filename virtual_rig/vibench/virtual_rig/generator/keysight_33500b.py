@@ -24,10 +24,7 @@ from .channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
 from .phase_course import Spacing
 from .scpi_instrument import Command, Quirks, choice, number, setting
 
-TOP_CODE = 65_534
-"""Largest code; the codes -32767 to 32767 are shifted to start at zero."""
 _MIDDLE = 32_767
-POINTS = (8, 1_048_576)
 HIGHEST_RATE_HZ = 250e6
 MOST_BURST_CYCLES = 100_000_000
 SWEEP_S = 1e-3, 250_000.0
@@ -53,16 +50,12 @@ class Keysight33500B(AFG1022):
     """The generator; see `AFG1022`. Waveforms have names; sweeps have a duration, hold time and trigger."""
 
     maker, model, firmware = "Agilent Technologies", "33522B", "4.00-1.19-2.00-52-00"
+    points, top_code = (8, 1_048_576), 65_534  # the codes -32767 to 32767 are shifted to start at zero
+    defaults = _Settings()
 
     def __init__(self, *arguments: object, **options: object) -> None:
         super().__init__(*arguments, **{"serial": DEFAULT_SERIAL, **options, "quirks": _QUIRKS})  # type: ignore[arg-type]
         self.selected = ""
-
-    def _new_memory(self) -> scpi.ArbitraryMemory:
-        return scpi.ArbitraryMemory(POINTS, TOP_CODE)
-
-    def _power_on(self) -> ChannelSettings:
-        return _Settings()
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
         del quirks
@@ -83,7 +76,7 @@ def _write_dac(own: Keysight33500B, _: int, name: bytes, data: bytes) -> None:
     stored = own.memory.names[1:]
     if _name(name) in stored:
         raise scpi.ScpiError(scpi.ErrorCode.SETTINGS_CONFLICT)  # 786, "Specified arb waveform already exists"
-    if sum(own.memory.codes(each).size for each in stored) + codes.size > POINTS[1]:
+    if sum(own.memory.codes(each).size for each in stored) + codes.size > own.points[1]:
         raise scpi.ScpiError(scpi.ErrorCode.OUT_OF_MEMORY)
     own.memory.store(_name(name), codes)
 

@@ -341,10 +341,6 @@ def as_number(value: float) -> bytes:
 
 Codes = NDArray[np.uint16]
 
-FEWEST_POINTS = 2
-MOST_POINTS = 8192
-TOP_CODE = 16383
-"""Largest code of 14 bits (IVI driver tkafg1k of Tektronix; public drivers read it back)."""
 USER_MEMORIES = 256
 EDIT_MEMORY = "EMEM"
 _MIDDLE_CODE = 8191
@@ -355,9 +351,8 @@ _POWER_ON_POINTS = 1000
 class ArbitraryMemory:
     """Edit memory and further memories by name; stored waveforms are immutable."""
 
-    def __init__(
-        self, points: tuple[int, int] = (FEWEST_POINTS, MOST_POINTS), top_code: int = TOP_CODE
-    ) -> None:
+    def __init__(self, points: tuple[int, int], top_code: int) -> None:
+        """``points`` are the fewest and the most points of a waveform."""
         self.top_code = top_code
         self._points = points
         self._waveforms: dict[str, Codes] = {}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .phase_course import PhaseCourse, Samples, SteadyPhase
-from .scpi_message import TOP_CODE, Codes
+from .scpi_message import Codes
 
 # Periodic shapes between -1 and 1 and their exact mean over any range of phase, in cycles. A mean over a
 # range of length zero is the value at that phase.
@@ -87,7 +87,7 @@ class Table:
     """
 
     codes: Codes
-    top_code: int = TOP_CODE
+    top_code: int
     _sums: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -218,13 +218,13 @@ class Timeline:
         """Shift the generator's clock from the next rendered sample on."""
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
-    def effective(self, time_s: float) -> float:
-        """Return when a command from ``time_s`` acts, which is not before the end of the rendered part."""
-        return max(time_s, self._end_s, self._since_s[-1])
+    def effective(self, time_s: float) -> tuple[float, float]:
+        """Return when a command from ``time_s`` acts, in rig time and in the generator's own time.
 
-    def own_time(self, time_s: float) -> float:
-        """Return the generator's own time at a rig time."""
-        return float(self.terminal.own_time(np.asarray(time_s)))
+        It does not act before the end of the rendered part.
+        """
+        at_s = max(time_s, self._end_s, self._since_s[-1])
+        return at_s, float(self.terminal.own_time(np.asarray(at_s)))
 
     def change(self, signal: Signal, time_s: float) -> None:
         """Start a signal at a rig time returned by ``effective``."""

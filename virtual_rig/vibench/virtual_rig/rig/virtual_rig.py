@@ -89,7 +89,12 @@ class VirtualRig:
             lambda: self.world.time_s,
             serial=serial,
             quirks=quirks,
-            terminal=_terminal(rig, virtual),
+            terminal=Terminal(
+                load_ohm=rig.generator.connected_ohm,
+                clock_error_ppm=relative_clock_ppm(virtual.generator_clock_ppm, virtual.converter_clock_ppm),
+                noise_v_per_rt_hz=virtual.generator_noise_v / FULL_BAND_HZ**0.5,
+                seed=virtual.seed,
+            ),
         )
         self.controller = _controller(rig, lambda: self.world.time_s)
         """The controller of a fast loop; None without one."""
@@ -139,7 +144,16 @@ class VirtualRig:
         with ExitStack() as starting:
             plug_in(self._usb)
             starting.callback(unplug, self._usb)
-            daq = starting.enter_context(self._serve())
+            daq = starting.enter_context(
+                DaqServer(
+                    self.world,
+                    self._pace,
+                    self._address,
+                    catalogue=catalogue_with(self.rig.daq.product, self.rig.daq.device),
+                    handlers=(usb_service(self._usb),),
+                    token=self.token,
+                )
+            )
             socket = starting.enter_context(self._socket())
             controller = (
                 None if self.controller is None else starting.enter_context(ScpiSocket(self.controller))
@@ -163,16 +177,6 @@ class VirtualRig:
             raise ConfigurationError(
                 f"port {self._scpi_port} cannot be used ({error}); give another port, or 0 for a free port"
             ) from error
-
-    def _serve(self) -> DaqServer:
-        return DaqServer(
-            self.world,
-            self._pace,
-            self._address,
-            catalogue=catalogue_with(self.rig.daq.product, self.rig.daq.device),
-            handlers=(usb_service(self._usb),),
-            token=self.token,
-        )
 
     @property
     def _running_state(self) -> "_Running":
@@ -226,12 +230,3 @@ def _address(resource: str) -> tuple[tuple[int, int], str]:
             "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
         )
     return ids, fields[3]
-
-
-def _terminal(rig: Rig, virtual: VirtualConfig) -> Terminal:
-    return Terminal(
-        load_ohm=rig.generator.connected_ohm,
-        clock_error_ppm=relative_clock_ppm(virtual.generator_clock_ppm, virtual.converter_clock_ppm),
-        noise_v_per_rt_hz=virtual.generator_noise_v / FULL_BAND_HZ**0.5,
-        seed=virtual.seed,
-    )
