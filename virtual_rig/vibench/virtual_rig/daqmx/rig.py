@@ -68,32 +68,31 @@ class Rig:
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
-        """Advance rig time; if the world fails, end all running tasks and waiting calls."""
+        """Advance in slices: feed the outputs, acquire the inputs, then advance the rest.
+
+        If the world fails, all running tasks and waiting calls end.
+        """
+        reached_s = self.now_s
         try:
-            self._advance_to(until_s)
+            for acquisition in self._acquisitions:
+                acquisition.advance_to(reached_s)
+            while reached_s < until_s:
+                reached_s = min(until_s, reached_s + SLICE_S)
+                for generation in self._generations:
+                    generation.prepare(reached_s)
+                for acquisition in self._acquisitions:
+                    acquisition.advance_to(reached_s)
+                if self.now_s < reached_s:
+                    self.world.advance(reached_s - self.now_s)
+                for generation in self._generations:
+                    generation.advance_to(reached_s)
         except AcquisitionError as error:
             lost = DaqmxRefusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, str(error))
             for stream in (*self._acquisitions, *self._generations):
                 stream.failure = lost
-            self.changed.notify_all()
             raise lost from error
-
-    def _advance_to(self, until_s: float) -> None:
-        """Advance in slices: feed the outputs, acquire the inputs, then advance the rest."""
-        reached_s = self.now_s
-        for acquisition in self._acquisitions:
-            acquisition.advance_to(reached_s)
-        while reached_s < until_s:
-            reached_s = min(until_s, reached_s + SLICE_S)
-            for generation in self._generations:
-                generation.prepare(reached_s)
-            for acquisition in self._acquisitions:
-                acquisition.advance_to(reached_s)
-            if self.now_s < reached_s:
-                self.world.advance(reached_s - self.now_s)
-            for generation in self._generations:
-                generation.advance_to(reached_s)
-        self.changed.notify_all()
+        finally:
+            self.changed.notify_all()
 
     def run(self, stream: Acquisition | Generation) -> None:
         """Include a stream in the advance of time; it starts now."""

@@ -29,8 +29,6 @@ from ..generator.afg1022 import AFG1022
 from ..usb.usbtmc import UsbTmcInstrument
 from ..world.world import World
 
-DROPOUT_LEVEL = 0.0
-OVER_RANGE_LEVEL = 1.0
 Heal = Callable[[], None]
 """Function that ends one fault."""
 # Calls at which a program first accesses the device: setting a task's clock, and starting the task.
@@ -130,12 +128,12 @@ class RigFaults:
 
     def drop_laser(self, for_s: PositiveFloat) -> Heal:
         """Set the output of the m0 sensor to zero for a while, like a vibrometer without light."""
-        self._world.disturb_response(for_s, DROPOUT_LEVEL)
+        self._world.disturb_response(for_s, level=0.0)
         return nothing_to_heal
 
     def over_range(self, for_s: PositiveFloat) -> Heal:
         """Hold the sensor of m0 at full scale for a while."""
-        self._world.disturb_response(for_s, OVER_RANGE_LEVEL)
+        self._world.disturb_response(for_s, level=1.0)
         return nothing_to_heal
 
     def disconnect(self, channel: str) -> Heal:

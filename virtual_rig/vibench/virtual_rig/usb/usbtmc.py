@@ -80,12 +80,6 @@ _CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 0, 0, 0, 0, 0, 0, 0, 0x00, 0x0
 """Reply to GET_CAPABILITIES: USBTMC 1.0 without options, USB488 1.0 with 488.2, reserved bytes."""
 
 
-@dataclass(frozen=True)
-class _Request:
-    tag: int
-    length: int
-
-
 @dataclass
 class _Flight:
     """Pending data between host and instrument, lost when the cable or the instrument was out of order."""
@@ -95,7 +89,8 @@ class _Flight:
     reply: bytes = b""
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""
-    request: _Request | None = None
+    request: tuple[int, int] | None = None
+    """Tag and length of the request for a reply."""
     rest: bytes = b""
     """Remainder of a transfer that did not fit into the host's buffer."""
     aborting: bool = False
@@ -142,17 +137,16 @@ class UsbTmcInstrument:
         with self._lock:
             self._check_cable()
             if len(data) < HEADER.size:
-                _stall()
+                _fail(errno.EPIPE)
             message_id, tag, inverse, length, attributes, _ = HEADER.unpack_from(data)
             if tag == 0 or tag ^ inverse != BYTE:
-                _stall()
+                _fail(errno.EPIPE)
             if message_id == MessageId.OUT:
-                payload = data[HEADER.size : HEADER.size + length]
-                self._take(payload, attributes)
+                self._take(data[HEADER.size : HEADER.size + length], attributes)
             elif message_id == MessageId.REQUEST_IN:
-                self._flight.request = _Request(tag, length)
+                self._flight.request = tag, length
             else:
-                _stall()
+                _fail(errno.EPIPE)
 
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Return the requested reply (3.3), or time out.
@@ -168,15 +162,15 @@ class UsbTmcInstrument:
                 self._flight.aborting = False
                 return b""
             if self._flight.request is None:
-                _time_out()
+                _fail(errno.ETIMEDOUT)
             if not self._flight.reply:
                 self._device.report(ErrorCode.QUERY_UNTERMINATED)
-                _time_out()
+                _fail(errno.ETIMEDOUT)
             if self._flight.late_ms > timeout_ms and timeout_ms != NEVER_MS:
                 self._flight.late_ms -= timeout_ms
-                _time_out()
+                _fail(errno.ETIMEDOUT)
             self._flight.late_ms = 0.0
-            self._flight.rest = self._transfer(self._flight.request)
+            self._flight.rest = self._transfer(*self._flight.request)
             self._flight.request = None
             return self._hand_over(length)
 
@@ -185,7 +179,7 @@ class UsbTmcInstrument:
         with self._lock:
             self._check_cable()
             if setup.request not in _REQUESTS:
-                _stall()
+                _fail(errno.EPIPE)
             return _REQUESTS[setup.request](self, setup.value & BYTE)[: setup.length]
 
     # Internal functions
@@ -194,7 +188,7 @@ class UsbTmcInstrument:
         self._flight.message += payload
         if len(self._flight.message) > LONGEST_MESSAGE:
             self._flight.message = b""
-            _stall()
+            _fail(errno.EPIPE)
         if attributes & END_OF_MESSAGE:
             message, self._flight.message = self._flight.message, b""
             # Execute a message; an unread earlier reply is lost, with -410 (IEEE 488.2, 6.3.2.3).
@@ -205,16 +199,12 @@ class UsbTmcInstrument:
             reply = self._device.execute(message)
             self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
 
-    def _transfer(self, request: _Request) -> bytes:
+    def _transfer(self, tag: int, length: int) -> bytes:
         """Return a transfer with the requested part of the reply; the last part has the end bit."""
-        reply, end = self._flight.reply, request.length
-        payload, self._flight.reply = reply[:end], reply[end:]
+        payload, self._flight.reply = self._flight.reply[:length], self._flight.reply[length:]
         attributes = 0 if self._flight.reply else END_OF_MESSAGE
-        padding = bytes(-len(payload) % ALIGNMENT)
-        header = HEADER.pack(
-            MessageId.REQUEST_IN, request.tag, request.tag ^ BYTE, len(payload), attributes, 0
-        )
-        return header + payload + padding
+        header = HEADER.pack(MessageId.REQUEST_IN, tag, tag ^ BYTE, len(payload), attributes, 0)
+        return header + payload + bytes(-len(payload) % ALIGNMENT)
 
     def _hand_over(self, length: int) -> bytes:
         transfer, self._flight.rest = self._flight.rest[:length], self._flight.rest[length:]
@@ -222,7 +212,7 @@ class UsbTmcInstrument:
 
     def abort_bulk_in(self, tag: int) -> bytes:
         """Abort a transfer for which the host has stopped waiting; the reply stays pending."""
-        if self._flight.request is None or self._flight.request.tag != tag:
+        if self._flight.request is None or self._flight.request[0] != tag:
             return bytes([TRANSFER_NOT_IN_PROGRESS, 0])
         self._flight.request = None
         self._flight.rest = b""
@@ -231,17 +221,13 @@ class UsbTmcInstrument:
 
     def _check_cable(self) -> None:
         if not self._is_plugged_in:
-            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+            _fail(errno.ENODEV)
         if self._is_hung:
-            _time_out()
+            _fail(errno.ETIMEDOUT)
 
 
-def _stall() -> NoReturn:
-    raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
-
-
-def _time_out() -> NoReturn:
-    raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+def _fail(number: int) -> NoReturn:
+    raise OSError(number, os.strerror(number))  # a TimeoutError for ETIMEDOUT
 
 
 _REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
