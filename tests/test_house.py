@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_460,
+    "acquisition": 28_444,
     "analysis": 33_358,
-    "cli": 5_110,
-    "extensions": 2_680,
-    "gui": 12_160,
+    "cli": 5_108,
+    "extensions": 2_678,
+    "gui": 12_148,
     "native": 6_625,
-    "sim": 20_342,
+    "sim": 20_330,
     "studies": 3_226,
-    "virtual_rig": 7_547,
+    "virtual_rig": 7_059,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

@@ -79,7 +79,7 @@ ROOT = Path(__file__).parents[1]
 WRITING = ("write_text", "write_bytes", "savefig", "copyfile", "copytree")
 UNFINISHED = {"coming", "unfinished", "tmp"}
 """Names that a file has until it is whole."""
-UNFINISHED_FOR_CALLER = {"_wav.py", "_csv.py", "_uff.py", "_mat.py", "_facts_document.py"}
+UNFINISHED_FOR_CALLER = {"_wav.py", "_csv.py", "_uff.py", "_mat.py", "_excerpt.py"}
 """Writers of exports: `new_file` gives them the unfinished name."""
 NO_FILE_OF_A_USER = {
     "docs.py: shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)": "scratch",
@@ -90,7 +90,7 @@ NO_FILE_OF_A_USER = {
     "style.py: self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)": "memory",
     "screenshots.py: small.save(str(path), None, _SMALLEST_FILE)": "made again with the documents",
     "_file_store.py: path.open('xb')": "claims the name while the file is made",
-    "tasks.py: settings.path.write_bytes(b'')": "the laboratory's converter writes it, as the real one does",
+    "tasks.py: self._path.write_bytes(b'')": "the laboratory's converter writes it, as the real one does",
 }
 
 

@@ -18,8 +18,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.facts import require_intact
 from ..tables import Table, table, write_csv
 from ._csv import write_csv_samples
-from ._excerpt import Excerpt, TransferObserver, ignore_progress
-from ._facts_document import facts_path, write_facts
+from ._excerpt import Excerpt, TransferObserver, facts_path, ignore_progress, write_facts
 from ._mat import require_small, write_mat
 from ._nexus import write_nexus
 from ._uff import UniversalFunction, write_uff, write_uff_functions, write_uff_scan

@@ -22,8 +22,7 @@ from vibench.acquisition.recording import ChannelHeader
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._alignment import stated_times
-from ._excerpt import Excerpt, TransferObserver, ignore_progress
-from ._facts_document import facts_document
+from ._excerpt import Excerpt, TransferObserver, facts_document, ignore_progress
 from ._hdf5_source import Hdf5Source, open_hdf5_source
 from ._source_channel import MOST_CHANNELS, SourceChannel, TableSource, exact_step, scale_among, unit_among
 
