@@ -108,7 +108,7 @@ def test_the_claims_report_begins_with_counts_and_has_a_card_per_section(found, 
     score, levels = score_figure(found.scores), score_figure(found.scores)
     path = write_page(reproduction_page(found, levels, score), tmp_path / "report.html")
     page = Page(path.read_text(encoding="utf-8"))
-    assert page.headings == ["claims on", "result", "agreement", "what to look at"]
+    assert page.headings == ["claims on", "result", "agreement", "figure and remarks"]
     assert page.findings.startswith("Of 3 claims 1 hold under the defaults, 0 for a share of starts, 1 under")
     assert page.findings.endswith("Claims that do not hold: third.")
     assert "Synthetic 1 of 3 claims hold under the defaults. no second, third" in page.visible

@@ -25,12 +25,12 @@ def card(name, text="words"):
 @pytest.mark.parametrize("number", [0, 1, MOST_OPEN_CARDS, MOST_OPEN_CARDS + 1, 60])
 def test_every_result_card_has_a_table_row_and_many_cards_are_folded(number, tmp_path):
     page = Read(written(tmp_path, tuple(card(f"c{each}", "result " * 20) for each in range(number))))
-    rows = page.visible.split("what to look at")[1].split("One by one")[0]
+    rows = page.visible.split("figure and remarks")[1].split("Individual results")[0]
     assert rows.count("cannot tell") == number
     assert [each for each in page.ids if each.startswith("card-")] == [
         f"card-{each}" for each in range(1, number + 1)
     ]
-    shown = page.visible.split("One by one")[1].count("result")
+    shown = page.visible.split("Individual results")[1].count("result")
     assert shown == (0 if number > MOST_OPEN_CARDS else 100 * number)
 
 

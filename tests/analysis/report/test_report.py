@@ -73,9 +73,9 @@ def test_a_report_contains_the_numbers_of_its_results(page, campaign):
 def test_a_report_begins_with_findings_figure_and_table_before_cards(page, campaign):
     order = ["findings", "figure-1", "cards", "card-1", "figure-2", "further", "details"]
     assert [each for each in page.ids if each in order] == order
-    assert page.headings == ["recording", "result", "agreement", "what to look at"]
+    assert page.headings == ["recording", "result", "agreement", "figure and remarks"]
     names = [each.analysis.facts.name for each in campaign.in_order]
-    rows = page.visible.split("what to look at")[1].split("One by one")[0]
+    rows = page.visible.split("figure and remarks")[1].split("Individual results")[0]
     places = [rows.index(f" {name} ") for name in (*names, "stopped.h5")]
     assert places == sorted(places)
     assert 10 < len(page.findings.split()) <= 120
@@ -129,7 +129,7 @@ def test_important_warnings_are_at_the_top_and_minor_ones_at_their_recording(dwe
         checks = (Check(what, Verdict.WARNING, "look at it"),)
         results = CampaignResults("one", (Result(replace(analysis, checks=checks), None),), ())
         page = Page(write_report(results, tmp_path / "one.html").read_text(encoding="utf-8"))
-        assert ("To know before reading on" in page.visible) is is_first
+        assert ("Read these warnings first" in page.visible) is is_first
         assert f"{what}: look at it" in page.visible
         assert f"Figure 1; not simulated; {what.lower()}" in page.visible
 
