@@ -17,15 +17,15 @@ def test_an_enum_member_and_its_value_as_text_are_equivalent():
     [
         (
             lambda folder: run_campaign(None, None, folder, existing="keep"),
-            "'keep' is no ExistingRecordings; ",
+            "'keep' is not a value of ExistingRecordings; ",
         ),
         (
             lambda folder: run_campaign(None, None, folder, after_failure="sulk"),
-            "'sulk' is no AfterFailure; ",
+            "'sulk' is not a value of AfterFailure; ",
         ),
         (
             lambda folder: list_recordings(folder, "some"),
-            "'some' is not a Refresh; give one of 'changed', 'all'",
+            "'some' is not a value of Refresh; give one of 'changed', 'all'",
         ),
     ],
 )

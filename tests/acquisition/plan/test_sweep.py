@@ -176,7 +176,7 @@ POINT = {"frequency_hz": [200], "amplitude_vpp": [1]}
         ({"frequency_hz": by(300, 200, 1)}, "is not above start"),
         ({"frequency_hz": [200]}, "line-200hz: excitation.dwell.amplitude_vpp is missing"),
         ({"frequency_hz": [200], "amplitude_vpp": [5000]}, "less than or equal to 1000"),
-        ({**POINT, "order": ["frequency_hz"]}, "leaves out 'amplitude_vpp'"),
+        ({**POINT, "order": ["frequency_hz"]}, "lacks 'amplitude_vpp'"),
         ({**POINT, "continue_from_previous": "amplitude_vpp"}, "must be the innermost axis"),
         ({**POINT, "continue_from_previous": "repetition"}, "is not an axis for a chain"),
         ({**POINT, "direction": ["up"]}, "has no meaning for the excitation 'dwell'"),

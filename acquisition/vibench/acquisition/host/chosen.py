@@ -22,7 +22,7 @@ def chosen(kind: type[Choice], given: Choice | str) -> Choice:
         return kind(given)
     except ValueError as unknown:
         raise ConfigurationError(
-            f"{given!r} is not a {kind.__name__}; give one of {', '.join(map(repr, map(str, kind)))}"
+            f"{given!r} is not a value of {kind.__name__}; give one of {', '.join(map(repr, map(str, kind)))}"
         ) from unknown
 
 
