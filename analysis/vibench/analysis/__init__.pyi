@@ -28,12 +28,8 @@ from .frequency_response.request import (
 from .frequency_response.resonance import resonances as resonances
 from .frequency_response.results import Estimator as Estimator, FrequencyResponse as FrequencyResponse
 from .frequency_response.transmissibility import transmissibility as transmissibility
-from .overlay.draws import DRAWS as DRAWS
-from .overlay.ensemble import (
-    FEWEST_DRAWS as FEWEST_DRAWS,
-    MOST_DRAWS as MOST_DRAWS,
-    CurveDifference as CurveDifference,
-)
+from .overlay.draws import DRAWS as DRAWS, MOST_DRAWS as MOST_DRAWS
+from .overlay.ensemble import FEWEST_DRAWS as FEWEST_DRAWS, CurveDifference as CurveDifference
 from .overlay.measurement_prediction import (
     MeasurementPrediction as MeasurementPrediction,
     predict_measurement as predict_measurement,

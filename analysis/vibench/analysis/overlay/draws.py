@@ -259,8 +259,8 @@ class PlayedVoltage:
         return result.ravel()[hop : hop + self._samples]
 
 
-DRAWS = 16
-"""Number of draws of a colliding motion; they determine its 95 % band to a fifth of its width."""
+DRAWS, MOST_DRAWS = 16, 1000
+"""Usual and largest number of draws of a colliding motion; 16 determine the 95 % band to a fifth."""
 FIRST_DRAWS = 8
 """Number of draws made first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4

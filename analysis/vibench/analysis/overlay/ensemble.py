@@ -20,8 +20,8 @@ AGREEMENT = 0.99
 BAND = 0.95
 MIXED = -1
 """State of a value that mixes two kinds of motion; it is not compared."""
-FEWEST_DRAWS, MOST_DRAWS = 5, 1000
-"""Minimum number of draws with the measured kind of motion for a comparison, and maximum of a request."""
+FEWEST_DRAWS = 5
+"""Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
 """Share of the normal limit; if all values are within it after half of the draws, more change nothing."""
 _FEWEST_POINTS = 30

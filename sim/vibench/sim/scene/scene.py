@@ -89,8 +89,8 @@ class Target(Strict):
         if self.error is None and self.time_s is None:
             msg = "A target without error and time is not allowed: give one of them, or both."
             raise ValueError(msg)
-        if self.error is not None and not 0.0 < self.error <= 1.0:
-            msg = f"Error {self.error} is not allowed: it must be above 0 and at most 1, which is 100 %."
+        if self.error is not None and not 0.0 < self.error < 1.0:
+            msg = f"Error {self.error} is not allowed: it must be above 0 and below 1, which is 100 %."
             raise ValueError(msg)
         if self.time_s is not None:
             require_positive("Time", self.time_s, "s")
