@@ -99,7 +99,7 @@ class BranchRequest(SpecimenChoice):
             )
         if self.error is not None and self.method is BranchMethod.FIRST_ORDER:
             raise ValueError(
-                f"an error of {self.error:g} was given, but the error of one harmonic cannot be chosen; use "
+                f"an error of {self.error:g} was given, but the error of one harmonic is fixed; use "
                 "the method balance or shooting, or leave out the error"
             )
         self._refuse_other_resonances()

@@ -184,12 +184,12 @@ class ExponentSpectrum(Labelled):
         """Return a sentence on the points, the check of their sums, and the cost."""
         chaotic = sum(each.verdict == "chaotic" for each in self.points)
         if not self.request.is_elastic:
-            check = "the contact dissipates energy, so the dampers alone do not set the sum of exponents"
+            check = "the contact dissipates energy, so sums of exponents are not checked against the dampers"
         elif not math.isfinite(self.largest_sum_difference):
             check = "without damping, sums of exponents cannot be checked"
         else:
-            check = f"sums of exponents differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
-            check += f"at most {self.largest_sum_difference:.1g} of this value"
+            check = f"sums of exponents differ from the damping rate {self.points[0].dampers_per_s:.6g} 1/s "
+            check += f"by at most {self.largest_sum_difference:.1g} of this value"
         return f"{len(self.points)} points in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
 
 

@@ -116,7 +116,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
     upper, lower = view.picture.plots(Parameter.FREQUENCY)
     assert len(lines(upper)) == 12  # six exponents, each with the band of its interval
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
-    assert "2 chaotic; sums of exponents differ from the dampers'" in view.summary
+    assert "2 chaotic; sums of exponents differ from the damping rate" in view.summary
     assert not view._compare.isEnabled()
 
 
