@@ -162,7 +162,7 @@ def test_a_crate_names_missing_recordings_of_its_campaign(vibench_here, folder):
     (folder / "tone.h5").unlink()
     found, names, graph = packed(vibench_here, folder)
     assert found.returncode == 1
-    assert "error: tone.h5 cannot be trusted (missing: the campaign recorded tone in it)" in found.stderr
+    assert "error: tone.h5 cannot be trusted (missing: the campaign recorded tone here)" in found.stderr
     assert "tone.h5" not in {*names, *graph}
     assert "tone.h5 cannot be trusted (missing" in graph["./"]["description"]
 

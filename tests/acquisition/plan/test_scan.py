@@ -51,8 +51,8 @@ def test_the_shipped_scan_visits_all_three_masses():
 @pytest.mark.parametrize(
     ("points", "sentence"),
     [
-        ([point("top"), point("Top")], r"two points have the name 'top'; give each another name"),
-        ([point("top"), point("foot", node=1)], r"two points have the node '1'; give each another node"),
+        ([point("top"), point("Top")], r"two points have the name 'top'; each name must be unique"),
+        ([point("top"), point("foot", node=1)], r"two points have the node '1'; each node must be unique"),
         ([{"name": "top", "body": "m0"}], r"scan\.0\.x_m, scan\.0\.y_m, scan\.0\.z_m are missing"),
         ([point("top", "m3")], r"scan\.0\.body.*'m3': input should be 'm0', 'm1' or 'm2'"),
         ([point("top", x_m=float("nan"))], r"scan\.0\.x_m.*finite"),

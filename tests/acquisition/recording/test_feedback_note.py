@@ -100,7 +100,7 @@ def test_other_events_and_truncated_notes_are_ignored():
 @pytest.mark.parametrize("more", ['"version": 2, ', '"version": 2, "bandwidth_hz": 0.1, '])
 def test_a_note_of_an_unknown_version_is_refused_with_that_version(more):
     with pytest.raises(
-        RecordingError, match=r"'level' at sample 512, of version 2, .* version 1\); read .* h5py"
+        RecordingError, match=r"'level' at sample 512 \(version 2\) .* version 1\); read .* h5py"
     ):
         read("level", LEVEL.replace("{", "{" + more))
 

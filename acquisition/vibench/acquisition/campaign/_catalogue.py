@@ -376,5 +376,5 @@ def _verify(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> Ve
 
 def _missing(path: Path, root: Path, point: JournalPoint) -> VerifiedRecording:
     return VerifiedRecording(
-        place_below(root, path), MISSING, f"the campaign recorded {point.name} in it", point.seal, {}
+        place_below(root, path), MISSING, f"the campaign recorded {point.name} here", point.seal, {}
     )

@@ -94,10 +94,10 @@ class GeneratorModel:
         self.check_frequency(Shape.SINE, sweep.start_hz)
         self.check_frequency(Shape.SINE, sweep.stop_hz)
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
-            most = f"sweeps at most {self.longest_sweep_s:g} s" if self.longest_sweep_s else "has no sweep"
+            most = f"at most {self.longest_sweep_s:g} s" if self.longest_sweep_s else "none"
             raise LimitExceeded(
-                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} {most} "
-                "by itself. Nothing was sent; use sine_sweep, which steps the frequency"
+                f"a sweep of {sweep.duration_s:g} s was requested; internal sweeps of the {self.name}: "
+                f"{most}. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
     def codes(self, waveform: Samples) -> ArbitraryCodes:
@@ -223,7 +223,7 @@ class NoGenerator:
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Refuse: the description of the generator has no internal sweep."""
-        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp needs a generator; here is {self.name}")
+        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp: this bench has {self.name} to play it")
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Accept the command, or refuse it."""

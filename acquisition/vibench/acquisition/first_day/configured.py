@@ -54,7 +54,7 @@ class Question:
 QUESTIONS = (
     Question("name", "What is the bench called?"),
     Question("generator.resource", "Which of these is the function generator?", Found.GENERATORS),
-    Question("generator.settle_s", "Waiting time after each message to it [s]? 0.1 is safe"),
+    Question("generator.settle_s", "Waiting time after each message to the generator [s]? 0.1 is safe"),
     Question("generator.amplitude_limit_vpp", "Largest amplitude that you allow on this bench [Vpp]?"),
     Question("daq.device", "Which of these is the converter?", Found.CONVERTERS),
     Question("daq.sample_rate_hz", "How many samples a second?"),

@@ -104,7 +104,7 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     if not found:
         raise ConfigurationError(
             missing_package(name)
-            or f"{name!r} is not installed in {kind.value}: {', '.join(plug_in_names(kind))} are. Correct "
+            or f"{name!r} is not in {kind.value}; installed are {', '.join(plug_in_names(kind))}. Correct "
             "the driver in the hardware configuration, or install the package that provides it"
         )
     if len(found) > 1:
@@ -145,7 +145,7 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
 
 _SILENCING = {"stop", "close", "silence"}
 _ADVICE = (
-    "Correct its package and run its contract tests (docs/instruments.md), or set another driver in the "
+    "Correct the plug-in and run its contract tests (docs/instruments.md), or set another driver in the "
     "hardware configuration"
 )
 

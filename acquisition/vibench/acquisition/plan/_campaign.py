@@ -89,7 +89,7 @@ class Campaign(FrozenModel):
             values = [str(getattr(each, what)).lower() for each in self._numbered_scan()]
             twice = next((value for value in values if values.count(value) > 1), None)
             if twice is not None:
-                raise ValueError(f"scan: two points have the {what} {twice!r}; give each another {what}")
+                raise ValueError(f"scan: two points have the {what} {twice!r}; each {what} must be unique")
         if self.scan and any(each.point is not None for each in self.measurements):
             raise ValueError("a measurement of a scan cannot have a point; list the point under [[scan]]")
         return self

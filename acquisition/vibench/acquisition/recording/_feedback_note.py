@@ -407,6 +407,6 @@ def feedback_note(event: Event) -> FeedbackNote | None:
     except ValidationError as error:
         version = numbers.get("version", VERSION)
         raise RecordingError(
-            f"the note {event.kind!r} at sample {event.sample}, of version {version}, is not one that this "
-            f"vibench can read (it knows version {VERSION}); read the samples with h5py, or update vibench"
+            f"the note {event.kind!r} at sample {event.sample} (version {version}) cannot be read by this "
+            f"vibench (it reads version {VERSION}); read the samples with h5py, or update vibench"
         ) from error

@@ -117,7 +117,7 @@ def seal_key(path: Path | None = None) -> SealKey | None:
     except OSError as error:
         raise RecordingError(
             f"The key {named} for seals cannot be read ({error.strerror}). Nothing was done; give the file"
-            f" that holds it (--key, or the variable {KEY_VARIABLE}), or none."
+            f" of the key (--key, or the variable {KEY_VARIABLE}), or no key."
         ) from error
     if len(secret) < SHORTEST_KEY:
         raise RecordingError(

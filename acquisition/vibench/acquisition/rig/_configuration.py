@@ -89,8 +89,8 @@ class VirtualConfig(FrozenModel):
         if not COARSEST_GRID_RATE_HZ <= rate_hz <= USUAL_GRID_RATE_HZ:
             raise ValueError(
                 f"the virtual rig needs {COARSEST_GRID_RATE_HZ:g} to {USUAL_GRID_RATE_HZ:g} steps a second: "
-                f"with fewer, the base would move by more than "
-                f"{level_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.1%} too little at {WATCHED_HZ:g} Hz; give "
+                f"with fewer, the base motion would be more than "
+                f"{level_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.1%} too small at {WATCHED_HZ:g} Hz; give "
                 "a rate in this range, or leave it out"
             )
         return rate_hz
