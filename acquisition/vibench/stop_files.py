@@ -2,8 +2,9 @@
 
 A file ``PID.START.stop-LEVEL`` in the folder of engines stops the process with number PID and start time
 START. The program renames the file to ``.taken-LEVEL`` when it obeys, updates its time while it ramps down,
-and removes it when its output has been read back as off. This module imports only a small part of the
-standard library, so that `vibench stop` starts without delay.
+and renames it to ``.silent-LEVEL`` when its output has been read back as off. A missing file confirms
+nothing: somebody may have emptied the folder. This module imports only a small part of the standard library,
+so that `vibench stop` starts without delay.
 """
 
 import os
@@ -35,9 +36,9 @@ def stop_path(folder: str, pid: int | str, start: str, level: str) -> str:
     return os.path.join(folder, f"{pid}.{start}.stop-{level}")  # noqa: PTH118 - pathlib takes 8 ms to load
 
 
-def taken_path(stop: str) -> str:
-    """Return the path of a stop file after the program has accepted the stop."""
-    return ".taken-".join(stop.rsplit(".stop-", 1))
+def answer_path(stop: str, answer: str) -> str:
+    """Return the path of a stop file after the ``answer`` of the program, ``"taken"`` or ``"silent"``."""
+    return f".{answer}-".join(stop.rsplit(".stop-", 1))
 
 
 def write_stop_file(stop: str, reason: str) -> None:
@@ -60,17 +61,19 @@ def write_stop_file(stop: str, reason: str) -> None:
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
     """Return the result of a stop, after waiting until the program has obeyed it or failed to."""
-    give_up_s = time.monotonic() + TAKEN_S
+    written_ns, give_up_s = _changed_ns(stop) or 0, time.monotonic() + TAKEN_S
     while _changed_ns(stop) is not None:
         if time.monotonic() > give_up_s:
             return Fate.NOT_TAKEN
         time.sleep(LOOK_S)
-    taken, seen_ns = taken_path(stop), 0
-    while (changed_ns := _changed_ns(taken)) is not None:
-        if changed_ns != seen_ns:
+    taken, silent, seen_ns = answer_path(stop, "taken"), answer_path(stop, "silent"), 0
+    give_up_s = time.monotonic() + HEEDED_S
+    # An older confirmation is that of an earlier stop.
+    while (_changed_ns(silent) or -1) < written_ns:
+        if (changed_ns := _changed_ns(taken) or seen_ns) != seen_ns:
             seen_ns, give_up_s = changed_ns, time.monotonic() + HEEDED_S
         if time.monotonic() > give_up_s or not is_alive():
-            return Fate.SILENT if _changed_ns(taken) is None else Fate.UNCONFIRMED
+            return Fate.SILENT if (_changed_ns(silent) or -1) >= written_ns else Fate.UNCONFIRMED
         time.sleep(LOOK_S)
     return Fate.SILENT
 

@@ -8,7 +8,8 @@ complete command.
 import gc
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 from vibench.stop_files import SWITCH_OFF, Fate, fate_of, stop_path, write_stop_file
 
@@ -18,7 +19,7 @@ LEVELS = ("ramp", "abort", "off")
 class RunningProgram:
     """Program announced by a file whose name contains process id and start time."""
 
-    def __init__(self, path: str, pid: str, start: str, *, is_alive: bool) -> None:
+    def __init__(self, path: str, pid: str, start: str, is_alive: Callable[[], bool]) -> None:
         self.path = path
         self.pid = pid
         self.start = start
@@ -72,21 +73,26 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
     """Stop the selected programs and return the exit code; None if the complete command is needed."""
     try:
         programs = [each for each in running_programs() if pid in ("", each.pid)]
-        living = [each for each in programs if each.is_alive]
+        living = [each for each in programs if each.is_alive()]
         stops = [stop_path(os.path.dirname(each.path), each.pid, each.start, level) for each in living]  # noqa: PTH120
         for stop in stops:
             write_stop_file(stop, reason)
     except OSError:
         return None
-    if not programs or any(fate_of(stop) is not Fate.SILENT for stop in stops):
+    fates = [fate_of(stop, each.is_alive) for each, stop in zip(living, stops, strict=True)]
+    if not programs or any(
+        fate is Fate.NOT_TAKEN and each.is_alive() for each, fate in zip(living, fates, strict=True)
+    ):
         return None
-    for each in living:
-        print(f"{each.name()}: has carried out the stop ({level}); its output is off.")  # noqa: T201
-    killed = [each for each in programs if not each.is_alive]
-    for each in killed:
-        print(f"error: {each.name()}, was killed. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201
-        os.unlink(each.path)  # noqa: PTH108 - the caller of the stop was informed
-    return 1 if killed else 0
+    for each, fate in zip(living, fates, strict=True):
+        if fate is Fate.SILENT:
+            print(f"{each.name()}: has carried out the stop ({level}); its output is off.")  # noqa: T201
+    unconfirmed = [each for each in programs if each not in living]
+    unconfirmed += [each for each, fate in zip(living, fates, strict=True) if fate is not Fate.SILENT]
+    for each in unconfirmed:
+        what = "has not confirmed" if each.is_alive() else "ended without confirming"
+        print(f"error: {each.name()}, {what} that its output is off. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201
+    return 1 if unconfirmed else 0
 
 
 def running_programs() -> Iterator[RunningProgram]:
@@ -104,9 +110,9 @@ def running_programs() -> Iterator[RunningProgram]:
             if _is_locked(path):
                 raise OSError("on another computer")
         elif place[1] == space:
-            yield RunningProgram(path, pid, start, is_alive=place[2] == _start_of(pid))
+            yield RunningProgram(path, pid, start, partial(_is_process, pid, place[2]))
         elif _is_locked(path):  # in a container on this computer
-            yield RunningProgram(path, pid, start, is_alive=True)
+            yield RunningProgram(path, pid, start, partial(_is_locked, path))
 
 
 def _state_folder() -> str:
@@ -129,6 +135,10 @@ def _start_of(pid: str) -> str:
     return "" if state in "ZX" else others[18]
 
 
+def _is_process(pid: str, start: str) -> bool:
+    return _start_of(pid) == start
+
+
 def _is_locked(path: str) -> bool:
     """Return whether the file is locked: the program that created it keeps a lock while it runs."""
     import fcntl
@@ -138,4 +148,6 @@ def _is_locked(path: str) -> bool:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
+    except FileNotFoundError:  # it ended
+        pass
     return False

@@ -1,5 +1,6 @@
 """A run that stands still is silenced, whatever holds it up; a stop is confirmed when the output is off."""
 
+import os
 import threading
 from pathlib import Path
 from threading import Event
@@ -23,7 +24,7 @@ from vibench.acquisition.stopping.program import (
 )
 from vibench.acquisition.stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopRequest
 from vibench.sim.operating_system.this import process_start
-from vibench.stop_files import Fate, fate_of, stop_path, taken_path, write_stop_file
+from vibench.stop_files import Fate, answer_path, fate_of, stop_path, write_stop_file
 
 from .ending_silent import bench_on, terminal_v, upto
 
@@ -127,7 +128,7 @@ def test_a_stop_is_confirmed_only_after_the_output_is_off(announced):
         guard.begin()
         stop = stopped()
         until(lambda: not Path(stop).exists())
-        assert Path(taken_path(stop)).exists()
+        assert Path(answer_path(stop, "taken")).exists()
         guard.silence()
         assert fate_of(stop) is Fate.SILENT
 
@@ -153,6 +154,31 @@ def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, mo
         guard.silence()
     assert fate_of(stop) is Fate.UNCONFIRMED
     DRIVES_ON.confirm_silence(guard)
+
+
+def test_an_emptied_state_folder_confirms_no_stop(announced, monkeypatch):
+    monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
+    with DriveGuard(Output(), StopSwitch()) as guard:
+        guard.begin()
+        stop = stopped()
+        until(lambda: not Path(stop).exists())
+        for each in engines_folder().iterdir():
+            each.unlink()
+        assert fate_of(stop) is Fate.UNCONFIRMED
+        guard.silence()
+        assert fate_of(stop) is Fate.SILENT
+
+
+def test_an_earlier_confirmation_confirms_no_later_stop(own_state, monkeypatch):
+    monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
+    stop = stop_path(str(engines_folder()), *own_process(), "abort")
+    Path(answer_path(stop, "silent")).touch()
+    os.utime(answer_path(stop, "silent"), (1.0, 1.0))
+    write_stop_file(stop, "smoke")
+    removing = threading.Timer(0.1, Path(stop).unlink)
+    removing.start()
+    assert fate_of(stop) is Fate.UNCONFIRMED
+    removing.join()
 
 
 @pytest.mark.thorough

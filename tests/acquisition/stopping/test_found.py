@@ -12,9 +12,15 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
-from vibench.acquisition.engine import StopDelivery, programs_to_stop, stop_engine
+from vibench.acquisition.engine import EngineGone, StopDelivery, programs_to_stop, stop_engine
 from vibench.acquisition.engine._client import EngineAddress, announce
-from vibench.acquisition.stopping.program import Program, announced_programs, engines_folder
+from vibench.acquisition.stopping.program import (
+    Program,
+    announced_programs,
+    engines_folder,
+    note_open_bench,
+)
+from vibench.command import stop_programs
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and modes as POSIX has them")
 
@@ -96,9 +102,10 @@ def test_an_announcement_is_restored_after_the_state_folder_was_emptied(own_stat
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
 
 
-def test_the_next_program_removes_files_left_by_a_killed_program():
+def test_a_killed_program_is_reported_until_a_bench_of_its_rig_is_silent(capsys):
     script = (
-        "from vibench.acquisition import *; a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
+        "from vibench.acquisition import *; from vibench.acquisition.stopping.program import note_open_bench;"
+        "note_open_bench('lab'); a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
     )
     with subprocess.Popen([sys.executable, "-uc", script], stdin=PIPE, stdout=PIPE) as process:
         process.stdout.read(1)
@@ -107,9 +114,17 @@ def test_the_next_program_removes_files_left_by_a_killed_program():
         process.kill()
         process.wait()
         stop.touch()
-    with stop_on_signal(StopSwitch(), "dwell"):
-        assert {each.suffix for each in engines_folder().iterdir()} == {".json"}
-        assert not left.exists()
+    note_open_bench("another")
+    for _ in range(2):
+        assert stop_programs("ramp", "smoke", "") == 1
+        assert "x, process" in (said := capsys.readouterr().err)
+        assert "switch the amplifier off" in said
+        with pytest.raises(EngineGone, match="switch the amplifier off"):
+            stop_engine(programs_to_stop(None)[0])
+        with stop_on_signal(StopSwitch(), "dwell"):
+            assert [each.what for each in announced_programs(Program)] == ["dwell"]
+    note_open_bench("lab")
+    assert not list(engines_folder().iterdir()), left
 
 
 def test_announcements_are_found_after_the_computer_was_renamed(monkeypatch):

@@ -52,6 +52,7 @@ from ..rig import (
     load_rig,
     output_driver,
 )
+from ..stopping.program import note_open_bench
 from .result import CheckResult
 
 # Only one program may use a bench. A lock ends with the process that holds it, even if it is killed.
@@ -365,13 +366,18 @@ def open_bench(
 def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.connected
-    digitizer = digitizer_driver(connected).open(connected)
-    closing.callback(digitizer.close)
-    output = _output(connected, digitizer, closing)
-    controller = _controller(connected, closing)
+    # Opening silences the generator: after a killed program it may be on, and the converter still in use.
     generator = generator_driver(connected.generator).open(connected.generator)
-    closing.callback(generator.close)
-    closing.callback(generator.stop)  # callbacks run in reverse order
+    with ExitStack() as silencing:
+        silencing.callback(generator.close)
+        silencing.callback(generator.stop)  # callbacks run in reverse order
+        note_open_bench(rig.name)
+        digitizer = digitizer_driver(connected).open(connected)
+        closing.callback(digitizer.close)
+        output = _output(connected, digitizer, closing)
+        controller = _controller(connected, closing)
+        # When leaving, silence first, then close the rest.
+        closing.push(silencing.pop_all())
     if output is not None:
         closing.callback(output.stop)
     usual = confirm_simulated if _kind(rig, digitizer) is BenchKind.SIMULATED else confirm_at_terminal

@@ -30,6 +30,7 @@ from ..stopping.program import (
     announced_programs,
     facts_of_this_process,
     programs_of_other_places,
+    unconfirmed_programs,
     withdraw,
 )
 from ..stopping.stop import StopLevel
@@ -109,11 +110,12 @@ def the_engine(pid: int | None) -> Announcement:
 def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     """Return the programs that a stop addresses: engines, and programs that drive a bench themselves.
 
-    Programs in other containers of this computer are included, since they read the same state folder.
-    Raises EngineError when there is none. ``pid`` selects one program; None: all of this computer.
+    Programs in other containers of this computer are included, since they read the same state folder, and
+    programs that ended without confirming silence. Raises EngineError when there is none. ``pid`` selects one
+    program; None: all of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
-    programs = (*announced_engines(), *programs_without_engine(), *contained)
+    programs = (*announced_engines(), *programs_without_engine(), *contained, *unconfirmed_programs())
     return tuple(each for each in programs if pid in (None, each.pid)) or (the_engine(pid),)
 
 

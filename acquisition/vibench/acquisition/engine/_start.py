@@ -165,6 +165,11 @@ def stop_engine(
         When a hold is requested from a program that is not an engine.
     """
     level = chosen(StopLevel, level)
+    ended = EngineGone(
+        f"process {engine.pid} ({engine.what}) ended without confirming that its output is off. {SWITCH_OFF}"
+    )
+    if not _runs(engine):
+        raise ended
     reason = reason.encode(errors="replace").decode()  # a terminal's text may contain surrogates
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
@@ -183,22 +188,24 @@ def stop_engine(
         raise EngineGone(
             f"the stop for process {engine.pid} was not written to the state folder: {error}. {SWITCH_OFF}"
         ) from error
-    match fate_of(stop, lambda: engine.is_alive):
+    match fate_of(stop, lambda: _runs(engine)):
         case Fate.SILENT:
             return StopDelivery.TOLD if isinstance(engine, Announcement) else StopDelivery.TAKEN
-        case Fate.UNCONFIRMED if engine.is_alive:
+        case Fate.UNCONFIRMED if _runs(engine):
             return StopDelivery.UNHEEDED
-        case Fate.NOT_TAKEN if engine.is_alive:
+        case Fate.NOT_TAKEN if _runs(engine):
             if isinstance(engine, Announcement):
                 with suppress(EngineError):  # the engine hangs: the stop remains in the folder
                     return _tell(engine, level, reason)
             return StopDelivery.KEPT
     with suppress(OSError):
         Path(stop).unlink()
-    raise EngineGone(
-        f"process {engine.pid} ({engine.what}) has ended without confirming that its output is off. "
-        f"{SWITCH_OFF}"
-    )
+    raise ended
+
+
+def _runs(engine: Program) -> bool:
+    """Whether the process runs now; a function, because the answer changes during a stop."""
+    return engine.is_alive
 
 
 def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:

@@ -11,6 +11,7 @@ from logging import getLogger
 from pathlib import Path
 from stat import S_IMODE, S_ISREG
 from threading import Event, Lock, Thread
+from time import time
 from types import FrameType
 from typing import TypeVar
 
@@ -25,7 +26,7 @@ from vibench.sim.operating_system.this import (
     rename,
     state_folder,
 )
-from vibench.stop_files import stop_path, taken_path
+from vibench.stop_files import answer_path, stop_path
 
 from ..errors import AcquisitionError
 from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
@@ -58,6 +59,7 @@ class KeptStops:
         self._press = press
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
+        """Stops that are being carried out, under their first names."""
         self._reserve = os.open(os.devnull, os.O_RDONLY)
         """Reserved file descriptor; it is closed so that a reason can be read even if no more are free."""
 
@@ -79,22 +81,27 @@ class KeptStops:
             self._obeyed[path] = mark  # carry out a stop only once, even if its file cannot be removed
             # Read regular files only, because reading a pipe could wait for ever.
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
-            taken = Path(taken_path(str(path)))
+            self._taken.add(path)
             with suppress(OSError):
-                rename(path, taken)
-                self._taken.add(taken)
+                _answer(path, "silent").unlink(missing_ok=True)  # of an earlier stop
+                rename(path, _answer(path, "taken"))
         self.confirm()
 
     def confirm(self) -> None:
-        """Remove obeyed stop files once no drive is on; until then, update their times as a sign of life."""
+        """Rename obeyed stop files once no drive is on; until then, update their times as a sign of life.
+
+        Files that somebody has removed are made again.
+        """
         is_advancing = DRIVES_ON.take_advance()
-        for taken in tuple(self._taken):
-            with suppress(OSError):  # somebody has emptied the folder
+        for path in tuple(self._taken):
+            with suppress(OSError):  # somebody has removed the folder
                 if not DRIVES_ON:
-                    self._taken.discard(taken)
-                    taken.unlink()
+                    with suppress(FileNotFoundError):
+                        rename(_answer(path, "taken"), _answer(path, "silent"))
+                    _answer(path, "silent").touch(0o600)
+                    self._taken.discard(path)
                 elif is_advancing:
-                    os.utime(taken)
+                    _answer(path, "taken").touch(0o600)
 
     def close(self) -> None:
         """Release the reserved file descriptor."""
@@ -113,9 +120,15 @@ class KeptStops:
                 self._reserve = os.open(os.devnull, os.O_RDONLY)
 
 
+def _answer(stop: Path, answer: str) -> Path:
+    return Path(answer_path(str(stop), answer))
+
+
 INTERVAL_S = 0.05
 """Interval between two calls of a watchdog [s]."""
 LEFT_ALONE_S = 1.0
+FRESH_S = 60.0
+"""Age up to which a confirmation of silence is kept after its program has ended [s]."""
 
 
 class Watchdog:
@@ -168,6 +181,8 @@ class Program(BaseModel):
     """Start time of the process, from the system. Process numbers are reused; number and start are unique."""
     computer: str = ""
     """Name of the computer; a state folder may be in a home folder that several computers share."""
+    rigs: tuple[str, ...] = ()
+    """Names of the rigs whose benches the process has opened."""
 
     @property
     def place(self) -> Place:
@@ -191,6 +206,9 @@ class Program(BaseModel):
         return not self.is_alive and _path(self).exists()
 
 
+_RIGS: set[str] = set()
+"""Names of the rigs whose benches this process has opened."""
+
 AnyProgram = TypeVar("AnyProgram", bound=Program)
 
 
@@ -203,29 +221,44 @@ def facts_of_this_process(what: str) -> dict[str, object]:
         "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "process_start": process_start(pid) or "",
         "computer": platform.node(),
+        "rigs": sorted(_RIGS),
     }
 
 
 def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     """Return all living programs on this computer (or in this container), oldest first, as ``model``.
 
-    Announcements of processes that have ended are removed.
-
     Raises AcquisitionError when there is no state folder and none can be created.
     """
     found = []
-    for path, announcement in _announcements(model):
-        is_here = announcement.computer in ("", platform.node())
-        if announcement.place is not Place.HERE:
-            continue
+    for _, announcement in _announcements(model):
         # The name of the computer may change while a program runs. Process number and start time identify it.
-        if announcement.is_alive and (is_here or announcement.process_start):
+        is_here = announcement.place is Place.HERE and (
+            announcement.computer in ("", platform.node()) or announcement.process_start != ""
+        )
+        if is_here and announcement.is_alive:
             found.append(announcement)
-        elif is_here:
-            with suppress(OSError):
-                path.unlink()
     _sweep()
     return tuple(sorted(found, key=lambda each: each.started_utc))
+
+
+def unconfirmed_programs() -> tuple[Program, ...]:
+    """Return the programs of this computer that ended without confirming that their output is off.
+
+    `note_open_bench` forgets them. Raises AcquisitionError in the same cases as `announced_programs`.
+    """
+    here = (each for _, each in _announcements(Program) if each.place is Place.HERE)
+    return tuple(each for each in here if not each.is_alive and each.computer in ("", platform.node()))
+
+
+def note_open_bench(rig: str) -> None:
+    """Note that this process has silenced the generator of a rig: earlier programs left nothing on there."""
+    for each in unconfirmed_programs():
+        if rig in each.rigs or not each.rigs:
+            withdraw(each)
+    _sweep()
+    _RIGS.add(rig)
+    _REACHED.announce_again()
 
 
 def programs_of_other_places() -> tuple[Program, ...]:
@@ -288,7 +321,6 @@ class _Reached:
         """Add an entry; raise OSError when the state folder cannot be written."""
         with self._changing:
             if not self._inside:
-                announced_programs(Program)  # removes entries of killed programs
                 kept = KeptStops.of_this_process(self._press)
                 try:
                     self._announce(entry[1])
@@ -314,7 +346,17 @@ class _Reached:
             watchdog.close()
             kept.confirm()
             kept.close()
-        withdraw(entry[1])
+        if not DRIVES_ON:
+            withdraw(entry[1])
+
+    def announce_again(self) -> None:
+        """Announce the rigs that this process has opened since its announcement; ignore a failure."""
+        with self._changing, suppress(OSError):
+            if self._inside:
+                press, program = self._inside[0]
+                program = program.model_copy(update={"rigs": tuple(sorted(_RIGS))})
+                self._inside[0] = press, program
+                self._announce(program)
 
     def _look(self) -> None:
         """Carry out new stops, and announce again if somebody has emptied the state folder."""
@@ -406,8 +448,11 @@ def _write(program: Program) -> Path:
 
 
 def _sweep() -> None:
-    """Remove files of processes that have ended; file names begin with the process number."""
-    folder = engines_folder()
+    """Remove files of processes that have ended; file names begin with the process number.
+
+    Fresh confirmations of silence stay, because the sender of a stop may not have read them.
+    """
+    folder, fresh_s = engines_folder(), time() - FRESH_S
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
         start, _, rest = rest.rpartition(".")
@@ -415,7 +460,8 @@ def _sweep() -> None:
         is_here = place_of(start) is Place.HERE
         if is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
             with suppress(OSError):
-                path.unlink()
+                if not rest.startswith("silent-") or path.stat().st_mtime < fresh_s:
+                    path.unlink()
 
 
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
