@@ -27,7 +27,7 @@ def test_buffers_and_reads_larger_than_the_memory_are_refused(daq, task):
     interpreter = task._interpreter
     with refused(DAQmxErrors.PAL_MEMORY_FULL):
         interpreter.read_analog_waveforms(task._handle, 1 << 30, 1.0, [], NoTiming)
-    task.in_stream.input_buf_size = 2**32 - 1
+    task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=2**32 - 1)
     with refused(DAQmxErrors.PAL_MEMORY_FULL):
         task.start()
     output = daq.outputs("Dev1/ao0", 1)

@@ -49,7 +49,7 @@ def test_samples_become_available_only_after_their_time(connect, clock):
         task.read(1, timeout=0.0)
     clock.now_s += 0.25
     wait_for(daq, 250, task)
-    assert task.in_stream.total_samp_per_chan_acquired == 250
+    assert task.in_stream.avail_samp_per_chan == 250
 
 
 def test_a_timeout_returns_the_samples_so_far(connect, clock):
@@ -61,7 +61,7 @@ def test_a_timeout_returns_the_samples_so_far(connect, clock):
     with refused(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(150, timeout=0.02)
     assert caught.value.samps_per_chan_read == 100
-    assert task.in_stream.curr_read_pos == 100
+    assert task.in_stream.avail_samp_per_chan == 0
 
 
 def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(connect, clock):
@@ -81,12 +81,11 @@ def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(connect, 
 def test_a_reader_that_is_too_late_gets_a_lost_samples_error(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
-    task.in_stream.input_buf_size = 500
     task.start()
     clock.now_s += 0.5
     wait_for(daq, 500, task)
     assert len(task.read(READ_ALL_AVAILABLE)) == 500
-    clock.now_s += 0.6
+    clock.now_s += 10.5  # the buffer has ten seconds
     rig = daq.server._rig
     with rig.changed:
         assert rig.changed.wait_for(lambda: rig._acquisitions[0].failure is not None, 10.0)
@@ -114,7 +113,7 @@ def test_the_speed_setting_makes_simulated_time_pass_faster(connect, clock):
     task.start()
     clock.now_s += 0.1
     wait_for(daq, 2000, task)
-    assert task.in_stream.total_samp_per_chan_acquired == 2000
+    assert task.in_stream.avail_samp_per_chan == 2000
 
 
 def test_real_time_samples_have_no_gap(connect):

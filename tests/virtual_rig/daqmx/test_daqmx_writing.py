@@ -43,7 +43,6 @@ def test_an_output_without_its_trigger_stays_silent(pair, daq):
     outputs.write(ramp(100))
     outputs.start()
     daq.world.advance(1.0)
-    assert outputs.out_stream.total_samp_per_chan_generated == 0
     assert not outputs.is_task_done()
     assert not daq.world.played
 
@@ -91,7 +90,6 @@ def test_writing_into_a_full_buffer_waits_for_the_output_to_play(pair):
     outputs.start()
     inputs.start()
     outputs.write(np.ones(10000))
-    assert outputs.out_stream.total_samp_per_chan_generated >= 9000
     heard = np.array(inputs.read(12000))
     assert np.flatnonzero(heard)[0] == 4000
 
@@ -117,7 +115,6 @@ def test_a_finite_output_ends_at_zero_volts(daq):
     task.write(ramp(300), auto_start=True)
     task.wait_until_done()
     assert task.is_task_done()
-    assert task.out_stream.total_samp_per_chan_generated == 300
     first_s = daq.world.played[OUTPUT][0].start_s
     np.testing.assert_allclose(daq.world.output(OUTPUT, first_s + np.arange(300) / RATE_HZ), ramp(300))
     assert daq.world.output(OUTPUT, np.array([first_s + 301 / RATE_HZ, daq.world.time_s + 1.0])).tolist() == [

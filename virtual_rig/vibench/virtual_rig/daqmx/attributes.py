@@ -26,10 +26,9 @@ from ..world.wiring import Coupling
 from .acquisition import Acquisition, check_memory
 from .calls import DaqmxSystem, Fields
 from .channels import OutputChannel
-from .data_calls import count_available, default_samples, newest
+from .data_calls import count_available, default_samples
 from .devices import AnalogInputs, Device
 from .errors import DaqmxRefusal, member, unsupported_value
-from .rig import QUESTION_S
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)
@@ -152,13 +151,6 @@ def _overloaded_names(task: Task) -> str:
     return ", ".join(channel.name for channel, is_over in zip(task.inputs, flags, strict=True) if is_over)
 
 
-def _total_generated(task: Task) -> int:
-    if task.generation is None:
-        return 0
-    task.rig.pace.pass_time(task.rig, QUESTION_S)
-    return task.generation.transferred
-
-
 def _set_regeneration(task: Task, mode: int) -> None:
     task.require_stopped()
     task.regeneration = member(RegenerationMode, mode, "Write_RegenMode")
@@ -201,13 +193,10 @@ TIMING: Attributes = {
 }
 TRIGGER: Attributes = {
     "START_TRIG_TERM": Attribute(_start_terminal),
-    "START_TRIG_RETRIGGERABLE": Attribute(lambda _: False),
 }
 READ: Attributes = {
     "CHANNELS_TO_READ": Attribute(_channel_names),
     "NUM_CHANS": Attribute(lambda task: len(task.channels)),
-    "CURR_READ_POS": Attribute(lambda task: task.acquisition.position if task.acquisition else 0),
-    "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(newest),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
     "0x31E8": Attribute(default_samples),  # has no name in the protocol: how many samples "all" means
     "OVERLOADED_CHANS_EXIST": Attribute(_has_overloads),
@@ -216,10 +205,8 @@ READ: Attributes = {
 WRITE: Attributes = {
     "NUM_CHANS": Attribute(lambda task: len(task.outputs)),
     "REGEN_MODE": Attribute(lambda task: task.regeneration, _set_regeneration),
-    "TOTAL_SAMP_PER_CHAN_GENERATED": Attribute(_total_generated),
 }
 BUFFER: Attributes = {
-    "INPUT_BUF_SIZE": Attribute(lambda task: task.buffer_size, _field("input_size")),
     "OUTPUT_BUF_SIZE": Attribute(lambda task: task.output_buffer.size, _set_output_buffer),
 }
 INPUT: Attributes = {

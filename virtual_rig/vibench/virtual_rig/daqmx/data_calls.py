@@ -80,12 +80,6 @@ def available(task: Task) -> int:
     return task.acquisition.available
 
 
-def newest(task: Task) -> int:
-    """Return how many samples per channel have been acquired so far."""
-    available(task)
-    return task.acquisition.transferred if task.acquisition else 0
-
-
 def count_available(task: Task) -> int:
     """Return the number of unread samples; time on demand advances if none was read since the last query."""
     acquisition = task.acquisition

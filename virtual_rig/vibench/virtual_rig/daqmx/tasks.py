@@ -82,11 +82,9 @@ class Task:
         self.rig = rig
         self.state = TaskState.UNVERIFIED
         self.timing = Timing()
-        self.input_size: int | None = None
-        """Buffer size in samples per channel; None: chosen from rate and samples."""
         self.log: TdmsLog | None = None
         self.output_size = 0
-        """Buffer size in samples per channel; 0: the size of the first writes."""
+        """Size of the output buffer in samples per channel; 0: the size of the first writes."""
         self.regeneration = RegenerationMode.ALLOW_REGENERATION
         self.inputs: list[InputChannel] = []
         self.outputs: list[OutputChannel] = []
@@ -141,8 +139,6 @@ class Task:
         """Size of the input buffer in samples per channel."""
         if self.kind is SampleTimingType.ON_DEMAND:
             return 0
-        if self.input_size is not None:
-            return self.input_size
         if self.timing.mode is AcquisitionType.FINITE:
             return self.timing.samples
         usual = next(size for limit_hz, size in _DEFAULT_BUFFERS if self.rate_hz <= limit_hz)
