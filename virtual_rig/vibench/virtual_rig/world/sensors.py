@@ -123,26 +123,20 @@ class LowPass:
         return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
 
 
-def first_order(cut_hz: float) -> LowPass:
-    """Return a low-pass with one real pole, -3 dB at ``cut_hz``."""
-    return LowPass((complex(-2 * np.pi * cut_hz),))
+def low_pass(
+    bandwidth_hz: float | None = None, resonance_hz: float | None = None, damping_ratio: float = 0.02
+) -> LowPass:
+    """Return the response of a sensor with a bandwidth (one pole, -3 dB) and a mounted resonance, if given.
 
-
-def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
-    """Return the low-pass response of a mass on a damped spring."""
-    omega = 2 * np.pi * resonance_hz
-    imaginary = omega * np.sqrt(1 - damping_ratio**2)
-    pole = complex(-damping_ratio * omega, imaginary)
-    return LowPass((pole, pole.conjugate()))
-
-
-def low_pass_of(sensor: SensorConfig) -> LowPass:
-    """Return the response of a sensor from its bandwidth and mounted resonance, if they are given."""
+    The default damping ratio is a typical value of piezoelectric sensors, assumed.
+    """
     poles: tuple[complex, ...] = ()
-    if sensor.bandwidth_hz is not None:
-        poles += first_order(sensor.bandwidth_hz).poles
-    if sensor.resonance_hz is not None:
-        poles += resonant(sensor.resonance_hz, SENSOR_DAMPING_RATIO).poles
+    if bandwidth_hz is not None:
+        poles += (complex(-2 * np.pi * bandwidth_hz),)
+    if resonance_hz is not None:
+        omega = 2 * np.pi * resonance_hz
+        pole = complex(-damping_ratio * omega, omega * np.sqrt(1 - damping_ratio**2))
+        poles += (pole, pole.conjugate())
     return LowPass(poles)
 
 
@@ -174,8 +168,6 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
     return np.concatenate([[total - weights.sum()], weights])
 
 
-SENSOR_DAMPING_RATIO = 0.02
-"""Damping ratio of a piezoelectric sensor's mounted resonance; assumed typical value."""
 IEPE_BIAS_V = 10.0
 """Constant voltage of a powered IEPE sensor; 8 to 12 V is usual."""
 LONGEST_DELAY_S = 5e-3
@@ -231,10 +223,9 @@ class MotionSensor:
                 f"delay_s = {config.delay_s} s of the {config.model} ({role.value}): the virtual rig can "
                 f"delay by at most {LONGEST_DELAY_S} s; give a smaller delay"
             )
-        low_pass = low_pass_of(config)
         bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz) if config.bandwidth_hz else 0.0
         self.delay_steps = (config.delay_s - bandwidth_s) * grid.rate_hz
-        self._filter = running_filter(low_pass, grid.step_s)
+        self._filter = running_filter(low_pass(config.bandwidth_hz, config.resonance_hz), grid.step_s)
         self._noise_rms = noise_rms
         self._full_scale = config.full_scale_v * config.units_per_volt(role.unit)
         self._full_scale_v = config.full_scale_v
