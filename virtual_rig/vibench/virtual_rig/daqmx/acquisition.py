@@ -18,15 +18,6 @@ LEAST_PRETRIGGER = 2
 """Smallest number of samples before and after a reference trigger."""
 
 
-@dataclass(frozen=True)
-class ReferenceTrigger:
-    """The edge around which a finite task stores samples."""
-
-    terminal: str
-    pretrigger: int
-    """Samples per channel stored before the trigger."""
-
-
 @dataclass
 class Timing:
     """Configuration of sample clock and triggers."""
@@ -40,7 +31,10 @@ class Timing:
     clock_source: str = ""
     trigger_source: str = ""
     """Empty: no trigger; sampling begins when the task is started."""
-    reference: ReferenceTrigger | None = None
+    reference_source: str = ""
+    """Empty: no reference trigger, around whose edge a finite task stores samples."""
+    pretrigger: int = 0
+    """Samples per channel stored before the reference trigger."""
 
     @property
     def total(self) -> float:
@@ -100,12 +94,15 @@ class Acquisition(Stream):
         began_s: float,
         total: float,
         buffer_size: int,
-        reference: ReferenceTrigger | None,
+        pretrigger: int,
         *,
         loses_samples: bool,
     ) -> None:
-        """``loses_samples``: whether new samples overwrite the oldest in a full buffer; if not, it grows."""
-        super().__init__(rate_hz, began_s, total if reference is None else math.inf)
+        """Begin an acquisition; with ``pretrigger`` samples before a reference trigger, or 0 without one.
+
+        ``loses_samples``: whether new samples overwrite the oldest in a full buffer; if not, it grows.
+        """
+        super().__init__(rate_hz, began_s, math.inf if pretrigger else total)
         self.position = 0
         """Number of samples read by the program."""
         self.queried_at = -1
@@ -116,7 +113,7 @@ class Acquisition(Stream):
         self.buffer_size = max(1, buffer_size)
         self._capacity = self.buffer_size if loses_samples else MOST_SAMPLES // channels
         self._samples = total
-        self._reference = reference
+        self._pretrigger = pretrigger
         self._is_open = True
 
     @property
@@ -135,13 +132,12 @@ class Acquisition(Stream):
     @property
     def awaits_trigger(self) -> bool:
         """Whether the reference trigger is still awaited; until then only the newest samples are kept."""
-        return self._reference is not None and self._is_open and self.total == math.inf
+        return self._pretrigger > 0 and self._is_open and self.total == math.inf
 
     @property
     def enough_before_s(self) -> float:
         """Rig time from which the reference trigger is accepted; infinite if it is accepted already [s]."""
-        assert self._reference is not None
-        kept = self._reference.pretrigger
+        kept = self._pretrigger
         return self.began_s + kept / self.rate_hz if self.transferred < kept else math.inf
 
     def trigger(self) -> bool:
@@ -149,8 +145,7 @@ class Acquisition(Stream):
 
         It is rejected until enough samples before it are stored.
         """
-        assert self._reference is not None
-        if not self.awaits_trigger or self.transferred < self._reference.pretrigger:
+        if not self.awaits_trigger or self.transferred < self._pretrigger:
             return False
         self.total = self.position + self._samples
         return True
@@ -158,8 +153,8 @@ class Acquisition(Stream):
     def _store(self, block: NDArray[np.float64]) -> None:
         self._unread.append(block)
         self.transferred += block.shape[1]
-        if self._reference is not None and self.awaits_trigger:
-            self._take(max(0, self.transferred - self.position - self._reference.pretrigger))
+        if self.awaits_trigger:
+            self._take(max(0, self.transferred - self.position - self._pretrigger))
         elif self.available > self._capacity:
             self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
 

@@ -26,7 +26,7 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .acquisition import Acquisition, ReferenceTrigger, Stream
+from .acquisition import Acquisition, Stream
 from .channels import InputChannel, OutputChannel, channel_names
 from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
@@ -157,8 +157,8 @@ def _set_start_trigger(task: Task, request: Any) -> None:
 def _set_reference_trigger(task: Task, request: Any) -> None:
     member(Edge, pick(request, "trigger_edge"), "DigEdge_RefTrig_Edge")
     task.require_stopped()
-    terminal = task.full_terminal(request.trigger_source)
-    task.timing.reference = ReferenceTrigger(terminal, request.pretrigger_samples)
+    task.timing.reference_source = task.full_terminal(request.trigger_source)
+    task.timing.pretrigger = request.pretrigger_samples
 
 
 def _set_logging(task: Task, request: Any) -> None:

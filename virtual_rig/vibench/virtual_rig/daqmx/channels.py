@@ -11,7 +11,6 @@ from ..world.wiring import Coupling, Input
 from .devices import AnalogInputs, AnalogOutputs, Device, expand
 from .errors import DaqmxRefusal, unsupported_value
 
-_SHORT_BITS, _LONG_BITS = 16, 32
 _SLACK = 1 + 1e-9
 """Relative tolerance of limits, which may have rounding errors."""
 
@@ -70,7 +69,7 @@ class InputChannel(_VoltageChannel):
     @property
     def raw_bits(self) -> int:
         """Bits of an unscaled sample in transfers."""
-        return _SHORT_BITS if self.side.bits <= _SHORT_BITS else _LONG_BITS
+        return 16 if self.side.bits <= 16 else 32
 
     def verify(self) -> None:
         """Refuse settings that the device does not support: range, terminal, coupling, excitation."""

@@ -245,14 +245,14 @@ class Task:
                 self.rig.require_terminal(awaited)
             if self.inputs:
                 check_memory(self.buffer_size, len(self.inputs))
-        if (reference := self.timing.reference) is not None:
+        if self.timing.reference_source:
             if self.timing.mode is not AcquisitionType.FINITE:
                 raise DaqmxRefusal(DAQmxErrors.REF_TRIG_WHEN_CONTINUOUS)
             most = self.timing.samples - LEAST_PRETRIGGER
-            if not LEAST_PRETRIGGER <= reference.pretrigger <= most:
+            if not LEAST_PRETRIGGER <= self.timing.pretrigger <= most:
                 allowed = f"{LEAST_PRETRIGGER} to {most} of {self.timing.samples} samples"
-                raise unsupported_value("RefTrig_PretrigSamples", reference.pretrigger, allowed)
-            self.rig.require_terminal(reference.terminal)
+                raise unsupported_value("RefTrig_PretrigSamples", self.timing.pretrigger, allowed)
+            self.rig.require_terminal(self.timing.reference_source)
 
     def _reserve(self) -> None:
         for device in self.devices:
@@ -292,27 +292,29 @@ class Task:
         return self.buffer
 
     def _begin(self) -> None:
+        rig, timing = self.rig, self.timing
         if self.inputs:
-            self.acquisition = self._acquire()
-            self.rig.run(self.acquisition)
+            if self.log is not None:
+                self.log.begin()
+            sampler = rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
+            self.acquisition = Acquisition(
+                sampler, len(self.inputs), self.rate_hz, rig.now_s, timing.total,
+                self.buffer_size, timing.pretrigger, loses_samples=rig.pace.loses_samples,
+            )  # fmt: skip
+            rig.run(self.acquisition)
             self._await_reference_edge()
         else:
-            self.generation = self._generate()
-            self.rig.run(self.generation)
-        self.rig.edge(self.start_terminal)
-
-    def _acquire(self) -> Acquisition:
-        if self.log is not None:
-            self.log.begin()
-        sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
-        return Acquisition(
-            sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
-            self.buffer_size, self.timing.reference, loses_samples=self.rig.pace.loses_samples,
-        )  # fmt: skip
+            physical = tuple(channel.physical for channel in self.outputs)
+            self.generation = Generation(
+                rig.world, physical, self.rate_hz, rig.now_s, timing.total,
+                self.output_buffer, self.regeneration, self.outputs[0].side,
+            )  # fmt: skip
+            rig.run(self.generation)
+        rig.edge(self.start_terminal)
 
     def _await_reference_edge(self) -> None:
-        if self.timing.reference is not None:
-            self.rig.arm(self.timing.reference.terminal, self._reference_edge)
+        if self.timing.reference_source:
+            self.rig.arm(self.timing.reference_source, self._reference_edge)
 
     def _reference_edge(self) -> None:
         """Apply an edge to the reference trigger; an edge that comes too early is ignored."""
@@ -332,13 +334,6 @@ class Task:
             self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, deadline_s)
             self.rig.changed.wait(_BREATH_S)  # let other callers stop the task
         return is_there()
-
-    def _generate(self) -> Generation:
-        physical = tuple(channel.physical for channel in self.outputs)
-        return Generation(
-            self.rig.world, physical, self.rate_hz, self.rig.now_s, self.timing.total,
-            self.output_buffer, self.regeneration, self.outputs[0].side,
-        )  # fmt: skip
 
     def is_done(self) -> bool:
         """Return whether the task is finished; raise the error that ended it."""
