@@ -49,7 +49,7 @@ def test_every_kind_of_transfer_passes_unchanged(rig, proxy):
     proxy.bulk_out(bytes([1, 1, 254, 0, 5, 0, 0, 0, 1, 0, 0, 0]) + b"*OPC?\0\0\0")
     proxy.bulk_out(bytes([2, 2, 253, 0, 64, 0, 0, 0, 0, 0, 0, 0]))
     assert proxy.bulk_in(64, 1000)[12:14] == b"1\n"
-    assert proxy.control(Setup(0xA2, 3, 5, 0x82, 2), b"") == bytes([0x81, 0])
+    assert proxy.control(Setup(0xA2, 3, 5, 0x82, 2)) == bytes([0x81, 0])
 
 
 def test_a_timeout_and_a_stall_look_the_same_at_both_ends(proxy):

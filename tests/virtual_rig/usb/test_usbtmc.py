@@ -44,7 +44,7 @@ class Host:
         return self.read()[0]
 
     def control(self, request, value=0, length=64, kind=CLASS_IN_INTERFACE):
-        return self.device.control(Setup(kind, request, value, 0, length), b"")
+        return self.device.control(Setup(kind, request, value, 0, length))
 
 
 @given(st.integers(1, 40))

@@ -53,22 +53,15 @@ _Method = Callable[[bytes], bytes]
 def usb_service(device: UsbTmcInstrument) -> grpc.GenericRpcHandler:
     """Return the handler that serves one device on a ``grpc.Server``."""
 
-    def identify(_: bytes) -> bytes:
-        return json.dumps(astuple(device.identification)).encode()
-
     def bulk_out(request: bytes) -> bytes:
         device.bulk_out(request)
         return b""
 
-    def control(request: bytes) -> bytes:
-        setup = Setup(*_SETUP.unpack_from(request))
-        return device.control(setup, request[_SETUP.size :])
-
     methods: dict[str, _Method] = {
-        "Identify": identify,
+        "Identify": lambda _: json.dumps(astuple(device.identification)).encode(),
         "BulkOut": bulk_out,
         "BulkIn": lambda request: device.bulk_in(*_READ.unpack(request)),
-        "Control": control,
+        "Control": lambda request: device.control(Setup(*_SETUP.unpack(request))),
     }
     handlers = {
         name: grpc.unary_unary_rpc_method_handler(_handler(name, act)) for name, act in methods.items()
@@ -121,10 +114,9 @@ class RemoteUsbDevice:
         """Receive one transfer."""
         return self._call("BulkIn", _READ.pack(length, timeout_ms), timeout_ms)
 
-    def control(self, setup: Setup, data: bytes) -> bytes:
+    def control(self, setup: Setup) -> bytes:
         """Execute a class request."""
-        packed = _SETUP.pack(setup.request_type, setup.request, setup.value, setup.index, setup.length)
-        return self._call("Control", packed + data)
+        return self._call("Control", _SETUP.pack(*astuple(setup)))
 
     def close(self) -> None:
         """Close the connection; later transfers fail with ENODEV. Allowed at any time."""
@@ -339,7 +331,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         if bmRequestType & _REQUEST_TYPE_MASK == usb.util.CTRL_TYPE_STANDARD:
             return _fill(data, _standard_reply(device, setup))
         with _usb_errors():
-            reply = device.control(setup, b"" if incoming else data.tobytes())
+            reply = device.control(setup)  # no class request of pyvisa carries data
         return _fill(data, reply) if incoming else len(data)
 
     def _present(self, handle: _Handle) -> UsbDevice:

@@ -174,7 +174,7 @@ class UsbTmcInstrument:
             self._flight.request = None
             return self._hand_over(length)
 
-    def control(self, setup: Setup, data: bytes) -> bytes:  # noqa: ARG002 - no class request carries data
+    def control(self, setup: Setup) -> bytes:
         """Answer a class request (4.2.1)."""
         with self._lock:
             self._check_cable()
