@@ -106,7 +106,7 @@ class AFG1022(ScpiInstrument):
 
     def configure(self, channel: int, settings: ChannelSettings) -> None:
         """Check and apply new settings; raises ScpiError and changes nothing if they are refused."""
-        settings.checked()
+        settings.check()
         shape_of(settings, self.memory)
         previous = self._channels[channel]
         self._replace(channel, settings)
@@ -132,7 +132,7 @@ class AFG1022(ScpiInstrument):
             self._replace(channel, self._power_on)
 
     def trigger(self) -> None:
-        """Start a waiting burst or sweep."""
+        """Start a waiting burst or sweep (``*TRG``)."""
         self._output.trigger(self._channels[SOUNDING_CHANNEL], self.now_s)
 
     def align_phases(self) -> None:
@@ -286,6 +286,8 @@ def burst_cycles(most: int, channels: int) -> Command:
 # fmt: off
 LOAD = load_command("OUTPut#:IMPedance")
 SHARED_COMMANDS = (
+    Command("*RST", "IEEE 488.2, 10.32", lambda generator, _: generator.reset(), takes=0),
+    Command("*TRG", "IEEE 488.2, 10.37", lambda generator, _: generator.trigger(), takes=0),
     setting("OUTPut#[:STATe]", "IVI",
         lambda s: s.relay is Relay.CLOSED,
         lambda s, on: replace(s, relay=Relay.CLOSED if on else Relay.OPEN)),

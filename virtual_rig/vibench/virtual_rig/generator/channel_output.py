@@ -124,16 +124,12 @@ class ChannelSettings:
         lowest = LOWEST_BURST_FREQUENCY_HZ if self.mode is RunMode.BURST else LOWEST_FREQUENCY_HZ
         return lowest, highest_frequency_hz(self.shape)
 
-    def checked(self) -> "ChannelSettings":
-        """Return the settings if they are consistent.
-
-        Raises ScpiError -221 for a peak beyond the output stage, and for noise that is not continuous.
-        """
+    def check(self) -> None:
+        """Refuse a peak beyond the output stage, and noise that is not continuous (-221)."""
         is_moded_noise = self.mode is not RunMode.CONTINUOUS and self.shape == NOISE
         peak_v = abs(self.offset_v) + self.amplitude_vpp / 2
         if peak_v > OPEN_PEAK_V + _PEAK_ROUNDING_V or is_moded_noise:
             raise ScpiError(ErrorCode.SETTINGS_CONFLICT)
-        return self
 
 
 def highest_frequency_hz(shape: str) -> float:

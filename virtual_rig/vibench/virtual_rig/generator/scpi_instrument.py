@@ -229,12 +229,6 @@ class ScpiInstrument:
         code = self.status.next_error()
         return f'{int(code)},"{code.text}"'.encode("ascii")
 
-    def reset(self) -> None:
-        """Restore the defaults."""
-
-    def trigger(self) -> None:
-        """Start the output that waits for a bus trigger (``*TRG``)."""
-
     def _answers(self, message: bytes) -> list[bytes]:
         """Execute all units of a message in order and return the replies."""
         prefix = ""  # position in the command tree, to which headers are relative (SCPI-1999, 1, 6.2.4)
@@ -250,17 +244,21 @@ class ScpiInstrument:
             if unit.asks and room < 0:
                 continue
             try:
-                answers.extend(found := self._obey(header, unit))
+                answer = self._obey(header, unit)
             except scpi.ScpiError as error:
                 self.status.report(error.code)
                 continue
-            room -= sum(map(len, found))
-            if found and room < 0:  # replies cannot be read before the message ends (IEEE 488.2, 6.3.1.7)
+            if answer is None:
+                continue
+            answers.append(answer)
+            room -= len(answer)
+            if room < 0:  # replies cannot be read before the message ends (IEEE 488.2, 6.3.1.7)
                 answers.clear()
                 self.status.report(scpi.ErrorCode.QUERY_DEADLOCKED)
         return answers
 
-    def _obey(self, header: str, unit: scpi.Unit) -> list[bytes]:
+    def _obey(self, header: str, unit: scpi.Unit) -> bytes | None:
+        """Execute one unit; return the reply of a query."""
         command, suffix = self._find(header)
         act = None if command is None else command.ask if unit.asks else command.write
         if command is None or act is None:
@@ -268,7 +266,7 @@ class ScpiInstrument:
             if not self.quirks.unknown_is_syntax_error:
                 raise scpi.ScpiError(scpi.ErrorCode.UNDEFINED_HEADER)
             self.status.report(scpi.ErrorCode.SYNTAX_ERROR)
-            return [b""] if unit.asks else []
+            return b"" if unit.asks else None
         if not 1 <= suffix <= command.channels:
             raise scpi.ScpiError(scpi.ErrorCode.HEADER_SUFFIX_OUT_OF_RANGE)
         takes = command.query_takes if unit.asks else command.takes
@@ -276,8 +274,7 @@ class ScpiInstrument:
             raise scpi.ScpiError(scpi.ErrorCode.MISSING_PARAMETER)
         if len(unit.parameters) > takes:
             raise scpi.ScpiError(scpi.ErrorCode.PARAMETER_NOT_ALLOWED)
-        answer = act(self, suffix, *unit.parameters)
-        return [] if answer is None else [answer]
+        return act(self, suffix, *unit.parameters)
 
     def _find(self, header: str) -> tuple[Command | None, int]:
         """Return the command of a header, and its numeric suffix."""
@@ -287,22 +284,17 @@ class ScpiInstrument:
         return None, 1
 
 
+# fmt: off
 COMMON_COMMANDS = (
     Command("*IDN", "IEEE 488.2, 10.14", ask=lambda each, _: each.identity()),
-    Command("*RST", "IEEE 488.2, 10.32", lambda each, _: each.reset(), takes=0),
     Command("*CLS", "IEEE 488.2, 10.3", lambda each, _: each.clear_status(), takes=0),
-    Command("*TRG", "IEEE 488.2, 10.37", lambda each, _: each.trigger(), takes=0),
     Command("*WAI", "IEEE 488.2, 10.39", lambda *_: None, takes=0),
-    Command(
-        "*OPC",
-        "IEEE 488.2, 10.18",
-        lambda each, _: each.status.operation_complete(),
-        lambda *_: b"1",
-        takes=0,
-    ),
+    Command("*OPC", "IEEE 488.2, 10.18",
+        lambda each, _: each.status.operation_complete(), lambda *_: b"1", takes=0),
     Command("*ESR", "IEEE 488.2, 10.12", ask=lambda each, _: b"%d" % each.status.take_events()),
     Command("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", ask=lambda each, _: each.next_error()),
 )
+# fmt: on
 
 
 # The generator on a raw TCP socket, for programs without Python: one line per message and reply. The real
