@@ -33,6 +33,9 @@ from .errors import DaqmxRefusal, member, sentence, unsupported_value
 from .rig import QUESTION_S, Rig
 from .tasks import Task, TdmsLog
 
+Fields = Mapping[str, object]
+"""The fields of a response; status 0 is omitted."""
+
 
 class DaqmxSystem:
     """State of the driver; the caller must hold the rig's lock."""
@@ -42,37 +45,44 @@ class DaqmxSystem:
         self.tasks: dict[str, Task] = {}
         self._unnamed = 0
 
-    def create_task(self, name: str) -> Task:
-        """Create a task; an empty name selects an unused one (-200089 for a name in use)."""
-        if not name:
-            name = f"_unnamedTask<{self._unnamed}>"
-            self._unnamed += 1
-        if name in self.tasks:
-            raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
-        task = Task(name, self.rig)
-        self.tasks[name] = task
-        return task
-
     def task(self, name: str) -> Task:
         """Return a task by name (-200088 if there is none)."""
         if name not in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.INVALID_TASK, f"Task Name: {name}")
         return self.tasks[name]
 
-    def clear_task(self, name: str) -> None:
+    def create(self, request: Any) -> Fields:
+        """Create a task, or attach to an existing one; an empty name selects an unused one."""
+        name, behavior = request.session_name, request.initialization_behavior
+        if behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_ATTACH_TO_EXISTING:
+            self.task(name)
+        exists = name in self.tasks
+        if (
+            exists
+            and behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_INITIALIZE_NEW
+        ):
+            raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
+        if not name:
+            name = f"_unnamedTask<{self._unnamed}>"
+            self._unnamed += 1
+        self.tasks.setdefault(name, Task(name, self.rig))
+        return {"task": Session(name=name), "new_session_initialized": not exists}
+
+    def clear(self, request: Any) -> Fields:
         """End and delete a task."""
-        self.task(name).abort()
-        del self.tasks[name]
+        self.task(request.task.name).abort()
+        del self.tasks[request.task.name]
         self.rig.changed.notify_all()
+        return {}
 
     def reset(self) -> None:
         """Delete every task, including those of disconnected clients."""
-        for name in tuple(self.tasks):
-            self.clear_task(name)
+        for task in self.tasks.values():
+            task.abort()
+        self.tasks.clear()
+        self.rig.changed.notify_all()
 
 
-Fields = Mapping[str, object]
-"""The fields of a response; status 0 is omitted."""
 TaskCall = Callable[[Task, Any], Fields | None]
 """Function of task and request that returns the fields of the response, if any."""
 
@@ -85,23 +95,6 @@ def pick(request: Any, field: str) -> int:
 def deadline(timeout_s: float) -> float:
     """Return the time of the monotonic clock at which a timeout ends; infinite for a negative one [s]."""
     return math.inf if timeout_s < 0 else time.monotonic() + timeout_s
-
-
-def _create(system: DaqmxSystem, request: Any) -> Fields:
-    name, behavior = request.session_name, request.initialization_behavior
-    exists = name in system.tasks
-    if behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_ATTACH_TO_EXISTING:
-        system.task(name)
-    is_new = behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_INITIALIZE_NEW
-    if exists and not is_new:
-        return {"task": Session(name=name), "new_session_initialized": False}
-    task = system.create_task(name)
-    return {"task": Session(name=task.name), "new_session_initialized": True}
-
-
-def _clear(system: DaqmxSystem, request: Any) -> Fields:
-    system.clear_task(request.task.name)
-    return {}
 
 
 def _is_done(task: Task, _: Any) -> Fields:
@@ -176,8 +169,8 @@ def _set_logging(task: Task, request: Any) -> None:
 
 
 CALLS: Mapping[str, Callable[[DaqmxSystem, Any], Fields]] = {
-    "CreateTask": _create,
-    "ClearTask": _clear,
+    "CreateTask": DaqmxSystem.create,
+    "ClearTask": DaqmxSystem.clear,
     "GetErrorString": lambda _, request: {"error_string": sentence(request.error_code)},
 }
 """Calls on the driver, keyed by their names in the protocol."""
