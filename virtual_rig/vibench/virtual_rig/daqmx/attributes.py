@@ -92,10 +92,6 @@ def _field(name: str, convert: Callable[[Any], object] = lambda value: value) ->
     return write
 
 
-def _coupling(code: int) -> Coupling:
-    return Coupling(member(WireCoupling, code, "AI_Coupling").name)
-
-
 def _require(property_name: str, allowed: Callable[[Any], Enum]) -> Callable[[Any, int], None]:
     """Return a function that accepts the only supported value and refuses other values."""
 
@@ -218,7 +214,8 @@ INPUT: Attributes = {
     "AI_RNG_HIGH": Attribute(lambda channel: channel.range_v),
     "AI_RNG_LOW": Attribute(lambda channel: -channel.range_v),
     "AI_COUPLING": Attribute(
-        lambda channel: WireCoupling[channel.actual_coupling.name], _field("coupling", _coupling)),
+        lambda channel: WireCoupling[channel.actual_coupling.name],
+        _field("coupling", lambda code: Coupling(member(WireCoupling, code, "AI_Coupling").name))),
     "AI_EXCIT_SRC": Attribute(lambda channel: channel.excitation,
         _field("excitation", lambda code: member(ExcitationSource, code, "AI_Excit_Src"))),
     "AI_EXCIT_VAL": Attribute(lambda channel: channel.excitation_a, _field("excitation_a")),

@@ -18,8 +18,6 @@ from .errors import DaqmxRefusal, unsupported_value
 from .rig import QUESTION_S
 from .tasks import Task
 
-READ_ALL = -1
-
 
 @dataclass(frozen=True)
 class Reading:
@@ -223,7 +221,7 @@ def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDA
     channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan
-    if wanted == READ_ALL:
+    if wanted < 0:
         wanted = room if not task.is_running else min(room, default_samples(task))
     if wanted > room:
         detail = f"Room for {room} samples per channel, {wanted} requested"

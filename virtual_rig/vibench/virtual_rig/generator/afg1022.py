@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,10 +259,7 @@ def load_command(header: str) -> Command:
     return replace(row, ask=ask)
 
 
-def _share(settings: ChannelSettings) -> float:
-    return settings.declared_share
-
-
+_share = attrgetter("declared_share")
 _DUTY = number(
     "[SOURce#:]PULSe:DCYCle", "drivers, AFG1062; range assumed", "duty_percent", scpi.PERCENT_UNITS,
     lambda _: (0.1, 99.9), default=50.0, decimals=1,

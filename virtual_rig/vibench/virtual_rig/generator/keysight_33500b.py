@@ -26,9 +26,6 @@ from .scpi_instrument import Command, Quirks, choice, number, setting
 
 _MIDDLE = 32_767
 HIGHEST_RATE_HZ = 250e6
-MOST_BURST_CYCLES = 100_000_000
-SWEEP_S = 1e-3, 250_000.0
-HOLD_S = 0.0, 3600.0
 DEFAULT_SERIAL = "MY52000001"
 _QUIRKS = Quirks(
     first_identity_after_clear_is_empty=False,
@@ -153,15 +150,16 @@ _COMMANDS = (
     number("[SOURce#:]FREQuency:STOP", _GUIDE, "sweep_stop_hz", scpi.FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=1e6, decimals=6),
     setting("[SOURce#:]SWEep:STATe", _GUIDE, lambda s: s.mode is RunMode.SWEEP, _sweeping),
-    number("[SOURce#:]SWEep:TIME", _GUIDE, "sweep_s", _SECONDS, lambda _: SWEEP_S, default=1.0, decimals=6),
-    number("[SOURce#:]SWEep:HTIMe", _GUIDE, "sweep_hold_s", _SECONDS, lambda _: HOLD_S,
-        default=0.0, decimals=6),
+    number("[SOURce#:]SWEep:TIME", _GUIDE, "sweep_s", _SECONDS,
+        lambda _: (1e-3, 250e3), default=1.0, decimals=6),
+    number("[SOURce#:]SWEep:HTIMe", _GUIDE, "sweep_hold_s", _SECONDS,
+        lambda _: (0.0, 3600.0), default=0.0, decimals=6),
     choice("[SOURce#:]SWEep:SPACing", _GUIDE, Spacing,
         lambda s: s.sweep_spacing, lambda s, word: replace(s, sweep_spacing=word)),
     choice("TRIGger#:SOURce", _GUIDE, Trigger, lambda s: s.trigger, lambda s, word: replace(s, trigger=word)),
     setting("[SOURce#:]BURSt:STATe", _GUIDE, lambda s: s.mode is RunMode.BURST,
         partial(with_mode, RunMode.BURST)),
-    burst_cycles(MOST_BURST_CYCLES, channels=2),
+    burst_cycles(100_000_000, channels=2),
     choice("[SOURce#:]BURSt:MODE", _GUIDE, BurstMode,
         lambda s: s.burst_mode, lambda s, mode: replace(s, burst_mode=mode)),
     *map(modulation_switch, (RunMode.AM, RunMode.FM, RunMode.PM, RunMode.FSK, RunMode.PWM)),

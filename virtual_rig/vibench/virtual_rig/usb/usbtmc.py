@@ -54,9 +54,8 @@ class Setup:
     length: int
 
 
-VENDOR_ID = 0x0699
-PRODUCT_ID = 0x0353
-"""USB product number, the same for AFG1022 and AFG1062."""
+AFG1022_IDS = 0x0699, 0x0353
+"""USB vendor and product number, the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
 """Message id, tag, inverted tag, length, attributes, unused termination character (table 1 to 4)."""
 ALIGNMENT = 4
@@ -100,7 +99,7 @@ class _Flight:
 class UsbTmcInstrument:
     """An instrument at a USB cable that can be disconnected."""
 
-    def __init__(self, device: AFG1022, usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID)) -> None:
+    def __init__(self, device: AFG1022, usb_ids: tuple[int, int] = AFG1022_IDS) -> None:
         self._device = device
         self.identification = Identification(*usb_ids, device.maker, device.model, device.serial)
         self._lock = threading.RLock()
