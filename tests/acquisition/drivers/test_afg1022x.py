@@ -285,7 +285,7 @@ class TestFaults:
             if message.startswith(b"DATA:DATA EMEM"):
                 spoilt = plugged.instrument.memory.codes("EMEM").copy()
                 spoilt[4] = 0
-                plugged.instrument.memory.hold(spoilt)
+                plugged.instrument.memory.store("EMEM", spoilt)
 
         plugged.log.after = spoil
         with pytest.raises(SettingRefused, match=r"1024 points were written to its memory.*1023 agree"):

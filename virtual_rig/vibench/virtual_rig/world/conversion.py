@@ -218,11 +218,18 @@ class ConverterInput:
     """One channel: input stage, anti-alias filter, noise, quantiser."""
 
     def __init__(
-        self, stage: InputStage, steps_per_sample: float, start_step: int, noise_v: float, noise: NoiseStream
+        self,
+        stage: InputStage,
+        steps_per_sample: float,
+        start_step: int,
+        history: FloatArray,
+        noise_v: float,
+        noise: NoiseStream,
     ) -> None:
-        """Begin at a step of the world; ``noise_v`` is the rms noise of the converter, in its band.
+        """Begin at a step of the world, after the signals of the steps in ``history``.
 
-        The filter keeps the delay of the present cable.
+        ``noise_v`` is the rms noise of the converter, in its band. The filter keeps the delay of the present
+        cable.
         """
         self.has_clipped = False
         self._stage = stage
@@ -230,13 +237,8 @@ class ConverterInput:
         self._noise_v = noise_v
         self._noise = noise
         self._count_v = volts_per_count(stage.configured.range_v)
-        self._means = np.empty(0)
-        self._means_first_step = 0
-
-    def begin(self, history: FloatArray, first_step: int) -> None:
-        """Process the signals before the conversion; clipping in them is ignored."""
-        self._means, _ = self._stage.pass_on(history)
-        self._means_first_step = first_step
+        self._means, _ = stage.pass_on(history)  # clipping before the conversion is ignored
+        self._means_first_step = start_step - history.shape[1]
 
     def take(self, signals: FloatArray, sample: int, count: int) -> FloatArray:
         """Process the next steps of the world and return the ``count`` samples that they complete [V]."""

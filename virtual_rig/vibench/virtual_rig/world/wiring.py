@@ -8,7 +8,6 @@ from vibench.acquisition.rig import Rig, Role
 
 SECOND_DEVICE = "Dev1"
 """The second converter of the virtual system, connected to the same cables by T-pieces."""
-_USUAL_OUTPUT = f"{SECOND_DEVICE}/ao0"
 
 
 class Signal(IntEnum):
@@ -66,11 +65,6 @@ def signal_rows(rig: Rig) -> dict[Role, int]:
     """Return the row of the world's signals for each role of a rig."""
     fixed = (Role.DRIVE_VOLTAGE, Role.AMPLIFIER_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
     return {role: row for row, role in enumerate((*fixed, *rig.sensors))}
-
-
-def amplifier_input(rig: Rig) -> str:
-    """Return the analogue output whose voltage is added to the generator's at the amplifier's input."""
-    return rig.daq.output_channel or _USUAL_OUTPUT
 
 
 def cables_of(rig: Rig, delay_steps: Mapping[Role, float]) -> dict[str, Cable]:

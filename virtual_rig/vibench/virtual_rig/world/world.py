@@ -34,7 +34,7 @@ from .sensors import (
     SensorParts,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
-from .wiring import OPEN_INPUT, Input, Signal, amplifier_input, cables_of, signal_rows
+from .wiring import OPEN_INPUT, SECOND_DEVICE, Input, Signal, cables_of, signal_rows
 
 
 class AnalogueOutput:
@@ -166,7 +166,8 @@ class World:
         self._converter_noise_v = virtual.converter_noise_v
         self._plan = cables_of(rig, {role: each.delay_steps for role, each in self._sensors.items()})
         self._cables = dict(self._plan)
-        self._amplifier_input = amplifier_input(rig)
+        # The analogue output whose voltage is added to the generator's at the amplifier's input.
+        self._amplifier_input = rig.daq.output_channel or f"{SECOND_DEVICE}/ao0"
         self._outputs: dict[str, AnalogueOutput] = {}
         self._loop = loop
         self._conversions: list[Conversion] = []
@@ -222,13 +223,12 @@ class World:
                     InputStage(configured, self._cables, self._grid),
                     ratio,
                     self._step,
+                    self._history,
                     self._converter_noise_v,
                     self._noise(f"{configured.physical_channel} from step {self._step}"),
                 )
                 for configured in inputs
             )
-            for channel in channels:
-                channel.begin(self._history, self._step - self._history.shape[1])
             conversion = Conversion(channels, ratio, self._step, self._compute_to, self._end)
             self._conversions.append(conversion)
             return conversion
