@@ -127,7 +127,7 @@ def test_a_specimen_may_state_its_format_version(tmp_path):
     assert faults("specimen", text) == []
     for wrong in ("2", "true", '"1"', "0"):
         path.write_text(text.replace("= 1", f"= {wrong}"), encoding="utf-8")
-        with pytest.raises(ValueError, match="is not a version that this vibench reads") as refused:
+        with pytest.raises(ValueError, match="is not version 1, which this vibench reads") as refused:
             load_specimen(path)
         assert "\n" not in str(refused.value)
         assert faults("specimen", path.read_text(encoding="utf-8")) != []
