@@ -95,5 +95,5 @@ def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(refusal, tmp_path):
 def test_an_estimate_reports_a_missing_output_of_the_bench(refusal, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     said = refusal("measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate")
-    assert "branch_3um needs a real-time controller, and this bench has none" in said
+    assert "branch_3um needs a real-time controller, but this bench has none" in said
     assert not (tmp_path / "out").exists()

@@ -59,7 +59,7 @@ class Table:
 
 
 def table(name: str, **columns: ArrayLike) -> Table:
-    """Return a table of ``columns``; their names end with the unit, as in the code."""
+    """Return a table called ``name`` of ``columns``, whose names end with the unit, as in the code."""
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
 
 

@@ -161,7 +161,7 @@ def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of
             return replace(block, volts=block.volts[:, :0]) if next(blocks) > 2 else block
 
         monkeypatch.setattr(type(bench.digitizer), "read", empty_from_the_third_on)
-        with pytest.raises(InstrumentError, match=r"a block of shape \(4, 0\) where \d+ samples"):
+        with pytest.raises(InstrumentError, match=r"a block of shape \(4, 0\), but \d+ samples"):
             bench_report(bench, tmp_path)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 

@@ -79,7 +79,7 @@ def test_an_unknown_driver_is_refused_with_the_known_ones():
 
 def test_a_configuration_with_a_missing_driver_is_refused_before_opening():
     with pytest.raises(
-        ConfigurationError, match=r"generator\.driver = 'plain_scpi' is not installed: afg1022x"
+        ConfigurationError, match=r"generator\.driver = 'plain_scpi' is not installed; give one of afg1022x"
     ):
         load_rig(BENCH)
 

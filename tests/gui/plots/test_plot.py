@@ -232,7 +232,7 @@ def test_pictures_and_numbers_are_copied_and_saved_without_overwriting(plot, qap
         assert (tmp_path / f"a.{ending}").stat().st_size > 40
         with pytest.raises(FileExistsError):
             write_plot(plot, tmp_path / f"a.{ending}")
-    with pytest.raises(OSError, match="ending"):
+    with pytest.raises(OSError, match="must end in"):
         write_plot(plot, tmp_path / "a.nothing")
 
 

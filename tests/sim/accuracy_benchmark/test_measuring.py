@@ -48,7 +48,7 @@ def test_chaotic_scatter_exceeds_differences_between_accuracy_levels():
         assert level.exponent_per_s > 50
     means = [level.response_i for level in chaotic.levels]
     assert np.std(means) / np.mean(means) < 2 * chaotic.levels[0].response_i_scatter
-    assert "Quick is sufficient" in chaotic.advice
+    assert "`quick` is sufficient" in chaotic.advice
 
 
 def test_a_motion_of_another_kind_than_declared_is_refused():

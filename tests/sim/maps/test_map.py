@@ -267,7 +267,7 @@ def test_a_diagram_with_an_error_target_keeps_one_state_per_drive_period():
     [
         ({"accuracy": "quick"}, "accuracy was given with an error or a time"),
         ({"observe": ["response", "lyapunov"]}, "a target is not allowed with lyapunov"),
-        ({"error": 2.0}, "less than or equal to 1"),
+        ({"error": 2.0}, "less than 1"),
     ],
 )
 def test_options_fixed_by_an_error_target_of_a_map_are_refused(given, said):

@@ -78,8 +78,8 @@ def chain_response(
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
-        As in `vibench.sim.chain.integrate_chain`; ``window_s`` is the observed part at the end of the run
-    [s]. initial_state
+        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the observed part at the end.
+    initial_state
         Initial state of every cell, shape (cells, 6); None for rest.
     """
     accuracy = chosen(Accuracy, accuracy)

@@ -161,7 +161,7 @@ def state_place() -> Path:
 
 
 def state_folder() -> Path:
-    """Return the user's state folder, created if missing; raise PermissionError if that fails."""
+    """Return the user's state folder, created if missing; raises PermissionError if that fails."""
     folder = state_place()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
