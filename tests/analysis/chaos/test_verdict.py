@@ -161,13 +161,13 @@ def test_verdicts_from_poincare_points_match_the_simulated_specimen(frequency_hz
 
 @pytest.mark.thorough
 def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
-    """The paper's dwell: a prediction from one neighbour, of three delays, left more of them undecided."""
-    window, skipped = 1300, 300
-    points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + 6 * window)[skipped:, :2]
+    """The paper's dwell: about four windows of five have enough points; no realisation has fewer than three."""
+    window, skipped, count = 1300, 300, 36
+    points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + count * window)[skipped:, :2]
     points = points / points.std(axis=0)
-    kinds = [motion_verdict(Points(each, QUIET), 260.0).kind for each in np.split(points, 6)]
+    kinds = [motion_verdict(Points(each, QUIET), 260.0).kind for each in np.split(points, count)]
     assert set(kinds) <= {MotionKind.CHAOTIC, MotionKind.UNDECIDED}
-    assert kinds.count(MotionKind.CHAOTIC) >= 5
+    assert kinds.count(MotionKind.CHAOTIC) >= 0.6 * count
 
 
 def duffing(periods, damping=0.3, force=0.5, turn=1.2, steps=60):
