@@ -203,7 +203,7 @@ def test_the_first_day_procedure_covers_all_sensors_of_the_template(tmp_path):
 def test_feedback_without_a_sensor_on_m0_is_refused_before_anything_plays(tmp_path):
     level = {"displacement_m": 1e-6}
     rig = rig_with("m2_acceleration", without=("m0_velocity",))
-    with pytest.raises(ConfigurationError, match=r"feedback needs the channel m0_velocity.*Nothing was played"):
+    with pytest.raises(ConfigurationError, match=r"needs the channel m0_velocity.*Nothing was played"):
         measured(
             rig, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
             base_level=level, duration_s=1.0,

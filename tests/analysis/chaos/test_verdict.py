@@ -161,7 +161,7 @@ def test_verdicts_from_poincare_points_match_the_simulated_specimen(frequency_hz
 
 @pytest.mark.thorough
 def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
-    """The paper's dwell: about four windows of five have enough points; no realisation has fewer than three."""
+    """The paper's dwell: some four windows of five are chaotic, in any realisation three or more."""
     window, skipped, count = 1300, 300, 36
     points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + count * window)[skipped:, :2]
     points = points / points.std(axis=0)
