@@ -91,10 +91,11 @@ def test_the_fast_stop_gives_advice_about_a_killed_program():
     with driving("north") as north:
         north.kill()
         north.wait()
-        told = vibench_stop()
-        assert told.returncode == 1
-        assert "was killed. The generator may still be driving: switch the amplifier off" in told.stderr
-        assert "no engine is running" in vibench_stop().stderr
+        for _ in range(2):
+            told = vibench_stop()
+            assert told.returncode == 1
+            said = "ended without confirming that its output is off. The generator may still be driving"
+            assert said in told.stderr
 
 
 @pytest.mark.parametrize("is_killed", [False, True])

@@ -450,7 +450,7 @@ def _write(program: Program) -> Path:
 def _sweep() -> None:
     """Remove files of processes that have ended; file names begin with the process number.
 
-    Fresh confirmations of silence stay, because the sender of a stop may not have read them.
+    Confirmations of silence stay for a minute, because the sender of a stop may not have read them.
     """
     folder, fresh_s = engines_folder(), time() - FRESH_S
     for path in folder.iterdir():
@@ -458,10 +458,13 @@ def _sweep() -> None:
         start, _, rest = rest.rpartition(".")
         is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps by another computer
         is_here = place_of(start) is Place.HERE
-        if is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
+        if rest.startswith("silent-"):
             with suppress(OSError):
-                if not rest.startswith("silent-") or path.stat().st_mtime < fresh_s:
+                if path.stat().st_mtime < fresh_s:
                     path.unlink()
+        elif is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
+            with suppress(OSError):
+                path.unlink()
 
 
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
