@@ -173,7 +173,7 @@ class TestWithoutAnEngine:
         assert said.splitlines()[-1].startswith("stopped")
         with open_recording(tmp_path / "alone.h5") as recording:
             assert recording.reason == "from elsewhere"
-        assert list((Path(os.environ["VIBENCH_STATE_DIR"]) / "engines").iterdir()) == []
+        assert list((Path(os.environ["VIBENCH_STATE_DIR"]) / "engines").glob("*.json")) == []
 
     def test_engine_commands_are_refused_for_other_programs(self, script, vibench_here, tmp_path):
         held = vibench_here("stop", "--level", "hold", cwd=tmp_path)
