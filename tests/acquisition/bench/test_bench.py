@@ -86,10 +86,14 @@ class TestOpening:
             drive_v = bench.digitizer.read(5120).volts[0] * bench.channels[0].units_per_volt
         assert np.std(drive_v) * np.sqrt(2) == pytest.approx(0.5 * rig.generator.terminal_factor(), rel=2e-3)
 
-    def test_a_missing_converter_leaves_the_generator_free(self, laboratory, virtual):
+    def test_a_missing_converter_leaves_the_generator_free_and_silent(self, laboratory, virtual):
+        """As after a killed program: the output is on, and the converter may be reserved for a while."""
+        virtual.generator.execute(b"OUTP1:STAT ON")
+        assert output_of(virtual) == b"1\n"
         lost = changed(laboratory, daq={"server": "127.0.0.1:9"})
         with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
             open_bench(lost, confirm_simulated, CalibrationRule.WAIVED)
+        assert output_of(virtual) == b"0\n"
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
 
     def test_a_missing_generator_leaves_the_converter_free(self, laboratory, virtual):
