@@ -80,6 +80,8 @@ def test_differences_of_two_studies_name_the_changed_fields():
         ("duration_s", "forever", "duration_s"),
         ("observe", ["spectrum"], "response"),
         ("duration_s", 1e300, "it must be 1e\\+12 drive periods at most, 1e\\+10 s"),
+        ("amplitudes_m", [1e-6, 1e30], r"Drive amplitude 1e\+30 m is not allowed"),
+        ("frequencies_hz", [100.0, 1e13], "Drive frequency 10000000000000.0 Hz is not allowed"),
         ("window_s", 0.005, "it must contain one drive period, 0.01 s"),
         ("window_s", 31.0, "within the run of 30.0 s"),
         ("frequencys", [1.0], "frequencys"),

@@ -13,6 +13,7 @@ from vibench.sim import (
     BalanceOptions,
     DrivePath,
     FrequencyPath,
+    Harmonic,
     HarmonicSet,
     Parameter,
     PhaseReference,
@@ -110,6 +111,7 @@ class BranchRequest(SpecimenChoice):
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
+        Harmonic(*self.path.drive(self.stop))  # refuses an impossible drive
         return self
 
     def _refuse_other_resonances(self) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from vibench.sim import Accuracy, SpecimenTable
+from vibench.sim import Accuracy, Harmonic, SpecimenTable
 from vibench.sim.chain import MOST_CELLS, Chain
 from vibench.sim.study import TargetError, TargetTime, frequency_range
 
@@ -67,6 +67,7 @@ class ChainRequest(SpecimenChoice):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
+        Harmonic(self.start_hz, self.amplitude_m)  # refuses an impossible drive
         self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(

@@ -58,6 +58,7 @@ class SpectrumRequest(SpecimenChoice):
             raise ValueError(
                 f"{self.points} points were requested; at most {MOST_POINTS}: take a larger step"
             )
+        Harmonic(*self.drive(self.stop))  # refuses an impossible drive
         return self
 
     @property
@@ -86,9 +87,8 @@ class SpectrumRequest(SpecimenChoice):
     def title(self) -> str:
         """Title for figures."""
         is_level = self.along is Parameter.AMPLITUDE
-        return f"{self.law}, " + (
-            f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
-        )
+        fixed = f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
+        return f"{self.law}, {fixed}"
 
 
 @dataclass(frozen=True)

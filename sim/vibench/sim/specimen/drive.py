@@ -10,8 +10,8 @@ from .stops import Strict, require_positive
 
 FEWEST_SAMPLES = 4
 """Fewest samples: a not-a-knot cubic spline needs four points."""
-SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e100
-"""Allowed amplitudes; squares of smaller displacements would underflow and give zero error estimates."""
+SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
+"""Allowed amplitudes: squares of smaller ones would underflow; larger ones are typing errors and run long."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
 """Allowed frequencies; powers of higher frequencies, and durations in drive periods, would overflow."""
 

@@ -213,14 +213,14 @@ class Study(GridPlan):
         """Raise ValueError for an unknown model or a window that is too short, before any computation."""
         for model in range(len(self.models)):
             for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
-                self.scene((model, 0, gap, 0, 0, 0), Rest())
+                for end in (0, -1):  # the least and the greatest drive
+                    self.scene((model, 0, gap, end, 0, end), Rest())
         return self
 
     @model_validator(mode="after")
     def _fits_a_file(self) -> Self:
-        points = self.grid.size
-        if points > MOST_POINTS:
-            raise ValueError(f"{points} points were requested; a study has at most {MOST_POINTS}")
+        if self.grid.size > MOST_POINTS:
+            raise ValueError(f"{self.grid.size} points were requested; a study has at most {MOST_POINTS}")
         return self
 
     @property
