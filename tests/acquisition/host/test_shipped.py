@@ -39,5 +39,5 @@ def test_a_folder_does_not_hide_a_shipped_file_of_the_same_name(tmp_path, monkey
     (tmp_path / "virtual_rig").mkdir()  # as in a checkout
     assert named("virtual_rig", "hardware_configs").name == "virtual_rig.toml"
     (tmp_path / "mine").mkdir()
-    with pytest.raises(ConfigurationError, match="'mine' is neither an existing file"):
+    with pytest.raises(ConfigurationError, match="'mine' is a folder, not a file nor one that"):
         load_campaign("mine")

@@ -116,3 +116,13 @@ def test_errors_describe_values_without_python_terms(tmp_path, text, told):
 
     file = tmp_path / "words.toml"
     assert refusal(load_toml, file, text, Words).startswith(f"{file}: {told}")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"\x89HDF\r\n\x1a\n\0", "is an HDF5 file"), (b"\xff\xfe\0", "is not UTF-8 text")]
+)
+def test_a_binary_file_is_refused_without_advice_to_save_it_as_text(tmp_path, content, said):
+    path = tmp_path / "c.h5"
+    path.write_bytes(content)
+    with pytest.raises(ConfigurationError, match=f"{said}; give a TOML file, saved as UTF-8"):
+        load_campaign(path)

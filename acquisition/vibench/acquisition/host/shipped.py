@@ -61,8 +61,8 @@ def named(given: Path | str, folder: str) -> Path:
     known = {each.stem: each for each in all_shipped(folder)}
     if path.name not in known:
         raise ConfigurationError(
-            f"{path.name!r} is neither an existing file nor one that comes with vibench: "
-            f"{', '.join(known)}; give one of these names, or the path of a TOML file"
+            f"{path.name!r} is {'a folder, not a' if path.is_dir() else 'neither an existing'} file nor one "
+            f"that comes with vibench: {', '.join(known)}; give one of these, or the path of a TOML file"
         )
     return known[path.name]
 

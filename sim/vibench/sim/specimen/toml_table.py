@@ -24,7 +24,8 @@ def toml_table(path: Path) -> dict[str, Any]:
             f"{path}: cannot be read ({error.strerror}); give the path of a TOML file"
         ) from error
     except UnicodeDecodeError as error:
-        raise UnreadableTomlError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
+        what = "is an HDF5 file" if error.object.startswith(b"\x89HDF") else "is not UTF-8 text"
+        raise UnreadableTomlError(f"{path}: {what}; give a TOML file, saved as UTF-8") from error
     except tomllib.TOMLDecodeError as error:
         raise UnreadableTomlError(f"{path}: is not valid TOML: {error}; correct that line") from error
     except RecursionError as error:
