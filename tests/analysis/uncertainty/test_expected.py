@@ -1,5 +1,6 @@
 """What a plan will know, said before it is played, against what its recording says afterwards."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -180,3 +181,6 @@ def test_a_dwell_is_analysed_over_its_window_or_completely(duration_s, window_s)
     dwell = Dwell(amplitude_vpp=0.05, frequency_hz=130.0, settle_s=1.0, duration_s=duration_s)
     found = expected_uncertainty(Measurement(name="dwell", excitation=dwell), RIG)
     assert {each.time_s for each in found} == {window_s}
+    text = replace(found[1], scatter=0.001).sentence
+    assert f"after {window_s:g} s (analysed window), " in text
+    assert "as planned" not in text

@@ -181,8 +181,9 @@ class Expected(Labelled):
             return f"not known beforehand, because {self._hindrance}"
         if self.scatter == 0.0:
             return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, at any duration; k = 2)"
+        mark = " (analysed window)" if self.quantity in {RESPONSE_I, RESPONSE_II} else " as planned"
         text = ", ".join(
-            f"{100 * half:.2g} % after {time_s:.3g} s" + (" as planned" if time_s == self.time_s else "")
+            f"{100 * half:.2g} % after {time_s:.3g} s" + (mark if time_s == self.time_s else "")
             for time_s, half in self.curve
             if half
         )
