@@ -62,6 +62,10 @@ class _Kind:
         return type(self)(runs, self.mean + share * self.off(ratio), spread)
 
 
+MOST_FACTOR = 10.0
+"""Uncertainty factor above which an estimate is stated as a range only."""
+
+
 @dataclass(frozen=True)
 class Expected:
     """Expected time of a job."""
@@ -75,14 +79,12 @@ class Expected:
 
     def __str__(self) -> str:
         """Return the estimate as text."""
-        learnt = (
-            f"from {self.runs} such runs on this machine"
-            if self.runs >= FEWEST
-            else "from too few such runs on this machine"
-        )
-        return (
-            f"Estimated time on one core: {self.time_s:.1g} s within a factor of {self.factor:.2g}, {learnt}."
-        )
+        time_s, factor = self.time_s, self.factor
+        learnt = f"{self.runs} such runs" if self.runs >= FEWEST else "too few such runs"
+        text = f"{time_s:.1g} s within a factor of {factor:.2g}"
+        if factor > 10.0:  # its centre would mislead
+            text = f"between {time_s / factor:.1g} and {time_s * factor:.1g} s"
+        return f"Estimated time on one core: {text}, from {learnt} on this machine."
 
 
 class CostLedger:
