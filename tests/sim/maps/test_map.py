@@ -24,10 +24,10 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
 @pytest.mark.parametrize(
     ("said", "complaint"),
     [
-        ({}, "a map needs one or two ranges, but the fields with a range are: none"),
+        ({}, "a map needs one or two ranges, but none was given; give start, stop and points"),
         (
             {"frequency_hz": FREQUENCIES, "amplitude_m": LEVELS, "gap_m": LEVELS},
-            "frequency_hz, amplitude_m, gap_m",
+            "but 3 were given: frequency_hz, amplitude_m, gap_m; give",
         ),
         ({"y_m": LEVELS, "chain": ("up",)}, "y_m sets the start"),
         ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is not a power of 2"),
@@ -162,6 +162,7 @@ def test_a_map_estimate_grows_with_work_and_shrinks_with_workers():
     assert several.points == 80
     assert several.work_s > one.work_s
     assert math.isfinite(several.most_useful_workers)
+    assert replace(one, work_s=1e3).most_useful_workers == one.points
 
 
 def test_the_largest_cost_of_a_map_grows_with_its_drive_periods():

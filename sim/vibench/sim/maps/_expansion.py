@@ -208,7 +208,7 @@ class MapEstimate:
     @property
     def most_useful_workers(self) -> int:
         """Largest useful number of workers; more workers would wait for the main process."""
-        return max(1, math.floor(self.work_s / (self.points * POINT_S)))
+        return max(1, min(self.points, math.floor(self.work_s / (self.points * POINT_S))))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
         """Return the elapsed time [s]: shared work and a last point, or the time of the main process."""

@@ -299,10 +299,10 @@ class Map(GridPlan):
             self.require_target_alone("accuracy")
         names = [each.field for each in self.varied]
         if len(names) not in (1, 2):
-            have = "none" if not names else ", ".join(names)
+            have = f"{len(names)} were given: {', '.join(names)}" if names else "none was given"
             raise ValueError(
-                f"a map needs one or two ranges, but the fields with a range are: {have}; give start, stop "
-                f"and points for one or two of {', '.join(each.field for each in QUANTITIES)}"
+                f"a map needs one or two ranges, but {have}; give start, stop and points for one or two of "
+                f"{', '.join(each.field for each in QUANTITIES)}"
             )
         if len(set(self.chain)) != len(self.chain):
             raise ValueError(f"chain = {', '.join(self.chain)} has a direction twice; give each once")
