@@ -236,7 +236,7 @@ SCORED_S = (1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5, 4e-5, 5e-5)
 ALIKE = change("zeta", 0.0165)
 BY_ODE45 = change("exponents", ExponentsBy.ODE45)
 DAMPINGS = (*(damping(value) for value in SCORED_S if value != FigureOptions.damping_time_s), ALIKE)
-"""Dampings to test, in this order, for a claim that depends on the damping."""
+"""Damping values to test, in this order, for a claim that depends on damping."""
 NARROWER_FIT = change("fit", 0.45e-6)
 SEVENTH_COUNTS = change("sum", "power:3@0.05+5@0.15+7@0.8")
 COMPARED_LOWER = change("compared", 400.0)

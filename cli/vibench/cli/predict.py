@@ -200,7 +200,7 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost
     text = " ".join(plan.sentences)
-    if not has_target:  # with a target, the result has the time
+    if not has_target:  # if a target was given, the result states the time
         text += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:

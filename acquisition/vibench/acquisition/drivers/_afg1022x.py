@@ -56,7 +56,7 @@ class AFG1022X(ScpiInstrument):
     identity: Identity
     """Reply to ``*IDN?``; stored completely, because its last field varies."""
     codes: ArbitraryCodes | None = None
-    """Contents of the memory while it is selected."""
+    """Waveform in the memory that the output plays."""
     unconfirmed: tuple[Knob, ...] = ()
     """Settings that could neither be made nor read remotely: the operator must confirm them."""
     _is_known = False

@@ -174,7 +174,7 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
 
 
 def _write(group: h5py.Group, source: object, words: Sequence[str], units: Mapping[str, str]) -> None:
-    """Write fields of an object: words as attributes, arrays as datasets with their units."""
+    """Write fields of an object: strings as attributes, arrays as datasets with their units."""
     for name in words:
         group.attrs[name] = getattr(source, name)
     for name, unit in units.items():

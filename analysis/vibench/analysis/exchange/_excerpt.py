@@ -1,4 +1,4 @@
-"""Part of a recording to export, read in blocks, and its facts for formats that cannot store them."""
+"""Part of a recording to export, and its metadata for formats without a place for them."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence

@@ -203,7 +203,7 @@ class DrawnFigure:
         metadata = {"svg": _NO_DATE, "pdf": _NO_PDF_DATE}.get(kind)
         with styled():
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
-        # Drawing computes the layout, half of the cost; the next format reuses this layout.
+        # The first drawing computes the layout, which is half of the cost; the next format reuses it.
         self.figure.set_layout_engine("none")
         return target.getvalue()
 

@@ -24,7 +24,7 @@ from .results import FrequencyResponse
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within this many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
-"""Least number of lines of a fit: 16 real values for 2 pole parameters and at most 10 linear ones."""
+"""Fewest lines for a fit: 8 complex values determine 2 pole and at most 10 linear parameters."""
 _LEAST_RISE = 3.0
 """Least height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3

@@ -196,6 +196,6 @@ STEPPED_SINE = stepped_analysis(lambda plan, _: plan.amplitude_vpp)
 STEPPED_LEVEL = stepped_analysis(
     lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), result=SteppedLevelAnalysis
 )
-# With feedback the setting differs from the plan's and is unknown for each step.
+# With feedback the generator voltage differs from the plan and is not known for each step.
 SETTLED_SINE = stepped_analysis(lambda *_: nan)
 RESONANCE_TRACKING = stepped_analysis(lambda *_: nan, SegmentLabel.RESONANCE)

@@ -194,7 +194,7 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Distance from a simpler motion, over the gap, within which a step may pass through that motion."""
+"""Distance to a simpler motion, as a fraction of the gap, below which a step may pass it."""
 IS_SIMPLER = 1e-7
 """Distance from a simpler motion, over the gap, that is due to rounding: both are the same motion."""
 

@@ -115,7 +115,7 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
         factor = np.linalg.cholesky(stiffness / np.outer(root, root))
     except np.linalg.LinAlgError:
         factor = np.zeros_like(stiffness)
-    # Singular values are the frequencies; eigenvalues of K would lose twice as many digits of a slow mode.
+    # Singular values are the frequencies; eigenvalues of K would lose twice as many digits of a low mode.
     modes, omega, _ = np.linalg.svd(factor)
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
