@@ -67,3 +67,38 @@ def test_a_fit_is_printed_in_words_and_saved_as_a_specimen_file(vibench_here, fo
     assert predicted.returncode == 0, predicted.stderr
     (point,) = json.loads(predicted.stdout)["points"]
     assert point["response_i"] == pytest.approx(abs(base_transmissibility(fitted, 130.0)[0, 0]), rel=1e-6)
+
+
+LEVELS = """
+name = "levels"
+[defaults]
+ramp_s = 0.3
+[[measurements]]
+name = "noise"
+[measurements.excitation]
+kind = "white_noise"
+amplitude_vpp = {}
+band_start_hz = 20
+band_stop_hz = 800
+realisations = 2
+settle_s = 1.5
+"""
+
+
+@pytest.mark.parametrize("level_vpp", [0.3, 1.0])
+def test_noise_with_collisions_is_refused(vibench_here, tmp_path, level_vpp):
+    """At 1 Vpp the motion is chaotic: realisations scatter no more than periods."""
+    (tmp_path / "levels.toml").write_text(LEVELS.format(level_vpp))
+    measured = vibench_here("measure", "levels.toml", "--out", "levels", "--check", "waived", cwd=tmp_path)
+    assert measured.returncode == 0, measured.stderr
+    result = vibench_here("analyse", "levels", "--fit", "--no-simulate", "--out", "report", cwd=tmp_path)
+    said = " ".join(result.stdout.split())
+    assert result.returncode == 0, result.stderr
+    assert "Fitted" not in said
+    assert "No value is fitted to noise: about any linear response, m0 scatters" in said
+    assert "masses collide, or friction acts; measure weaker noise." in said
+    assert not (tmp_path / "report" / "specimen.toml").exists()
+    as_json = vibench_here("analyse", "levels", "--fit", "--no-simulate", "--json", cwd=tmp_path)
+    fit = json.loads(as_json.stdout)["specimen_fit"]
+    assert (fit["fits"], fit["values"]) == (False, {})
+    assert fit["suspects"][0]["assumption"] == "linearity"

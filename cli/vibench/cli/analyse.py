@@ -197,6 +197,7 @@ def _analyse(
         updated = None if fit is None else fit_specimen(paths, name, observer, fit)
         overlay = overlay if updated is None else updated.specimen
         results = analyse_files(paths, name, simulation, request, observer, overlay, draws)
+        updated = None if updated is None else updated.checked(results)
         motions = list(hidden_motions(results, overlay, observer, hidden))
         others = {
             role: analyse_files(
@@ -205,7 +206,7 @@ def _analyse(
             for role, having in other_responses(paths).items()
         }
     if updated is not None:
-        results = replace(results, model_sentences=updated.sentences)
+        results = replace(results, model_sentences=(updated := updated.checked(results)).sentences)
     from vibench.analysis.report import check_warnings, findings, write_report
 
     if as_json:

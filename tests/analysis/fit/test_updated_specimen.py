@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -174,3 +175,17 @@ def test_missing_data_for_a_fit_give_a_one_sentence_error(measured):
         update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep goes from"):
         fit_gap([], gong2025())
+
+
+def test_a_fit_whose_simulation_disagrees_with_its_noise_gives_no_values(measured, updated):
+    def overlaid(*, agrees):
+        overlay = SimpleNamespace(ensemble=(SimpleNamespace(agrees=agrees),))
+        return replace(measured, results=tuple(replace(each, overlay=overlay) for each in measured.results))
+
+    assert updated.checked(overlaid(agrees=True)) is updated
+    refused = updated.checked(overlaid(agrees=False))
+    assert not refused.fitted
+    assert not refused.fits
+    assert refused.specimen == gong2025()
+    (said,) = refused.sentences
+    assert said.startswith("No value is fitted to noise: a simulation of the fitted specimen disagrees")

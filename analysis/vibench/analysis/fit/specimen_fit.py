@@ -24,7 +24,7 @@ from .parameters import (
     parameter_value,
     with_values,
 )
-from .suspects import Suspect, suspects
+from .suspects import Assumption, Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
 """Relative standard deviation of a converter clock; recordings do not reveal its error."""
@@ -132,6 +132,13 @@ def fit_specimen(
         confidence=confidence,
         phase_rad=found.phases,
     )
+
+
+def not_linear(nominal: Specimen, sentence: str) -> SpecimenFit:
+    """Return a refused fit for a recording that contradicts any linear model, as ``sentence`` explains."""
+    suspect = Suspect(Assumption.LINEARITY, sentence, np.nan, mends=False, behind=0.0)
+    nan = float("nan")
+    return SpecimenFit(nominal, (), np.zeros((0, 0)), 0, nan, nan, (suspect,), nan, (nan, nan))
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:

@@ -38,6 +38,7 @@ class Assumption(StrEnum):
     EXTRA_MODE = "extra mode"
     TABLE_MASS = "table mass"
     GAPS = "gaps"
+    LINEARITY = "linearity"
 
 
 @dataclass(frozen=True)

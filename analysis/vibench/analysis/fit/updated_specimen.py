@@ -13,10 +13,11 @@ from vibench.sim.background import Observer, ignore_progress
 
 from ..errors import AnalysisError, NotEnoughData
 from ..frequency_response.distortion import scatters_beyond_noise
-from ..frequency_response.noise_response import NoiseAnalysis
+from ..frequency_response.noise_response import NoiseAnalysis, scatter_over_silence
 from ..kinds.analysis_kind import NoiseResult
 from ..overlay.driven_rig import described_shaker
 from ..overlay.shaker_fit import fit_shaker
+from ..recordings.channels import RecordedChannels
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Labelled, columns, plain, plus_minus
@@ -24,11 +25,14 @@ from ..uncertainty.budget import stated_uncertainties
 from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
 from .gap_fit import bracketed_gap, fit_gap
 from .parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
-from .specimen_fit import SpecimenFit, fit_specimen
+from .specimen_fit import SpecimenFit, fit_specimen, not_linear
 from .suspects import Assumption, Suspect
 
 _SURELY = 3.3
 """Number of standard deviations that one correct description in a thousand exceeds."""
+_LARGEST_SCATTER = 100.0
+"""Largest variance about a linear response over that in silence; light collisions reach some thousands."""
+_WEAKER = "masses collide, or friction acts; measure weaker noise"
 _LEAST_RELATIVE_SD = 2e-3
 """Relative error of the fitted table mass due to coil, filters and held samples."""
 
@@ -127,6 +131,25 @@ class UpdatedSpecimen(Labelled):
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
+    def checked(self, results: CampaignResults) -> "UpdatedSpecimen":
+        """Return the fit, without values if its overlay in ``results`` disagrees with the fitted noise."""
+        overlays = [
+            each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
+        ]
+        if not self.values or all(curve.agrees for each in overlays if each for curve in each.ensemble):
+            return self
+        described = self.nominal.specimen()
+        why = f"a simulation of the fitted specimen disagrees with the recording: {_WEAKER}"
+        return replace(
+            self,
+            specimen=described,
+            values=(),
+            collisions=None,
+            linear=not_linear(described, why),
+            table=None,
+            not_determined=(),
+        )
+
     @property
     def description(self) -> SpecimenDescription:
         """Fitted specimen in the form of a specimen file; other values as in the bench configuration."""
@@ -195,7 +218,9 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
     if updated.collisions is not None:
         yield from updated.collisions.sentences
     linear, table = updated.linear, updated.table
-    if linear is not None and not linear.fits:
+    if linear is not None and not linear.lines:
+        yield f"No value is fitted to {updated.linear_from}: {linear.suspects[0].sentence}."
+    elif linear is not None and not linear.fits:
         yield (
             f"The model does not fit {updated.linear_from}: chi² is {linear.reduced_chi_square:.3g} per "
             f"degree of freedom; a correct model exceeds {linear.limit:.3g} in 1 of 1000 cases. No fitted "
@@ -301,6 +326,12 @@ def _linear(
         reasons.append("Damping and frequencies stay as described: no noise was recorded.")
         return None
     facts, weakest = results.noise[0].analysis.facts, results.noise[0].analysis.response
+    with open_recording(facts.path) as recording:
+        channels = RecordedChannels(recording, response=facts.response)
+        scatter = scatter_over_silence(channels, results.noise[0].analysis.excitation, weakest)
+    if scatter > _LARGEST_SCATTER:
+        why = f"about any linear response, m0 scatters {np.sqrt(scatter):.2g} times as much as in silence"
+        return not_linear(nominal, f"{why}: {_WEAKER}")
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
         return fit_specimen(

@@ -399,6 +399,45 @@ def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
     return tuple(without_bounds(each) for each in found)
 
 
+_QUIET_S = 0.05
+_QUIET_BLOCKS = 200
+
+
+def scatter_over_silence(channels: Channels, noise: Noise, found: NoiseResponse) -> float:
+    """Return the variance about the linear response over that of the channels in silence, median of lines.
+
+    NaN for hits. Chaos scatters alike between periods and between realisations, so only silence reveals it.
+    Recordings start or end in silence; without one, the ratio is too small.
+    """
+    length, rate = round(_QUIET_S * channels.sample_rate_hz), round(channels.sample_rate_hz)
+    label = SegmentLabel.NOISE if found.periodic is None else SegmentLabel.REALISATION
+    stretches = channels.stretches(label)
+    starts = np.concatenate([np.arange(each.start, each.stop - length, length) for each in stretches])
+    if found.hits is not None or not starts.size:
+        return np.nan
+
+    def powers(at: Reals) -> Reals:
+        blocks = [channels.read(int(each), int(each) + length)[1:] for each in at]
+        return np.abs(np.fft.rfft(blocks * np.hanning(length))) ** 2
+
+    lines = found.frequency_response
+    block_hz = np.fft.rfftfreq(length, 1 / channels.sample_rate_hz)
+    inside = (block_hz >= noise.band_start_hz) & (block_hz <= noise.band_stop_hz)
+    ends = [np.arange(0, rate - length, length), channels.samples - np.arange(length, rate, length)]
+    calm = powers(np.concatenate(ends))
+    level = calm[:, 1, inside].sum(axis=1)
+    played = np.nanmean(powers(starts[:: -(-starts.size // _QUIET_BLOCKS)]), axis=0)
+    silent = np.sum(np.mean(calm[level <= 2 * np.nanmin(level)], axis=0) / played, axis=0)
+    if found.periodic is None:
+        scatter = 2 * lines.n_eff * lines.relative_sd_magnitude**2
+    else:
+        periods = min(each.periods for each in found.periodic.repetitions)
+        varied = found.periodic.distortion_variance
+        scatter = found.periodic.noise_variance + (0.0 if varied is None else varied)
+        scatter = scatter * periods / found.periodic.frequency_response.magnitude**2
+    return float(np.nanmedian(scatter / np.interp(lines.frequency_hz, block_hz, silent)))
+
+
 @dataclass(frozen=True, eq=False)
 class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
     """Analysis of a noise measurement: the transmission from base to m0."""
