@@ -198,8 +198,9 @@ def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output,
     digitizer.start()
     digitizer.read(1280)
     virtual.faults.lose_daq_server()
-    with pytest.raises(InstrumentLost, match=r"MAY STILL BE PLAYING.*0\.5 s.*switch the amplifier off"):
-        output.stop()
+    for _ in range(2):  # a second attempt does not count as silence
+        with pytest.raises(InstrumentLost, match=r"MAY STILL BE PLAYING.*0\.5 s.*switch the amplifier off"):
+            output.stop()
     virtual.faults.heal()
     with pytest.raises(InstrumentLost, match="no longer knows the task"):
         digitizer.close()

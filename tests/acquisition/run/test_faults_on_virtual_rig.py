@@ -5,18 +5,22 @@ Silence is looked at in the simulated world, at the generator's terminal, not in
 
 import re
 
+import numpy as np
 import pytest
 
 from tests.changed import changed
 from vibench.acquisition import (
     InstrumentError,
     InstrumentLost,
+    StopLevel,
+    StopSwitch,
     open_recording,
     run_measurement,
 )
 from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
 from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 from .ending_silent import bench_on, kept_drive, terminal_v, when_recording
 
@@ -26,6 +30,7 @@ DWELL = Measurement(
     ramp_s=0.3,
     ramp_step_s=0.03,
 )
+SILENT_V = 5e-3
 SWEEP = DWELL.model_copy(
     update={"excitation": SineSweep(amplitude_vpp=1.5, start_hz=200, stop_hz=230, duration_s=3, settle_s=0.2)}
 )
@@ -112,3 +117,54 @@ def test_a_laser_drop_out_and_an_over_range_are_flagged_without_ending_the_run(l
         flagged = [overload for overload in recording.overloads if overload.channel == "m0_velocity"]
         samples = sum(overload.last_sample - overload.first_sample + 1 for overload in flagged)
         assert samples / recording.sample_rate_hz == pytest.approx(0.2, abs=0.05)
+
+
+def test_a_stuck_relay_is_silenced_by_the_amplitude(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    switch = StopSwitch()
+
+    def stop_with_stuck_relay(progress):
+        if progress.state is RunState.RECORDING and switch.request is None:
+            virtual.faults.stick_output()
+            switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off pressed"))
+
+    with bench_on(connected) as bench:
+        with pytest.raises(InstrumentError, match=r"its amplitude had to be lowered.*MAY STILL BE ON"):
+            run_measurement(
+                bench, DWELL, tmp_path / "run.h5", on_progress=stop_with_stuck_relay, switch=switch
+            )
+        assert terminal_v(virtual) < SILENT_V
+    with open_recording(tmp_path / "run.h5") as recording:
+        off, *again = [event.sample for event in recording.events if event.kind == "off"]
+        assert 0 < (again[0] - off) / recording.sample_rate_hz < 1.5
+        assert np.max(np.abs(recording.read("drive_voltage")[-100:])) < SILENT_V
+
+
+def test_a_stuck_relay_is_silenced_after_a_second_keyboard_interrupt(laboratory, tmp_path):
+    virtual, connected = laboratory()
+
+    def interrupt(progress):
+        if progress.state is RunState.RECORDING:
+            virtual.faults.stick_output()
+            switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off pressed"))
+        if progress.state is RunState.RAMPING_DOWN:
+            raise KeyboardInterrupt
+
+    switch = StopSwitch()
+    with bench_on(connected) as bench:
+        with pytest.raises(KeyboardInterrupt):
+            run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=interrupt, switch=switch)
+        assert terminal_v(virtual) < SILENT_V
+
+
+def test_an_output_that_stays_on_is_lowered_and_reported(laboratory):
+    virtual, connected = laboratory()
+    execute = virtual.generator.execute
+    with bench_on(connected) as bench:
+        bench.generator.load_sine(260.0, 1.5)
+        bench.generator.start()
+        virtual.generator.execute = lambda sent: execute(sent.replace(b"STAT OFF", b"STAT ON"))
+        with pytest.raises(InstrumentLost, match="amplitude was set to the minimum"):
+            bench.generator.stop()
+        assert terminal_v(virtual) < SILENT_V
+        virtual.generator.execute = execute

@@ -203,10 +203,16 @@ class AFG1022X(ScpiInstrument):
                 last = str(failure)
             else:
                 return
+        try:
+            self._mute()
+            lowered = "; its amplitude was set to the minimum"
+        except InstrumentError:
+            lowered = ""
+        self._forget()
         raise InstrumentLost(
             f"THE OUTPUT OF {self.name} MAY STILL BE ON: it could not be switched off in "
-            f"{2 * _STOP_ATTEMPTS} attempts, the last two over a new connection. Turn the amplifier's gain "
-            f"down, switch the amplifier off, then check cable and power of the generator ({last})"
+            f"{2 * _STOP_ATTEMPTS} attempts, the last two over a new connection{lowered}. Turn the "
+            f"amplifier's gain down, switch the amplifier off, then check cable and power of the generator ({last})"
         )
 
     def close(self) -> None:

@@ -44,6 +44,8 @@ class DaqmxOutput:
         self._resources = ExitStack()
         self._task: Task | None = None
         self._written = 0
+        self._is_zero = True
+        """Whether nothing was reserved since the output went to zero; otherwise `stop` tries again."""
         self._is_open = True
         self.idle = IdleOutput.HELD
         """Voltage of the output when it runs out of samples, as read back: zero if the device can do this."""
@@ -106,7 +108,7 @@ class DaqmxOutput:
 
         Raises InstrumentLost when the device or its server is gone: the output then runs empty by itself.
         """
-        if self._task is None:
+        if self._is_zero:
             return
         task, self._task, self._written = self._task, None, 0
         try:
@@ -115,8 +117,10 @@ class DaqmxOutput:
                 last.callback(self._release)
                 # An output that ran out of samples reports this again; it has stopped, as required.
                 last.enter_context(suppress(DataLost))
-                with daqmx_call(f"stopping {self._physical}"):
-                    task.stop()
+                if task is not None:
+                    with daqmx_call(f"stopping {self._physical}"):
+                        task.stop()
+            self._is_zero = True
         except InstrumentLost as error:
             raise InstrumentLost(
                 f"{error}. {self._physical} MAY STILL BE PLAYING the samples that were written ahead, at "
@@ -127,7 +131,8 @@ class DaqmxOutput:
     def close(self) -> None:
         """Release the output, at zero volts. Legal at any time."""
         self._is_open = False
-        self.stop()
+        if self._task is not None:  # otherwise `stop` has succeeded, or raised its error
+            self.stop()
 
     def _reserve(self) -> Task:
         config, physical = self._config, self._physical
@@ -153,7 +158,7 @@ class DaqmxOutput:
             task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
             task.control(TaskMode.TASK_RESERVE)
             undo.pop_all()
-        self._task = task
+        self._task, self._is_zero = task, False
         return task
 
     def _release(self) -> None:

@@ -10,7 +10,16 @@ import numpy as np
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation.steps import Play, Stream, Tone, Waveform, full_level
 from ..instruments import FunctionGenerator, Sweep
-from ..plan import FEWEST_STAIRS, DriveSource, Measurement, Phase, RunState, half_cosine, stairs
+from ..plan import (
+    CHECK_FREQUENCY_HZ,
+    FEWEST_STAIRS,
+    DriveSource,
+    Measurement,
+    Phase,
+    RunState,
+    half_cosine,
+    stairs,
+)
 
 QUIET = 1.25
 """Setting at level 0, where ramps start and end, over the generator's smallest setting (for a waveform of
@@ -150,13 +159,19 @@ class GeneratorDrive:
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands, then turn the output off in any case.
 
-        Used when the run ends without sampling. The ramp has about 20 commands of a few milliseconds each, or
-        four on a slow generator.
+        Used when the run ends without sampling, or when switching off did not silence. The ramp has about 20
+        commands of a few milliseconds each, or four on a slow generator. If the output was off already, or
+        the ramp failed, the amplitude is lowered last: a stuck relay reads back as off.
         """
+        was_off = not self._is_on
         try:
             with suppress(AcquisitionError):  # if the ramp fails, stop() still switches off
                 self._ramp_down_blindly()
         finally:
+            self._stop()
+        if self._setting_vpp > self._quiet_vpp() and (was_off or self._level > 0.0):
+            with suppress(AcquisitionError):
+                self._lower()
             self._stop()
 
     def _sound(self, play: Play | None) -> None:
@@ -245,7 +260,15 @@ class GeneratorDrive:
         if self._is_on and self._dead_man is not None:
             self._generator.end_burst()
         self._is_on = False
-        self._level = 0.0
+
+    def _lower(self) -> None:
+        """Set the amplitude of level 0 while the output is off."""
+        quiet_vpp = self._quiet_vpp()
+        try:
+            self._generator.set_amplitude(quiet_vpp)
+        except AcquisitionError:  # its settings are unknown after a failed change
+            self._generator.load_sine(CHECK_FREQUENCY_HZ, quiet_vpp)
+        self._level, self._setting_vpp = 0.0, quiet_vpp
 
     def _set_level(self, level: float) -> None:
         self._level = level

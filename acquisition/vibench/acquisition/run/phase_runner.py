@@ -1,13 +1,14 @@
 """Play phases while every block is read, recorded and checked against the limits."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from enum import Enum, auto
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import DriveLate, RunStalled
+from ..errors import AcquisitionError, DriveLate, RunStalled
 from ..excitation.steps import Play, Tone
 from ..instruments import Block, Samples, Sweep
 from ..plan import Phase, RunState
@@ -18,7 +19,7 @@ from .acquisition_loop import BLOCK_S, AcquisitionLoop
 from .drive import Drive
 from .ending import Progress
 from .limit_monitor import LimitMonitor
-from .silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
+from .silence_watch import LISTEN_S, LONGEST_S, LOWER_AFTER_S, SilenceWatch
 from .until import UntilWatch
 
 DELAY_SAMPLES = 40
@@ -362,10 +363,24 @@ class PhaseRunner:
         self._silence.require_silence()
 
     def _listened(self) -> Iterator[Progress]:
-        """Continue to record until the measured drive is silent, or for `LONGEST_S`."""
-        give_up_s = self.loop.elapsed_s + LONGEST_S
+        """Continue to record until the measured drive is silent, or for `LONGEST_S`.
+
+        A drive that is still measured is switched off again, and its amplitude lowered, at growing intervals.
+        """
+        give_up_s, wait_s = self.loop.elapsed_s + LONGEST_S, LOWER_AFTER_S
         yield from self._read(LISTEN_S)
+        if not self._silence.is_silent:
+            self.loop.cut()
+            yield from self._read(LISTEN_S)  # and all samples converted before the output was off
+        lower_s = self.loop.elapsed_s + wait_s
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
+            if self.loop.elapsed_s > lower_s:
+                self._silence.note_heard()
+                with suppress(AcquisitionError):  # the measurement decides
+                    self._drive.silence()
+                self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
+                self.loop.cut()
+                lower_s, wait_s = lower_s + 2 * wait_s, 2 * wait_s
             yield from self._read(LISTEN_S)
 
     def _read(self, duration_s: float, into: Heard | None = None, lead_s: float = 0.0) -> Iterator[Progress]:

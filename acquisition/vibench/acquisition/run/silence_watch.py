@@ -163,6 +163,8 @@ LISTEN_S = 0.02
 """Step of the search for silence: one period of the mains [s]."""
 LONGEST_S = 12.0
 """Longest search for silence [s]; longer than the converter's buffer."""
+LOWER_AFTER_S = 1.0
+"""Time of measured drive after which the amplitude is lowered too [s]; the output's relay may be stuck."""
 STILL_ON = 0.1
 """Fraction of the largest recorded drive above which a remaining signal cannot be hum."""
 
@@ -180,7 +182,7 @@ class SilenceWatch:
         self._residue_v = inf
         self._loudest_v = 0.0
         self.is_heard = False
-        """Whether the drive was still measured at the end of the search for silence."""
+        """Whether the drive was still measured after its output was switched off."""
 
     def learn_hum(self, quiet: Samples) -> None:
         """Set the limit of silence from ``quiet``, shape (channels, samples) [V], while nothing plays."""
@@ -209,13 +211,20 @@ class SilenceWatch:
     def text(self) -> str:
         """Return the time from stop to silence as text."""
         took_s = (self._last_loud + 1 - self._begin) / self._sample_rate_hz
+        if self.is_silent and self.is_heard:
+            seen = f"{took_s:.3f} s after the stop was seen (now {self._residue_v:.2g} V)"
+            return f"not silent by switching off: its amplitude had to be lowered, {seen}"
         if self.is_silent:
             return f"{took_s:.3f} s from the stop being seen to measured silence ({self._residue_v:.2g} V)"
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
+    def note_heard(self) -> None:
+        """Note whether more than hum remains although the output was switched off."""
+        self.is_heard |= not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
+
     def require_silence(self) -> None:
-        """Raise InstrumentError if more than hum remains."""
-        self.is_heard = not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
+        """Raise InstrumentError if more than hum remained after switching off."""
+        self.note_heard()
         if self.is_heard:
             raise InstrumentError(
                 f"the drive is {self.text()}. It was commanded off and the recording is kept; THE OUTPUT "
@@ -308,6 +317,7 @@ class DriveGuard(ClosedOnLeaving):
         if not self._is_leaving:
             self._switch.ask(self._standstill)
         self._drive.cut()
+        self._drive.silence()  # lowers the amplitude, because nothing is measured now
         self._is_cut = True
         self._confirm()
 
