@@ -134,7 +134,7 @@ def test_a_description_round_trips_through_its_text(tmp_path):
         (("2e4,", '"stiff",'), "stiffnesses_n_per_m.0 = 'stiff'"),
         (("[30e-6, inf]", "[inf, inf]"), "finite at one stop"),
         (("linear_gap:1e5", "rubber"), "rubber"),
-        (("hertz_stiffness = 4.9e9", ""), "hertz_stiffness is missing"),
+        (("hertz_stiffness = 4.9e9", ""), 'hertz_stiffness is missing; give it, or model = "gong2025" for'),
         (("name =", "damping_time_s = 1e-5\nname ="), "both are given"),
         (("dampings_ns_per_m", "# "), "neither is given"),
         (("[30e-6, inf]", "[1e-5, 2e-5, 3e-5]"), r"a number above 0 \[m\], or \[lower, upper\]"),

@@ -396,7 +396,7 @@ def _complaint(specimen: str, error: ValidationError) -> str:
     message = fault_in_words(first)
     match first["type"]:
         case "missing":
-            fault = f"{key} is missing"
+            fault = f'{key} is missing; give it, or model = "{USUAL_SPECIMEN}" for all keys of that specimen'
         case "extra_forbidden":
             fault = f"{first['loc'][-1]} is not a key of a specimen; allowed are {', '.join(sorted(_KEYS))}"
         case _ if key:
