@@ -57,7 +57,6 @@ def compare_recording(
     with open_recording(path) as recording:
         result, failures = result_of(recording, simulation, request)
     facts = result.analysis.facts
-    name = facts.name
     if facts.mass != "m0":
         raise UnusableData(
             f"{path.name} is a point of a scan on {facts.mass}, but comparisons show m0; choose a recording "
@@ -65,10 +64,10 @@ def compare_recording(
         )
     return ComparedRecording(
         path=path,
-        name=name,
+        name=facts.name,
         recording_id=facts.recording_id,
         samples_id=facts.samples_id,
-        curves=tuple(sorted_curve(each) for each in _curves(result, name)),
+        curves=tuple(sorted_curve(each) for each in _curves(result, facts.name)),
         failures=tuple(each.sentence for each in failures),
         warnings=tuple(each.text for each in result.analysis.checks if each.verdict is Verdict.WARNING),
         kept=pickle.dumps((result, failures)),
@@ -90,7 +89,7 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
     found = drive_level(result)
     if not found:
         raise NotEnoughData(
-            f"{compared.name} has no level over a range of frequencies; choose a stepped sine or a sweep"
+            f"{compared.path.name} has no level over a range of frequencies; choose a stepped sine or a sweep"
         )
     return found
 
