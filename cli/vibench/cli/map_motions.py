@@ -117,7 +117,7 @@ def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> N
     """Print the caption, the motions, and for a basin map its boundary and the effect of kicks."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
-        console.print(f"{number}: {motion_words(motion)}")
+        console.print(f"{number}: {motion_words(results, motion)}")
     if len(results.motions) > SHOWN_MOTIONS:
         console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer motions: see the table or --json.")
     if results.plan.is_basin:

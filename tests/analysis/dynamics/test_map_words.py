@@ -1,9 +1,13 @@
 """The caption of a map: what tells its figure from that of another specimen, law or start."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from vibench.analysis.dynamics import map_caption
-from vibench.sim.maps import Map, Range, solve_map
+from vibench.analysis.dynamics import map_caption, motion_words
+from vibench.sim import MotionKind
+from vibench.sim.maps import Audit, Map, MapMotion, Range, solve_map
+from vibench.sim.scene.shares import Share
 
 OWN = {"name": "mine", "masses_kg": (5.8e-3, 2.1e-3, 2.2e-3)}
 
@@ -33,3 +37,22 @@ def test_a_caption_names_every_changed_specimen_value(said, words):
     levels = Range(start=1e-9, stop=2e-9, points=2)
     plan = Map.model_validate({"amplitude_m": levels, "periods": 100, "window_periods": 10, **said})
     assert map_caption(solve_map(plan, workers=1)).startswith(words)
+
+
+CHAOS = MapMotion(MotionKind.CHAOTIC_SO_FAR, None, True, 4.08, 2.0, Share(0.7134, 0.1707, 0.9678))
+
+
+@pytest.mark.parametrize(
+    ("random_starts", "filled", "end"),
+    [
+        (0, None, "71.34% of the points"),
+        (0, 0, "71.34% of the points"),
+        (0, 5, "71.34% of the points; if all were computed 17.07% to 96.78%"),
+        (3, None, "71.34% of the points; with other random starts 17.07% to 96.78%"),
+    ],
+)
+def test_the_share_of_a_motion_has_an_interval_only_if_it_is_an_estimate(random_starts, filled, end):
+    plan = Map(frequency_hz=Range(start=100.0, stop=200.0, points=3), random_starts=random_starts)
+    audit = None if filled is None else Audit(filled, 0, 0, (0.0,), (0.0,))
+    said = motion_words(SimpleNamespace(plan=plan, audit=audit), CHAOS)
+    assert said == f"chaotic, Response I 4.08: {end}"

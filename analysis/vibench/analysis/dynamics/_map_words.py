@@ -58,14 +58,16 @@ def motion_classes(results: MapResults) -> Reals:
     return found
 
 
-def motion_words(motion: MapMotion) -> str:
-    """Return the name and share of a motion."""
-    kind = f"period {motion.period}" if motion.period is not None else str(motion.motion)
+def motion_words(results: MapResults, motion: MapMotion) -> str:
+    """Return the name and share of a motion; the share has an interval only if it is an estimate."""
+    kind = motion.motion.removesuffix(" so far") if motion.period is None else f"period {motion.period}"
     kind = kind if motion.has_impacts else "no impacts"
-    share = motion.share
-    return (
-        f"{kind}, Response I {motion.response_i:.3g}: {share.share:.2%} ({share.low:.2%} to {share.high:.2%})"
-    )
+    text = f"{kind}, Response I {motion.response_i:.3g}: {motion.share.share:.2%} of the points"
+    interval = f"{motion.share.low:.2%} to {motion.share.high:.2%}"
+    if results.plan.random_starts:
+        return f"{text}; with other random starts {interval}"
+    is_estimate = results.audit is not None and results.audit.filled > 0
+    return f"{text}; if all were computed {interval}" if is_estimate else text
 
 
 def map_caption(results: MapResults) -> str:

@@ -135,11 +135,8 @@ def _draw_classes(axes: Axes, results: MapResults) -> None:
         cmap=colours,
         norm=BoundaryNorm(np.arange(len(MOTION_CLASSES) + 1) - 0.5, colours.N),
     )
-    known = [k for k in range(len(MOTION_CLASSES)) if np.any(classes == k)]
-    handles = [
-        Patch(facecolor=MOTION_CLASSES[k][1], edgecolor="#9a9a9a", linewidth=1.0, label=MOTION_CLASSES[k][0])
-        for k in known
-    ]
+    known = [MOTION_CLASSES[k] for k in range(len(MOTION_CLASSES)) if np.any(classes == k)]
+    handles = [Patch(facecolor=fill, edgecolor="#9a9a9a", linewidth=1.0, label=name) for name, fill in known]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5)
 
 
@@ -150,7 +147,8 @@ def _draw_basins(axes: Axes, results: MapResults) -> None:
     colours = ListedColormap(list(_COLOURS[: len(shown)]))
     norm = BoundaryNorm(np.arange(len(shown) + 1) - 0.5, colours.N)
     _draw(axes, results, np.minimum(numbers, len(shown) - 1), cmap=colours, norm=norm)
-    handles = [Patch(facecolor=_COLOURS[k], label=motion_words(each)) for k, each in enumerate(shown)]
+    labels = [motion_words(results, each) for each in shown]
+    handles = [Patch(facecolor=_COLOURS[k], label=label) for k, label in enumerate(labels)]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1)
 
 

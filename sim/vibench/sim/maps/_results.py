@@ -162,7 +162,7 @@ class MapResults(GridResults[Map]):
         return self._described(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Return the motions reached from the starts of one cell, the most common first."""
+        """Return the motions of a cell, the most common first; `place`: second quantity, first quantity."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
