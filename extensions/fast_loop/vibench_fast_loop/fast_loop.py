@@ -165,7 +165,7 @@ _POINTS = 25
 _PERIODS, _WHOLE = range(1, 41), 2e-5
 """Numbers of periods to try, and tolerance; the smallest with a whole number of samples is used."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Samples per period for the slope of the spring force, without and with stops."""
+"""Samples per period at which the slope of the spring force is taken, without and with stops."""
 _PART_S = 1e-6
 """Longest part of a sample for which the slope of the stops is constant [s]; a contact has a hundred."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)

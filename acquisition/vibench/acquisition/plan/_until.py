@@ -28,7 +28,7 @@ class Until(FrozenModel):
     """
 
     resonance_hz: Wish | None = None
-    """Required bound on the frequency of every resonance found in noise: ``"0.1 %"``."""
+    """Uncertainty to reach for the frequency of every resonance under noise excitation: ``"0.1 %"``."""
     transmissibility: Wish | None = None
     """Required bound on the transmissibility at every resonance found in noise: ``"2 %"``."""
     response_i: Wish | None = None

@@ -356,7 +356,7 @@ class _Scan:
         slope, offset = 0.0, float(np.mean(distance))
         if np.ptp(places):
             fitted = np.polyfit(places / span, distance, 1)
-            # In a short file, a line through the few extremes may fit worse than the line through the ends.
+            # In a short file, a line through few extremes may be worse than the line from first to last.
             if np.ptp(distance - fitted[0] * places / span) < np.ptp(distance):
                 slope, offset = float(fitted[0]), float(fitted[1])
         off = distance - slope * places / span - offset
@@ -432,7 +432,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
 def restarts(
     starts_s: Mapping[int, float], rate_hz: float | None, samples: int
 ) -> tuple[tuple[tuple[int, int], ...], str]:
-    """Return runs (as in `TimeAxis`) of a channel with several stated starts, and a contradiction or ""."""
+    """Return the runs (as in `TimeAxis`) of a channel with several starts, and a contradiction or ""."""
     runs = [(0, 0)]
     first_s = next(iter(starts_s.values()), 0.0)
     for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):

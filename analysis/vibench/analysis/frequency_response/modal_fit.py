@@ -58,7 +58,7 @@ class Resonance:
 
     @property
     def remark(self) -> str:
-        """Sentence on a fit that does not describe its lines, or on overlapping modes; otherwise empty."""
+        """Warning if the fit does not match the spectral lines or modes overlap; otherwise empty."""
         if self.is_explained and self.overlap > 1.0:
             return f"two modes overlap at {self.frequency_hz:.5g} Hz; the bounds include this overlap"
         if self.is_explained:
@@ -370,7 +370,7 @@ class _Sums:
 
     def misfit_rates(self, poles: Reals) -> Reals:
         """Return the derivatives of the residual with respect to each pole."""
-        # The dependence of the factors on the poles does not change the gradient (Kaufman 1975, BIT 15, 49-57).
+        # That the factors depend on the poles does not change the gradient (Kaufman 1975, BIT 15, 49-57).
         factors, _, onto = self.factors(poles)
         rates = self.pole_rates(poles, factors)
         return np.asarray(onto @ (onto.T @ rates) - rates)

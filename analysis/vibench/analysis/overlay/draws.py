@@ -538,7 +538,7 @@ class StretchDraws:
 def stretch_draws(
     recording: Recording, specimen: Specimen, start: int, stop: int, fitted: FittedShaker | None = None
 ) -> StretchDraws:
-    """Return a source of draws under the recorded voltage from sample ``start`` to ``stop``.
+    """Return a source of draws driven by the recorded voltage from sample ``start`` to ``stop``.
 
     Near the end of the recording, the stretch is shortened to leave 50 ms for the fade-out.
 

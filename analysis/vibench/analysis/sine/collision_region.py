@@ -124,7 +124,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
     threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
     above, is_clear = residual > threshold, sweep.is_clear & (residual > _CLEARLY * threshold)
     is_known = bool(np.isfinite(sweep.linear_residual).all())
-    is_clear[0] &= is_known  # An unknown specimen may still ring from its start.
+    is_clear[0] &= is_known  # The initial transient of an unknown specimen may not have decayed.
     inside = np.zeros(above.size, dtype=np.bool_)
     regions = []
     is_voted = _majority(above, votes) | binary_opening(is_clear & impacts, np.ones(2, np.bool_))

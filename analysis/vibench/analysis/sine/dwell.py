@@ -264,7 +264,7 @@ class DwellResponse(Labelled):
     noise_density: float
     """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """RMS displacement noise by this density, or noise in the silence if larger [m]."""
+    """RMS displacement noise from this density, or noise measured without drive if larger [m]."""
     displacement: ConvertedSignal
     """x over the record [m]; the window lies in its settled part."""
     is_clear: Flags

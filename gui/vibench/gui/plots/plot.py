@@ -37,7 +37,7 @@ def steady_range(shown: Range, data: Range) -> Range | None:
     if is_inside and size >= LEAST_USED * (shown[1] - shown[0]):
         return None
     if size <= 0.0:
-        # A constant signal needs some range around it in any unit.
+        # A constant signal needs an axis range around its value, whatever its unit.
         half = 0.5 * abs(low) or 1e-3
         wanted = (low - half, high + half)
         return None if is_inside and shown[1] - shown[0] <= 8 * half else wanted

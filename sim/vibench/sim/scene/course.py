@@ -297,7 +297,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have ended on a torus, which does not repeat either: only the growth tells them apart.
+        # Chaos may have become quasi-periodic, which does not repeat either: only its growth rate differs.
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [

@@ -302,7 +302,7 @@ class _Refinement:
         elif len(near) > 0 and not now < path.distance:
             path.closest = 0.3 * float(changes[near[0]])
             known = self._nearest(recent[-1], KNOWN * size)
-            # A motion that stops approaching a known motion may be near another one, such as its mirror image.
+            # A motion that stops approaching a known motion may be near another, such as its mirror image.
             is_new = known is not None and known is not path.orbit
             path.orbit = (known if is_new else self._newton(path.run, int(near[0]) + 1)) or path.orbit
             now = self._away_from(path.orbit, recent[-1], size)

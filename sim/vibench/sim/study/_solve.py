@@ -87,7 +87,7 @@ class Expansion(Points):
         return np.arange(len(arrays[FINAL_STATE]))
 
     def unchained(self, number: int) -> Scene:
-        """Return the scene of a point that does not continue another."""
+        """Return the scene of a point that does not start from another point's final state."""
         place = self.grid.place(number)
         start = self._study.starts[place[-2]]
         match start:

@@ -51,7 +51,7 @@ USUAL_GRID = TimeGrid()
 
 
 def relative_clock_ppm(clock_ppm: float, converter_clock_ppm: float) -> float:
-    """Return another instrument's clock error relative to rig time, which the converter counts [ppm]."""
+    """Return the clock error of another instrument relative to the converter's clock [ppm]."""
     return ((1.0 + clock_ppm * PPM) / (1.0 + converter_clock_ppm * PPM) - 1.0) / PPM
 
 
