@@ -32,7 +32,7 @@ _SURELY = 3.3
 """Number of standard deviations that one correct description in a thousand exceeds."""
 _LARGEST_SCATTER = 100.0
 """Largest variance about a linear response over that in silence; light collisions reach some thousands."""
-_WEAKER = "masses collide, or friction acts; measure weaker noise"
+_WEAKER = "so masses may collide or rub; measure weaker noise"
 _LEAST_RELATIVE_SD = 2e-3
 """Relative error of the fitted table mass due to coil, filters and held samples."""
 
@@ -139,7 +139,7 @@ class UpdatedSpecimen(Labelled):
         if not self.values or all(curve.agrees for each in overlays if each for curve in each.ensemble):
             return self
         described = self.nominal.specimen()
-        why = f"a simulation of the fitted specimen disagrees with the recording: {_WEAKER}"
+        why = f"a simulation of the fitted specimen disagrees with the recording, {_WEAKER}"
         return replace(
             self,
             specimen=described,
@@ -331,7 +331,7 @@ def _linear(
         scatter = scatter_over_silence(channels, results.noise[0].analysis.excitation, weakest)
     if scatter > _LARGEST_SCATTER:
         why = f"about any linear response, m0 scatters {np.sqrt(scatter):.2g} times as much as in silence"
-        return not_linear(nominal, f"{why}: {_WEAKER}")
+        return not_linear(nominal, f"{why}, {_WEAKER}")
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
         return fit_specimen(
