@@ -44,6 +44,7 @@ from ._header import (
 )
 from ._layout import (
     CHUNK_SAMPLES as CHUNK_SAMPLES,
+    GAPS as GAPS,
     MISSING_COUNT as MISSING_COUNT,
     PART_SUFFIX as PART_SUFFIX,
     SUFFIX as SUFFIX,

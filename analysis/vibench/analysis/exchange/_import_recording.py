@@ -19,6 +19,7 @@ import numpy as np
 from vibench.acquisition import Block, Overload
 from vibench.acquisition.plan import AbstractExcitation, Segment, Step
 from vibench.acquisition.recording import (
+    GAPS,
     ChannelHeader,
     Origin,
     RecordingHeader,
@@ -316,7 +317,7 @@ def _write(
     starts = {each.start: each.segment for each in parts}
     stops = {each.stop for each in parts}
     edges = {*range(0, samples, BLOCK_SAMPLES), *starts, *(stop for stop in stops if stop < samples), samples}
-    ordered = sorted(edges)
+    ordered, gaps = sorted(edges), 0
     for start, stop in pairwise(ordered):
         if start in stops:
             writer.end_segment()
@@ -324,6 +325,12 @@ def _write(
             writer.begin_segment(starts[start].label, **starts[start].numbers)
         values = np.stack([each.read(source, start, stop) for each in wanted])
         for block in _blocks(values, start, wanted):
+            gaps += block.first_sample > writer.samples
+            if gaps > GAPS.capacity:
+                raise InvalidRequest(
+                    f"samples are missing in more than {GAPS.capacity} places of the file, and a recording "
+                    "stores no more; import a shorter file, or one without lost samples"
+                )
             writer.append(block)
         observer(values.size)
     if samples in stops:
