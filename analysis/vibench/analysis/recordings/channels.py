@@ -249,6 +249,6 @@ def read_whole(channels: Channels, stretch: Stretch) -> Reals:
     if lost:
         raise UnusableData(
             f"{lost} of {stretch.samples} samples were lost in this part, so its motion cannot be analysed; "
-            "measure again"
+            "measure again, or import a part of the file without lost samples"
         )
     return data
