@@ -61,7 +61,9 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerance of a time on an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative deviation of an interval from the median; share of such intervals that means coarse times."""
+"""Relative deviation from a multiple of the typical interval; share of such intervals in coarse times."""
+_SINGLE = 0.2
+"""Quantile of the intervals that is a single one, even if two samples in five were lost."""
 _LEAST_ROUNDED = 10
 """Minimum number of differing intervals to recognize rounding; fewer could be regularly lost samples."""
 _ROUNDED_SPREAD = 1.05
@@ -192,7 +194,8 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
-    if scan is None or not (is_named or (first.size >= _LEAST_RISING and not scan.is_coarse)):
+    is_even = scan is not None and first.size >= _LEAST_RISING and not (scan.is_coarse or scan.is_inferred)
+    if scan is None or not (is_named or is_even):
         return None
     for block in chain((first,), iterator):
         scan.add(block)
@@ -278,43 +281,52 @@ def agrees(rate_hz: float, bounds_hz: tuple[float, float]) -> bool:
 
 
 def _begin(block: Reals) -> "_Scan | None":
+    block = block[np.isfinite(block)]
     intervals = np.diff(block)
     rising = intervals[intervals > 0]
     if not rising.size or np.count_nonzero(intervals >= 0) < _RISING * intervals.size or block.size < 2:
         return None
-    typical = float(np.median(rising))
+    # A lost sample doubles an interval; rounding lengthens it by a third at most if samples can be counted.
+    typical = float(np.median(rising[rising <= 1.4 * np.quantile(rising, _SINGLE)]))
     is_near = np.abs(intervals / typical - 1) <= _OFF
+    # Repeated and coarse times have intervals of zero, which lost samples do not explain.
+    is_off = np.abs(intervals / typical - np.maximum(np.rint(intervals / typical), 1)) > _OFF
     mean = float(block[-1] - block[0]) / intervals.size
-    if np.count_nonzero(~is_near) > _MANY_OFF * intervals.size + 1:
+    many = _MANY_OFF * intervals.size + (intervals.size > 2)
+    if np.count_nonzero(is_off) > many:
         return _Scan(mean, float(np.quantile(rising, 0.01)))
-    if digit := _last_digit(block, intervals[~is_near] - typical):
+    are_many_lost = bool(np.count_nonzero(~is_near) > many)
+    digit = typical if are_many_lost else _last_digit(intervals[~is_near] - typical, typical)
+    spread = _COARSE_SPREAD if are_many_lost else _ROUNDED_SPREAD
+    if digit and _distance_from_line(block) < spread * digit:
         return _Scan(mean, digit)
     near = intervals[is_near]
-    return _Scan(float(np.mean(near)), min(float(np.ptp(near)) / 2, 0.8 * _OFF * typical))
+    rounding = min(float(np.ptp(near)) / 2, 0.8 * _OFF * typical)
+    return _Scan(float(np.mean(near)), rounding, is_inferred=are_many_lost)
 
 
-def _last_digit(block: Reals, off: Reals) -> float:
-    """Return the last decimal digit of evenly spaced times if rounding explains their intervals; else 0.
+def _last_digit(off: Reals, typical: float) -> float:
+    """Return the last decimal digit of times whose rounding may explain their intervals; else 0.
 
     Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
     later times away from a line; rounding moves each time by half a digit at most.
     """
-    if off.size < _LEAST_ROUNDED:
-        return 0.0
-    step = float(np.min(np.abs(off)))
-    digit = 10.0 ** round(np.log10(step))
-    place = np.arange(block.size) / block.size
-    apart = block - block[0]
-    apart = apart - np.polyval(np.polyfit(place, apart, 1), place)
-    is_rounded = abs(step / digit - 1) < _ROUNDED_SPREAD - 1 and np.ptp(apart) < _ROUNDED_SPREAD * digit
-    return digit if is_rounded else 0.0
+    step = float(np.min(np.abs(off))) if off.size >= _LEAST_ROUNDED else 0.0
+    digit = 10.0 ** round(np.log10(step)) if 0 < step < 1.5 * typical else 0.0
+    return digit if abs(step - digit) < (_ROUNDED_SPREAD - 1) * digit else 0.0
+
+
+def _distance_from_line(times: Reals) -> float:
+    place = np.arange(times.size) / times.size
+    apart = times - times[0]
+    return float(np.ptp(apart - np.polyval(np.polyfit(place, apart, 1), place)))
 
 
 class _Scan:
     """Scan of times; it keeps the jumps and the largest deviations from an even axis."""
 
-    def __init__(self, interval: float, rounding: float) -> None:
-        self._interval, self._rounding = interval, rounding
+    def __init__(self, interval: float, rounding: float, *, is_inferred: bool = False) -> None:
+        self._interval, self._rounding, self.is_inferred = interval, rounding, is_inferred
         self.is_coarse = rounding > _OFF * interval
         self._last: tuple[float, int] | None = None
         self._start = 0.0
@@ -367,16 +379,17 @@ class _Scan:
         trouble = self._trouble or _impossible(self._runs, self._samples, span)
         if not trouble and spread > allowed:
             trouble = (
-                f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis, which "
-                "lost samples do not explain"
+                f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis: they "
+                "are uneven, or have too few digits to count lost samples"
             )
         is_exact = spread < EVEN * interval
         if is_exact:
-            before, place = self._last or (self._start, 1)
+            before, place = self._last or (self._start + interval, 1)
             interval = (before - self._start) / place if place else interval
-        uncertainty = 0.0 if is_exact else spread / span
+        # Rounded times with lost samples may have the same intervals, so the mapping must confirm the rate.
+        uncertainty = 1e-12 * interval * self.is_inferred if is_exact else spread / span
         start = self._start if is_exact else self._start + offset
-        rounding = 2 * self._rounding / self._samples**0.5
+        rounding = 2 * self._rounding / max(self._samples, 1) ** 0.5
         return TimeAxis(start, interval, uncertainty, rounding, tuple(self._runs), trouble)
 
 
@@ -416,7 +429,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
         back = max(0, end - place)
         if back > _MOST_REPEATED:
             raise InvalidRequest(
-                f"the times of {channel.name} go back by {back} samples at its sample {first}, as if two "
+                f"the times of {channel.title} go back by {back} samples at its sample {first}, as if two "
                 'records were joined; export each record alone, or give time = "even" to ignore the times'
             )
         while back and kept and kept[-1].end > place:
@@ -447,7 +460,6 @@ def restarts(
 
 _APART = 0.1
 """Largest offset between channels that are analysed together, in sample intervals."""
-_IGNORE = 'give time = "even" and sample_rate_hz in the mapping to ignore it'
 _UNITS = ("s", "ms", "us", "ns", "min", "h", "d")
 
 
@@ -464,6 +476,8 @@ class Alignment:
     """Delay of each channel that remains after rounding to whole intervals; at most half an interval."""
     remarks: tuple[str, ...]
     """Remarks on the times in the file, and on times that the mapping replaces."""
+    is_contradicted: bool
+    """Whether the replaced times show another sample rate or lost samples."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:
@@ -476,7 +490,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
     for each in placed:
         if each.time_trouble:
             raise InvalidRequest(
-                f"{path.name} {each.time_trouble} ({each.name}); export it again, or {_IGNORE}"
+                f"{path.name} {each.time_trouble} (channel {each.title}); export it again{_or_ignore(placed)}"
             )
     rate_hz = _rate_hz(placed, mapping, path)
     _require_one_shift(placed, mapping, path)
@@ -497,15 +511,31 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
         raise InvalidRequest(f"the channels of {path.name} do not overlap in time; choose channels that do")
     for each, offset, own in zip(placed, offsets, cut, strict=True):
         if offset:
-            remarks[f"{each.name} starts {offset / rate_hz:.6g} s after the first channel"] = None
+            remarks[f"{each.title} starts {offset / rate_hz:.6g} s after the first channel"] = None
         if len(own) > 1 or own[-1].end - own[0].place != each.samples:
             missing = own[-1].end - own[0].place - sum(one.samples for one in own)
-            remarks[f"the times of {each.name} jump; {missing} samples are lost there"] = None
+            remarks[f"the times of {each.title} jump; {missing} samples are lost there"] = None
         low, high = each.rates_hz
         if each.time_unit is not None and (high / low - 1) * each.samples > 1:
-            remarks[f"the times of {each.name} have too few digits to show every lost sample"] = None
+            remarks[f"the times of {each.title} have too few digits to show every lost sample"] = None
     late_s = tuple((offset - round(offset)) / rate_hz for offset in offsets)
-    return Alignment(rate_hz, places, tuple(cut), late_s, tuple(remarks))
+    is_contradicted = any(_is_contradicted(each, mapping) for each in channels)
+    return Alignment(rate_hz, places, tuple(cut), late_s, tuple(remarks), is_contradicted)
+
+
+def _or_ignore(channels: Sequence[SourceChannel]) -> str:
+    """Return the advice to ignore the times; empty if they show lost samples, which must be counted."""
+    if any(len(each.runs) > 1 for each in channels):
+        return ""
+    return ', or, if no samples are missing, give time = "even" and sample_rate_hz to ignore its times'
+
+
+def _is_contradicted(channel: SourceChannel, mapping: ImportMapping) -> bool:
+    if mapping.time != "even" or mapping.sample_rate_hz is None:
+        return False
+    stated = _with_unit(channel, mapping.model_copy(update={"time": None}))
+    is_same = agrees(mapping.sample_rate_hz, stated.rates_hz)
+    return not is_same or len(channel.runs) > 1 or bool(channel.time_trouble)
 
 
 def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> Iterator[str]:
@@ -518,6 +548,8 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
             start = f", starts at {each.start_s:.9g} s" if each.start_s else ""
             trouble = f", {each.time_trouble}" if each.time_trouble else ""
             text = f"{rate_text}{start}{runs}{trouble}"
+            if _is_contradicted(each, mapping):
+                text += "; where these are right, frequencies and amplitudes are wrong"
             yield f"the mapping's {given:.9g} samples/s replace the times of the file ({text})"
         elif each.time_unit is not None and mapping.time_unit not in {None, each.time_unit}:
             text = each.time_unit or "no unit"
@@ -563,7 +595,9 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
     given = mapping.sample_rate_hz
     if given is None and (not rates_hz or not _same(rates_hz, longest)):
         why = "does not state its sample rate exactly" if not rates_hz else "states several sample rates"
-        raise InvalidRequest(f"{path.name} {why}; give sample_rate_hz in the mapping")
+        low, high = channels[0].rates_hz
+        about = f" (its times give about {(low + high) / 2:.5g})" if high < inf else ""
+        raise InvalidRequest(f"{path.name} {why}{about}; give sample_rate_hz in the mapping")
     rate = given if given is not None else rates_hz[0]
     for each in channels:
         low, high = each.rates_hz
@@ -572,7 +606,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
             way = "export the file again" if each.sample_rate_hz is None else "leave its sample_rate_hz out"
             raise InvalidRequest(
                 f"{path.name} states {rate_text} samples/s, but the mapping {rate:.9g}; correct the mapping, "
-                f"or {way}; or {_IGNORE}"
+                f"or {way}{_or_ignore(channels)}"
             )
         highest_hz = mapping.measurement.excitation.band_hz[1]
         if each.time_unit == "" and 2 * highest_hz > rate:
@@ -583,7 +617,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
     if not _same(rates_hz, longest):
         raise InvalidRequest(
             f"{path.name} states {rates_hz[0]:.9g} and {rates_hz[-1]:.9g} samples/s for different channels, "
-            f"which drift apart; export them with one clock, or {_IGNORE}"
+            f"which drift apart; export them with one clock{_or_ignore(channels)}"
         )
     return rate
 
@@ -604,7 +638,7 @@ def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping
             said = ", ".join(f"{name} = {shortened(value)}" for name, value in differing)
             raise InvalidRequest(
                 f"{path.name} states {said} for {first.name} and {each.name}, which may shift their times; "
-                f"give delay_s of both channels in the mapping, or {_IGNORE}"
+                f"give delay_s of both channels in the mapping{_or_ignore(channels)}"
             )
 
 
@@ -619,11 +653,11 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
     if unknown:
         raise InvalidRequest(
             f"{path.name} states the start of some channels, but not of {', '.join(unknown)}; choose "
-            f"channels that all state it or all do not, or {_IGNORE}"
+            f"channels that all state it or all do not{_or_ignore(channels)}"
         )
     if max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels)) * rate_hz > _APART:
         raise InvalidRequest(
             f"the channels of {path.name} start at different times, stated with too few digits to align "
-            f"them; export them with the same start, or {_IGNORE}"
+            f"them; export them with the same start{_or_ignore(channels)}"
         )
     return [(each.start_s - min(known)) * rate_hz for each in channels if each.start_s is not None]

@@ -32,7 +32,7 @@ from vibench.acquisition.recording import (
 from ..errors import InvalidRequest, UnusableData
 from ..recordings.channels import DRIVE
 from ..signals.arrays import Flags, Reals
-from ._alignment import Piece, align
+from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
 from ._mapping import ChannelMapping, ImportMapping
 from ._source import Source, channel_blocks, find_channel, opened_source
@@ -179,7 +179,7 @@ def import_recording(
             expected_samples=samples,
             origin=_origin(wanted, mapping, path),
             plan_json=mapping.measurement.model_dump_json(),
-            bench_json=json.dumps(_bench(path, mapping, wanted, aligned.remarks)),
+            bench_json=json.dumps(_bench(path, mapping, wanted, aligned)),
             confirmations=mapping.confirmations,
             provenance=replace(
                 collect_provenance(),
@@ -282,7 +282,7 @@ def _power_of_two_above(peak: float, name: str) -> float:
 
 
 def _bench(
-    path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], remarks: Sequence[str]
+    path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], aligned: Alignment
 ) -> dict[str, Any]:
     """Return the known facts of the bench, and facts on the imported file."""
     with path.open("rb") as file:
@@ -296,7 +296,8 @@ def _bench(
             "imported_utc": datetime.now(UTC).isoformat(timespec="seconds"),
             "mapping": mapping.model_dump(mode="json"),
             "channels": [asdict(each.source) for each in wanted],
-            "time": list(remarks),
+            "time": list(aligned.remarks),
+            "time_contradicted": aligned.is_contradicted,
         },
     }
     if mapping.specimen is not None:

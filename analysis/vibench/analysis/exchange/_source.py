@@ -21,7 +21,7 @@ from ._excerpt import BLOCK_SAMPLES
 from ._hdf5_source import Hdf5Source, open_hdf5_source
 from ._mapping import unit_in_name
 from ._mat import open_mat
-from ._source_channel import SourceChannel
+from ._source_channel import NAME_SHOWN, SourceChannel
 from ._tdms_source import open_tdms
 from ._uff import open_uff
 from ._wav import open_wav
@@ -68,8 +68,8 @@ DAMAGE = (
 """Errors that h5py, npTDMS and scipy raise for damaged files."""
 
 
-CHANNELS_SHOWN, NAME_SHOWN = 20, 60
-"""Maximum number of channels in a message, and maximum length of each name."""
+CHANNELS_SHOWN = 20
+"""Maximum number of channels in a message."""
 MOST_CHANNELS = 4096
 """Maximum number of channels; more mean a transposed table or a damaged file."""
 
@@ -191,12 +191,7 @@ def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     if len(found) == 1:
         return found[0]
     many = "several channels" if found else "no channel"
-    named = [_channel_in_words(each) for each in source.channels[:CHANNELS_SHOWN]]
+    named = [each.title for each in source.channels[:CHANNELS_SHOWN]]
     rest = len(source.channels) - len(named)
     held = ", ".join(named) + (f" and {rest} more" if rest else "")
     raise InvalidRequest(f"{path.name} has {many} {shortened(wanted, NAME_SHOWN)!r}; it has {held}")
-
-
-def _channel_in_words(channel: SourceChannel) -> str:
-    label = f" ({shortened(channel.label, NAME_SHOWN)})" if channel.label else ""
-    return repr(shortened(channel.name, NAME_SHOWN)) + label

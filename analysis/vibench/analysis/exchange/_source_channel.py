@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibench.acquisition import shortened
 from vibench.acquisition.recording import Origin
 
 from ..signals.arrays import Reals
 
 EXACT_KINDS = {"i": 4, "u": 2}
 """Largest size in bytes of signed and unsigned integers that a recording can store exactly."""
+NAME_SHOWN = 60
+"""Maximum length of a name in a message."""
 LEAST_INTERVAL_S = 1e-100
 """Shortest accepted interval between samples, so that its inverse is finite."""
 SECONDS = {
@@ -139,6 +142,12 @@ class SourceChannel:
     """Names and values of facts that may shift the times in an unknown way, such as a delay."""
     time_trouble: str = ""
     """Contradiction in the file's time information; empty if there is none."""
+
+    @property
+    def title(self) -> str:
+        """Name and label in messages."""
+        label = f" ({shortened(self.label, NAME_SHOWN)})" if self.label else ""
+        return repr(shortened(self.name, NAME_SHOWN)) + label
 
     @property
     def are_counts(self) -> bool:

@@ -209,9 +209,10 @@ def _rates(facts: RecordingFacts) -> Check:
 
 
 def _import_time_checks(facts: RecordingFacts) -> Iterator[Check]:
-    remarks = facts.bench.get("imported", {}).get("time", ())
-    if remarks:
-        yield Check("Time of the imported file", Verdict.NOTE, "; ".join(remarks))
+    imported = facts.bench.get("imported", {})
+    if remarks := imported.get("time", ()):
+        verdict = Verdict.WARNING if imported.get("time_contradicted") else Verdict.NOTE
+        yield Check("Time of the imported file", verdict, "; ".join(remarks))
 
 
 def _calibrations(facts: RecordingFacts) -> Check:
