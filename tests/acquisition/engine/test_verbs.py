@@ -7,6 +7,7 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition import CheckRule, ConfigurationError, StopLevel
+from vibench.acquisition.campaign import PointOutcome
 from vibench.acquisition.engine import (
     CampaignRequest,
     Engine,
@@ -20,6 +21,7 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.engine._server import answer_to
 from vibench.acquisition.engine._verbs import VERBS
 from vibench.acquisition.engine._wire import Message
+from vibench.acquisition.plan import RunState
 
 from .conftest import PATIENCE_S, campaign
 
@@ -206,3 +208,40 @@ def test_requests_and_answers_round_trip(handler):
     assert answer_to(handler, VERBS["beat"].message()).text == b'{"ok": true}'
     looked = answer_to(handler, VERBS["look"].message(most=3))
     assert json.loads(looked.text).keys() == {"run_id", "first_sample", "sample_rate_hz", "shape"}
+
+
+def test_a_hold_that_the_drive_cannot_keep_is_refused(shipped_rig, tmp_path):
+    """The hold was confirmed, but it ramped the run down and ended it as carried out."""
+    generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
+    engine, refusals = Engine(Supervision.UNATTENDED), []
+    handler = RequestHandler(engine, JobQueue(engine))
+    engine.open(shipped_rig.model_copy(update={"generator": generator}))
+    tell = engine.published.tell
+
+    def hold(progress, bench):
+        tell(progress, bench)
+        if progress.run.state is RunState.RECORDING and not refusals:
+            with pytest.raises(EngineError, match=r"cannot be held\. The run continues; stop") as refused:
+                handler.carry_out(VERBS["stop"], {"level": StopLevel.HOLD})
+            refusals.append(refused)
+
+    engine.published.tell = hold
+    request = CampaignRequest(campaign=campaign("m", duration_s=1.0), folder=tmp_path, check=CheckRule.WAIVED)
+    (point,) = engine.measure(request)
+    assert refusals
+    assert point.outcome is PointOutcome.RECORDED
+    engine.close()
+
+
+def test_a_run_that_cannot_be_held_counts_as_stopped(shipped_rig, tmp_path):
+    generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
+    engine = Engine(Supervision.UNATTENDED)
+    engine.open(shipped_rig.model_copy(update={"generator": generator}))
+    engine.switch.hold()  # before the run: the engine cannot know yet
+    request = CampaignRequest(campaign=campaign("m", duration_s=1.0), folder=tmp_path, check=CheckRule.WAIVED)
+    (point,) = engine.measure(request)
+    assert point.outcome is PointOutcome.STOPPED
+    assert engine.switch.request is not None
+    ended = json.loads((tmp_path / f"{request.campaign.name}.log.jsonl").read_text().splitlines()[-1])
+    assert ended["why"] == "stopped"
+    engine.close()

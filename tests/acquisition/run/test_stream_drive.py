@@ -181,10 +181,13 @@ class TestEveryWayOut:
 
     def test_a_hold_ramps_a_stream_down_with_a_reason(self, streaming_bench, tmp_path):
         run = run_upto(RunState.RECORDING, streaming_bench, tmp_path)
+        assert "cannot be held" in run.switch.refusal_to_hold()
         run.switch.hold()
         list(run)
         assert run.outcome.state is RunState.STOPPED
         assert "cannot be held" in run.outcome.reason
+        assert run.switch.request.reason == run.outcome.reason  # a campaign ends as stopped
+        assert not run.switch.refusal_to_hold()
         assert_faded_without_a_step(streaming_bench)
 
     @heard_state

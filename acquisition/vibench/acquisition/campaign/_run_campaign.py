@@ -119,7 +119,9 @@ class CampaignRunner:
         except BaseException as error:
             self._ended(f"{campaign.name} ended: {type(error).__name__}", "stopped")
             raise
-        self._ended(f"{campaign.name} {self._closing()}", "stopped" if self._coming else "carried_out")
+        is_stopped = any(each.outcome is PointOutcome.STOPPED for each in self._results)
+        reason_code = "stopped" if self._coming or is_stopped else "carried_out"
+        self._ended(f"{campaign.name} {self._closing()}", reason_code)
         return tuple(self._results)
 
     def _name_damaged(self) -> None:

@@ -212,7 +212,8 @@ class AFG1022X(ScpiInstrument):
         raise InstrumentLost(
             f"THE OUTPUT OF {self.name} MAY STILL BE ON: it could not be switched off in "
             f"{2 * _STOP_ATTEMPTS} attempts, the last two over a new connection{lowered}. Turn the "
-            f"amplifier's gain down, switch it off, then check cable and power of the generator ({last})"
+            "amplifier's gain down, switch the amplifier off, then check cable and power of the generator "
+            f"({last})"
         )
 
     def close(self) -> None:

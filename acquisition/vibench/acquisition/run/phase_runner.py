@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum, auto
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 
@@ -395,19 +395,27 @@ class PhaseRunner:
         Signals that must be fed with samples cannot be held. The recording has space for `HOLD_LONGEST_S`;
         after that, the run is ramped down.
         """
-        if not self._drive.can_hold:
-            source = self._drive.drive_source.value
-            reason = f"a stream of the {source} cannot be held: the run was ramped down"
-            raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
+        if refusal := self.refusal_to_hold():
+            self._stop_held(f"{refusal}: the run was ramped down")
         before = self.state
         self._enter(RunState.HELD)
         while self._switch.is_holding:
             self._held_s += BLOCK_S
             if self._held_s > HOLD_LONGEST_S:
-                reason = f"held for {HOLD_LONGEST_S:g} s, the longest hold that fits in the recording"
-                raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
+                self._stop_held(f"held for {HOLD_LONGEST_S:g} s, the longest hold that fits in the recording")
             yield from self._recorded([self.loop.linger(BLOCK_S)])
         self._enter(before)
+
+    def refusal_to_hold(self) -> str:
+        """Return why the drive cannot be held now; empty if it can."""
+        source = self._drive.drive_source.value
+        return "" if self._drive.can_hold else f"the present signal of the {source} cannot be held"
+
+    def _stop_held(self, reason: str) -> NoReturn:
+        """Stop the run, and with it the campaign, because a hold is impossible."""
+        request = StopRequest.by(Cause.OPERATOR, reason)
+        self._switch.ask(request)
+        raise Stopped(request)
 
     def _go_on(self, block: Block) -> None:
         """Raise an exception if the run must end early: a limit, a stall, or a request."""

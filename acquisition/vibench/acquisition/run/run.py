@@ -237,6 +237,7 @@ class Run(ClosedOnLeaving):
             self._total_s,
             self._until,
         )
+        self.switch.refusal_to_hold = self._runner.refusal_to_hold
         try:
             yield from self._played_or_stopped(self._runner)
         except (GeneratorExit, DriveLate, LimitExceeded, RunStalled):
@@ -255,6 +256,7 @@ class Run(ClosedOnLeaving):
                     self._ending.leave(guard, self._bench.digitizer, sink)
             finally:
                 self._runner.state = self._ending.state
+                self.switch.refusal_to_hold = str
                 if self._until is not None:
                     self._until.close()
 

@@ -2,7 +2,7 @@
 
 import mmap
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -96,6 +96,8 @@ class StopSwitch:
     def __init__(self) -> None:
         self._requests: dict[StopLevel, StopRequest] = {}
         self._holding = False
+        self.refusal_to_hold: Callable[[], str] = str
+        """Returns why the run cannot be held now; empty if it can, or nothing runs."""
         self._marks: deque[str] = deque()
         self._changes: deque[str] = deque()
 
