@@ -4,7 +4,6 @@ import json
 from typing import Self, TypeVar
 
 from pydantic import BaseModel
-from pyvisa import VisaIOError
 
 from vibench.acquisition.drivers import Link, open_link
 from vibench.acquisition.errors import ConfigurationError, InstrumentError, InstrumentLost
@@ -92,7 +91,9 @@ class LineController:
         try:
             self._link.write(request.model_dump_json(exclude_defaults=False))
             line = self._link.read_bytes(_LONGEST_LINE, break_on_termchar=True)
-        except (VisaIOError, OSError) as error:
+        except MemoryError:  # the caller releases its reserve
+            raise
+        except Exception as error:  # pyvisa-py passes on whatever sockets raise
             raise InstrumentLost(
                 f"the real-time controller at {where} does not answer ({error}). Its watchdog silences it "
                 f"after {self._config.watchdog_s:g} s; check its power and its network"

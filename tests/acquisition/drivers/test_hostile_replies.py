@@ -2,12 +2,12 @@
 
 import socket
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import Block, InstrumentError, open_bench
+from vibench.acquisition import Block, InstrumentError, InstrumentLost, open_bench
 from vibench.acquisition.drivers import AFG1022X, DaqmxDigitizer
 from vibench.acquisition.drivers._daqmx import linear_step_v
 from vibench.acquisition.drivers._scpi import ScpiInstrument
@@ -168,3 +168,16 @@ def test_a_non_numeric_scale_gives_no_converter_step():
     assert linear_step_v([0.0, 1e-6, 0.0], 5.0) == 1e-6
     assert linear_step_v([0.0, 1e-6, float("nan")], 5.0) is None
     assert linear_step_v([float("nan"), 1e-6], 5.0) is None
+
+
+def test_a_listener_that_never_accepts_is_an_absent_instrument():
+    """pyvisa-py raises a bare Exception when connecting takes too long."""
+    with ExitStack() as closing:
+        listener = closing.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
+        for _ in range(4):
+            waiting = closing.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex(listener.getsockname())
+        resource = f"TCPIP0::127.0.0.1::{listener.getsockname()[1]}::SOCKET"
+        with pytest.raises(InstrumentLost, match=r"^no instrument answers at TCPIP0::127.*Check its power"):
+            open_link(resource, "@py", timeout_s=0.3)

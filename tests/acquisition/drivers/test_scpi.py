@@ -114,7 +114,15 @@ def test_a_timeout_is_an_error_that_states_how_long_was_waited():
     assert not isinstance(caught.value, InstrumentLost)
 
 
-@pytest.mark.parametrize("death", [LOST, ValueError("[Errno 19] No such device"), OSError(errno.EIO, "I/O")])
+@pytest.mark.parametrize(
+    "death",
+    [
+        LOST,
+        ValueError("[Errno 19] No such device"),
+        OSError(errno.EIO, "I/O"),
+        Exception("could not connect"),
+    ],
+)
 @pytest.mark.parametrize("act", ["command", "query", "query_codes"])
 def test_every_error_of_a_lost_device_is_recognised(death, act):
     instrument = Instrument()

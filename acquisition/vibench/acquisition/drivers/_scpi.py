@@ -13,7 +13,7 @@ import numpy as np
 import pyvisa
 from numpy.typing import NDArray
 
-from ..errors import InstrumentError, InstrumentLost, SettingRefused
+from ..errors import AcquisitionError, InstrumentError, InstrumentLost, SettingRefused
 from ..host.log import LOG
 from ._visa_link import Link
 
@@ -27,8 +27,6 @@ _LONGEST_REPLY = 1_000_000
 # Long enough for an old reply that is under way, short enough for an emergency stop [ms].
 _STALE_REPLY_MS = 100.0
 _LATE = pyvisa.constants.StatusCode.error_timeout
-# pyvisa-py passes on the ValueError and OSError of PyUSB when the device is gone.
-_LOST = (ValueError, OSError, pyvisa.errors.InvalidSession)
 _QUEUE_ENTRY = re.compile(r'([+-]?[0-9]{1,9})\s*,\s*"?([^"]*)"?')
 _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
@@ -224,7 +222,9 @@ class ScpiInstrument:
         LOG.debug("%s: %s", self.name, doing)
         try:
             yield
-        except (pyvisa.VisaIOError, *_LOST) as error:
+        except (AcquisitionError, MemoryError):
+            raise
+        except Exception as error:  # pyvisa-py passes on whatever PyUSB, sockets and RPC raise
             if isinstance(error, pyvisa.VisaIOError) and error.error_code == _LATE:
                 raise InstrumentError(
                     f"{self.name} did not answer {doing!r} within {self._link.timeout / 1000:g} s; "

@@ -40,7 +40,9 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
                 f"{resource} is in use by another program; close that program and open the bench again"
             ) from error
         raise _absent(resource, error) from error
-    except (ValueError, OSError) as error:  # pyvisa-py reports an absent or unresponsive USB device this way
+    except MemoryError:  # the caller releases its reserve
+        raise
+    except Exception as error:  # pyvisa-py reports absent devices as bare Exception, ValueError or OSError
         raise _absent(resource, error) from error
     message_link = cast("Link", link)
     message_link.timeout = timeout_s * _MS_PER_S
