@@ -1,7 +1,9 @@
 """The DAQmx driver over the real nidaqmx client, against the virtual rig's DAQ."""
 
 from contextlib import ExitStack
+from types import SimpleNamespace
 
+import grpc
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -10,7 +12,7 @@ from nidaqmx.errors import DaqError
 
 from tests.changed import changed
 from vibench.acquisition import AcquisitionError, ConfigurationError, InstrumentError, InstrumentLost
-from vibench.acquisition.drivers import DaqmxDigitizer
+from vibench.acquisition.drivers import DaqmxDigitizer, _daqmx
 from vibench.acquisition.drivers._daqmx import linear_step_v
 from vibench.acquisition.drivers._daqmx_errors import MEANINGS, from_code
 from vibench.acquisition.errors import DataLost, InstrumentBusy
@@ -298,3 +300,24 @@ def sine_fit(row, frequency_hz):
     angle = 2 * np.pi * frequency_hz * np.arange(row.size) / RATE_HZ
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
     return basis @ np.linalg.lstsq(basis, row)[0]
+
+
+def test_calls_after_an_unanswered_call_have_a_short_deadline():
+    class Details(SimpleNamespace):
+        def _replace(self, **changes):
+            return Details(**{**vars(self), **changes})
+
+    codes = iter(
+        [grpc.StatusCode.OK, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.OK, grpc.StatusCode.OK]
+    )
+    deadlines_s, client = [], _daqmx._Deadline()
+    for _ in range(4):
+        client.intercept_unary_unary(
+            lambda details, _: (
+                deadlines_s.append(details.timeout) or SimpleNamespace(code=lambda: next(codes))
+            ),
+            Details(metadata=None),
+            None,
+        )
+    lost_s, usual_s = _daqmx.LOST_DEADLINE_S, _daqmx.CALL_DEADLINE_S
+    assert deadlines_s == [usual_s, usual_s, lost_s, usual_s]

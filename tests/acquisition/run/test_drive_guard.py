@@ -230,3 +230,14 @@ def test_background_jobs_of_a_run_start_no_new_thread(monkeypatch):
     beside.do(lambda: done.append(2))
     beside.close(20)
     assert done == [1, 2]
+
+
+def test_a_guard_that_cannot_silence_says_so_once_and_tries_again(monkeypatch, caplog):
+    monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 1)
+    output = Output(*[InstrumentLost("THE OUTPUT MAY STILL BE ON")] * 3)
+    with caplog.at_level("INFO"), DriveGuard(output, StopSwitch()) as guard:
+        guard.begin()
+        until(lambda: output.is_off)
+        until(lambda: not DRIVES_ON)
+    assert [record.getMessage() for record in caplog.records] == ["THE OUTPUT MAY STILL BE ON"]
+    assert not caplog.records[0].exc_info

@@ -168,3 +168,19 @@ def test_an_output_that_stays_on_is_lowered_and_reported(laboratory):
             bench.generator.stop()
         assert terminal_v(virtual) < SILENT_V
         virtual.generator.execute = execute
+
+
+def test_a_hanging_generator_gets_one_attempt_after_a_failed_stop(laboratory, monkeypatch):
+    """A run with instruments that hang took minutes to end."""
+    virtual, connected = laboratory()
+    attempts = []
+    with bench_on(connected) as bench:
+        virtual.faults.hang_generator()
+        reconnect = bench.generator.reconnect
+        monkeypatch.setattr(bench.generator, "reconnect", lambda: (attempts.append(1), reconnect()))
+        for expected in (2, 3):
+            with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON.*switch the amplifier off"):
+                bench.generator.stop()
+            assert len(attempts) == expected
+        virtual.faults.heal()
+        bench.generator.stop()

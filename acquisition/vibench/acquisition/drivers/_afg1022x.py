@@ -60,7 +60,7 @@ class AFG1022X(ScpiInstrument):
     unconfirmed: tuple[Knob, ...] = ()
     """Settings that could neither be made nor read remotely: the operator must confirm them."""
     _is_known = False
-    _is_silent_and_closed = False
+    _is_silent_and_closed = _has_not_stopped = False
 
     def __init__(self, config: GeneratorConfig) -> None:
         self._config = config
@@ -193,7 +193,8 @@ class AFG1022X(ScpiInstrument):
         if self._is_silent_and_closed:
             return
         last = ""
-        for attempt in range(2 * _STOP_ATTEMPTS):
+        # An instrument that did not answer gets one attempt, so that the run ends in a bounded time.
+        for attempt in range(2 * _STOP_ATTEMPTS - 1 if self._has_not_stopped else 0, 2 * _STOP_ATTEMPTS):
             try:
                 if attempt >= _STOP_ATTEMPTS:
                     self.reconnect()
@@ -202,7 +203,9 @@ class AFG1022X(ScpiInstrument):
             except InstrumentError as failure:
                 last = str(failure)
             else:
+                self._has_not_stopped = False
                 return
+        self._has_not_stopped = True
         try:
             self._mute()
             lowered = "; its amplitude was set to the minimum"

@@ -29,7 +29,9 @@ from ._overload import overload_ranges
 
 # Longer than any single read (`LONGEST_READ_S` plus its margin): a server that is silent for this time
 # counts as gone, even if its connection still exists.
-CALL_DEADLINE_S = 60.0
+CALL_DEADLINE_S = 20.0
+LOST_DEADLINE_S = 1.0
+"""Time limit of calls after a call that was not answered [s], so that a run ends in a bounded time."""
 # One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
@@ -41,11 +43,17 @@ _CHANNEL_OPTIONS = (
 class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc ships without types
     """Ends every call that takes too long, and adds the token; the DAQmx client does neither."""
 
+    def __init__(self) -> None:
+        self._is_lost = False
+
     def intercept_unary_unary(self, continuation: Callable[..., Any], details: Any, request: Any) -> Any:
         # A namedtuple's _replace is public in spite of its underscore.
         carried = ((TOKEN_KEY, given_token()),) if given_token() else ()
         metadata = (*(details.metadata or ()), *carried)
-        return continuation(details._replace(timeout=CALL_DEADLINE_S, metadata=metadata), request)
+        deadline_s = LOST_DEADLINE_S if self._is_lost else CALL_DEADLINE_S
+        answer = continuation(details._replace(timeout=deadline_s, metadata=metadata), request)
+        self._is_lost = answer.code() is grpc.StatusCode.DEADLINE_EXCEEDED
+        return answer
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from time import monotonic
 
 import numpy as np
 
-from ..errors import CheckFailed, InstrumentError
+from ..errors import AcquisitionError, CheckFailed, InstrumentError
 from ..host.beside import ClosedOnLeaving
+from ..host.log import LOG
 from ..instruments import Block, Samples
 from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
 from ..rig import Channel, Rig, Role
@@ -272,7 +273,7 @@ class DriveGuard(ClosedOnLeaving):
         self._standstill = StopRequest(Cause.FAULT, StopLevel.OFF, reason)
         self._blocks = self._seen = 0
         self._still_s, self._round_s = 0.0, monotonic()
-        self._has_begun = self._is_cut = self._is_leaving = False
+        self._has_begun = self._is_cut = self._is_leaving = self._has_failed = False
         self._watchdog = Watchdog(self._look, "drive guard")
 
     def begin(self) -> None:
@@ -316,8 +317,15 @@ class DriveGuard(ClosedOnLeaving):
             return
         if not self._is_leaving:
             self._switch.ask(self._standstill)
-        self._drive.cut()
-        self._drive.silence()  # lowers the amplitude, because nothing is measured now
+        try:
+            self._drive.cut()
+            self._drive.silence()  # lowers the amplitude, because nothing is measured now
+        except AcquisitionError as error:  # the next check tries again
+            LOG.debug("the drive guard could not silence the drive", exc_info=True)
+            if not self._has_failed:
+                LOG.error("%s", error)
+            self._has_failed = True
+            return
         self._is_cut = True
         self._confirm()
 
