@@ -197,7 +197,6 @@ def _analyse(
         updated = None if fit is None else fit_specimen(paths, name, observer, fit)
         overlay = overlay if updated is None else updated.specimen
         results = analyse_files(paths, name, simulation, request, observer, overlay, draws)
-        updated = None if updated is None else updated.checked(results)
         motions = list(hidden_motions(results, overlay, observer, hidden))
         others = {
             role: analyse_files(
