@@ -75,7 +75,7 @@ def test_impacts_are_resolved_inside_a_coarse_step():
 @pytest.mark.parametrize("rate_hz", [6400.0, 12_799.0, 204_800.0])
 def test_a_grid_whose_error_is_too_large_is_refused_with_the_error(rate_hz):
     with pytest.raises(
-        ConfigurationError, match=r"grid_rate_hz = .*12800 to 102400 steps.*0\.8% too little at 500 Hz"
+        ConfigurationError, match=r"grid_rate_hz = .*12800 to 102400 steps.*0\.8% too small at 500 Hz"
     ):
         rig_with(5120.0, grid_rate_hz=rate_hz)
 
