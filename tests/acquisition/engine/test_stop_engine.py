@@ -42,7 +42,7 @@ def driving(tmp_path, monkeypatch):
     with serving(RequestHandler(engine, JobQueue(engine)), "night"):
         DRIVES_ON.begin(engine)
         yield engine
-    DRIVES_ON.confirm_silence(engine)
+        DRIVES_ON.confirm_silence(engine)
 
 
 def test_a_stop_is_not_confirmed_while_a_run_hangs_with_the_drive_on(driving):

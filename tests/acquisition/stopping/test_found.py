@@ -195,3 +195,10 @@ def test_a_full_state_folder_refuses_the_program_without_leftovers(own_state):
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
     assert "a script cannot be entered in the state folder" in ended.stdout, ended.stderr
     assert [each.name for each in own_state.rglob("*") if each.is_file()] == []
+
+
+def test_a_program_that_opened_a_bench_while_announced_leaves_the_folder_empty():
+    with stop_on_signal(StopSwitch(), "dwell"):
+        note_open_bench("lab")
+        assert [each.rigs for each in announced_programs(Program) if "lab" in each.rigs]
+    assert not list(engines_folder().iterdir())

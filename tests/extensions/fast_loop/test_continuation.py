@@ -243,7 +243,7 @@ def among_stops(**more):
 def test_motions_near_grazing_are_refused_with_the_loop_multiplier(rig):
     fast = fast_loop(hardening(rig).model_copy(update={"specimen": rig.specimen}))
     plan = continuation(start_hz=254, low_hz=253.9, high_hz=254.3)
-    with pytest.raises(LimitExceeded, match=r"multiplier is 1\d\d at .* hold it from 254 to 254\.2\d? Hz\."):
+    with pytest.raises(LimitExceeded, match=r"multiplier is 1\d\d at .* from 254 to 254\.2\d? Hz\."):
         require_held(fast, plan)
 
 

@@ -221,7 +221,6 @@ def facts_of_this_process(what: str) -> dict[str, object]:
         "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "process_start": process_start(pid) or "",
         "computer": platform.node(),
-        "rigs": sorted(_RIGS),
     }
 
 
@@ -353,10 +352,7 @@ class _Reached:
         """Announce the rigs that this process has opened since its announcement; ignore a failure."""
         with self._changing, suppress(OSError):
             if self._inside:
-                press, program = self._inside[0]
-                program = program.model_copy(update={"rigs": tuple(sorted(_RIGS))})
-                self._inside[0] = press, program
-                self._announce(program)
+                self._announce(self._inside[0][1])
 
     def _look(self) -> None:
         """Carry out new stops, and announce again if somebody has emptied the state folder."""
@@ -376,7 +372,7 @@ class _Reached:
 
     def _announce(self, program: Program) -> None:
         self._unmark()  # Windows cannot replace an open file
-        self._mark = _lock(_write(program))
+        self._mark = _lock(_write(program.model_copy(update={"rigs": tuple(sorted(_RIGS))})))
 
     def _unmark(self) -> None:
         mark, self._mark = self._mark, None
