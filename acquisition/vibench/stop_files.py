@@ -68,7 +68,7 @@ def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
         time.sleep(LOOK_S)
     taken, silent, seen_ns = answer_path(stop, "taken"), answer_path(stop, "silent"), 0
     give_up_s = time.monotonic() + HEEDED_S
-    # An older confirmation is that of an earlier stop.
+    # An older confirmation belongs to an earlier stop.
     while (_changed_ns(silent) or -1) < written_ns:
         if (changed_ns := _changed_ns(taken) or seen_ns) != seen_ns:
             seen_ns, give_up_s = changed_ns, time.monotonic() + HEEDED_S

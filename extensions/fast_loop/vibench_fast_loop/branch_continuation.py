@@ -22,7 +22,7 @@ class BranchContinuation(AbstractFeedback):
 
     A real-time controller damps the motion between m1 and m2 and plays a Fourier series. Pseudo-arclength
     continuation uses the frequency and the first coefficient. The other coefficients make the base move as a
-    sine, so the motion is that of the specimen under this sine, unaffected by the control (Sieber and
+    sine, so the specimen moves as under this sine, unaffected by the control (Sieber and
     Krauskopf, Nonlinear Dyn. 51 (2008) 365; Renson and others, J. Sound Vib. 367 (2016) 145).
     """
 

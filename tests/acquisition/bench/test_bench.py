@@ -249,3 +249,10 @@ class TestKnobs:
 def aged(rig, day):
     vibrometer = rig.vibrometer.model_copy(update={"calibrated": datetime.fromisoformat(day).date()})
     return rig.model_copy(update={"vibrometer": vibrometer})
+
+
+def test_a_virtual_bench_opens_without_a_state_folder(rig, tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "file"))
+    with open_bench(rig) as bench:
+        assert bench.kind is BenchKind.SIMULATED

@@ -197,7 +197,7 @@ class PhaseSearch:
     """Largest step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
-    """Whether the phase is that of a linear mode; if not, only the nearest tries determine its slope."""
+    """Whether the phase follows a linear mode; if not, only the nearest tries determine its slope."""
 
     def next_hz(self) -> float:
         """Return the next frequency to try [Hz]; needs at least one earlier try."""

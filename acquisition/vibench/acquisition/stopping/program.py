@@ -252,11 +252,12 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 def note_open_bench(rig: str) -> None:
     """Note that this process has silenced the generator of a rig: earlier programs left nothing on there."""
-    for each in unconfirmed_programs():
-        if rig in each.rigs or not each.rigs:
-            withdraw(each)
-    _sweep()
     _RIGS.add(rig)
+    with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
+        for each in unconfirmed_programs():
+            if rig in each.rigs or not each.rigs:
+                withdraw(each)
+        _sweep()
     _REACHED.announce_again()
 
 

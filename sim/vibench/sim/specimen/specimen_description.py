@@ -286,7 +286,7 @@ class SpecimenTable(SpecimenDescription):
 
 
 def usual_specimen() -> SpecimenTable:
-    """Return the default specimen, which is that of the paper."""
+    """Return the default specimen, the paper's."""
     return SpecimenTable.model_validate(USUAL_SPECIMEN)
 
 
