@@ -1,12 +1,12 @@
 """Analysis: frequency responses, spectra, responses, figures and reports from recordings and predictions.
 
 Functions are pure and results are immutable; values have an uncertainty where it can be computed. Units are
-SI; names end with the unit where needed. Errors state what was given, what is allowed and what to do. The
-packages cover signals, recordings, frequency responses and sines, simulation beside the measurement, figures,
+SI; names of quantities end with the unit. Errors state what was given, what is allowed and what to do. The
+packages cover signals, recordings, frequency responses, sines, simulations overlaid on measurements, figures,
 results and reports. They use recordings and plans of a bench, but no instruments and no windows. The names
 below are imported on first use.
 
-Example: a mass on a base that moves as noise, resonant at 95 Hz with a damping ratio of 0.01.
+Example: a mass with a resonance at 95 Hz and a damping ratio of 0.01, on a base with random motion.
 
 >>> import numpy as np
 >>> from vibench.analysis import resonances, transmissibility

@@ -1,4 +1,4 @@
-"""The errors of an analysis: each says what was given, what is allowed, and what to do next."""
+"""Errors of an analysis; each message states what was given, what is allowed, and what to do next."""
 
 
 class AnalysisError(Exception):
@@ -14,4 +14,4 @@ class NotEnoughData(AnalysisError, ValueError):
 
 
 class UnusableData(AnalysisError, ValueError):
-    """The samples lack what the analysis needs: a dead drive channel, values that are not finite."""
+    """The samples cannot be analysed: for example, the drive channel is dead or values are not finite."""

@@ -1,4 +1,4 @@
-"""Choices for figures, kept apart so that commands can list them without matplotlib installed."""
+"""Choices for figures, in a separate module so that commands can list them without matplotlib."""
 
 from enum import StrEnum
 
@@ -20,6 +20,6 @@ SHOWN = {
     "contact_energy": "largest energy in a stop [J]",
     "lyapunov": "largest Lyapunov exponent [1/s]",
     "duration": "simulated time [s]",
-    "motions": "number of motions reached from the starts",
+    "motions": "number of motions reached from the initial states",
 }
 """Quantities that a map can show in addition to the kinds of motion."""

@@ -59,15 +59,15 @@ class Table:
 
 
 def table(name: str, **columns: ArrayLike) -> Table:
-    """Return a table called ``name`` of ``columns``, whose names end with the unit, as in the code."""
+    """Return a table with this name and these columns; column names end with the unit, as in ``time_s``."""
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
 
 
 def columns(source: object, keys: str) -> dict[str, Any]:
-    """Return values of a result, keyed as in a JSON document or in the headings of a table.
+    """Return selected values of a result, keyed as in a JSON document or in the headings of a table.
 
-    The keys ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"`` take a field or property, an attribute
-    of a part (None if the part is None), an item of an array, and all keys of a part's document.
+    The four items of ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"`` select a field or property, an
+    attribute of a part (None if the part is None), an item of an array, and all keys of the part ``run``.
     """
     found: dict[str, Any] = {}
     for each in keys.split():
@@ -84,7 +84,7 @@ def columns(source: object, keys: str) -> dict[str, Any]:
 
 
 def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
-    """Return the values of several parts, concatenated per key as in `columns`; NaN for missing values."""
+    """Return one array per key (see `columns`) with the values of all parts; NaN for missing values."""
     found = [columns(each, keys) for each in parts]
     names = [each.partition("=")[0] for each in keys.split()]
     return {
@@ -96,7 +96,7 @@ def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value in a form for JSON; numbers that are not finite become None.
+    """Convert a value to types that JSON can store; numbers that are not finite become None.
 
     A dataclass is converted to the keys in its ``DOCUMENT`` (see `columns`), or to all fields if it has none.
     """
@@ -175,7 +175,7 @@ UNITS = {
 }
 """Unit of a value, keyed by the suffix of its name; the longest matching suffix counts."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
-"""Names of independent variables; a result uses the first one that it has."""
+"""Names of independent variables; the first of these in a result is its coordinate."""
 
 
 class Labelled:
@@ -184,8 +184,8 @@ class Labelled:
     OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Units of values whose names have no unit suffix; ``{0.name}`` inserts a field.
 
-    In a part of a result, ``{unit}`` inserts the part's unit in its parent. Parts may define ``DOCUMENT``
-    too.
+    In a part of a result, ``{unit}`` inserts the unit that the parent states for this part. Parts may define
+    ``DOCUMENT`` too.
     """
     DOCUMENT: ClassVar[str] = ""
     """Keys of the JSON document in the syntax of `columns`; empty for all fields."""
@@ -197,12 +197,12 @@ class Labelled:
     def to_xarray(self) -> "xarray.Dataset":
         """Return all numbers of the result as an `xarray.Dataset`.
 
-        Arrays as long as the result's frequencies or times share that dimension. Bounds (``magnitude_lower``)
-        and standard deviations (``sd_...``) are separate variables. Names of values in a part begin with the
-        name of the part (``response_frequency_hz``). A list of parts that contain single numbers, such as
+        Arrays over the result's frequencies or times share that dimension. Bounds (``magnitude_lower``) and
+        standard deviations (``sd_...``) are separate variables. Names of values in a part begin with the name
+        of the part (``response_frequency_hz``). A list of parts that contain single numbers, such as
         resonances, becomes one array per field (``resonances_frequency_hz``); other parts are numbered. A
-        variable has the attribute ``units`` unless it is a pure number or its unit depends on the input. Rows
-        with different units have a variable of units (``values_value_units``). Texts are attributes.
+        variable has the attribute ``units`` unless it is a pure number or its unit depends on the input. If
+        rows have different units, a variable contains these (``values_value_units``). Texts are attributes.
 
         Raises InvalidRequest when xarray is not installed.
         """
@@ -228,7 +228,7 @@ def unit_of(name: str) -> str:
 
 
 def _unit(part: Any, key: str, unit: str) -> str:
-    """Return the unit of a value in a part; ``unit`` is the unit of the part in its parent."""
+    """Return the unit of a value in a part; ``unit`` is the unit that the parent states for the part."""
     pattern = getattr(part, "OWN_UNITS", {}).get(key)
     if pattern is None:
         return unit_of(key)
