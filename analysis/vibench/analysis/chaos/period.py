@@ -12,17 +12,17 @@ LONGEST_PERIOD = 32
 _TABLE = 2
 """Number of dimensions of an array of points: periods by coordinates."""
 STEADY = 2e-3
-"""Relative scatter that is allowed for a steady motion, because no drive is steadier."""
+"""Scatter allowed for a steady motion, relative to the orbit; real drives fluctuate by as much."""
 _NOISE_MARGIN = 1.5
 """Largest ratio of measured to expected scatter that is attributed to noise."""
 _REPEATED = 0.25
-"""Largest share of the points' variance that may remain for a period above one."""
+"""For periods above one: largest variance of points of equal phase, relative to that of all points."""
 _BLOCKS = 10
 _DRIFT = 5.0
 """Largest drift [standard errors]; 1 settled record in 250 exceeds it (4 slopes, 8 degrees of freedom)."""
 
 _STEADY_SCATTER = 0.9
-"""Least ratio of the smaller to the larger scatter of the two halves of a settled record."""
+"""Minimum ratio of the smaller to the larger scatter of the two halves of a settled record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +65,9 @@ class Points(Labelled):
 def shortest_period(points: Points) -> int | None:
     """Return the fewest drive periods after which all points repeat within noise; None if they do not.
 
-    Points of the same phase are compared over the whole record, because slow changes are small from period to
-    period. Beyond their noise, they may scatter by 0.2 % of the orbit (unsteadiness of the drive), and for a
-    period above one by no more than half of the total scatter.
+    To test period n, every nth point is compared over the whole record, because slow changes are small from
+    one period to the next. These points may scatter by 0.2 % of the orbit (unsteady drive) in addition to
+    their noise; if n exceeds one, by at most half of the total scatter.
     """
     by_noise = (_NOISE_MARGIN * points.noise) ** 2
     allowed = by_noise + STEADY**2
@@ -83,7 +83,7 @@ def shortest_period(points: Points) -> int | None:
 
 
 def drift(points: Points) -> float:
-    """Return the trend of mean and scatter over a record, in standard errors.
+    """Return the largest trend of the mean or the scatter over a record, in standard errors.
 
     The slope through tenths of the record is divided by its standard error; a scatter of 0.2 % of the orbit
     is tolerated as unsteadiness of the drive.
@@ -103,7 +103,7 @@ def drift(points: Points) -> float:
 
 
 def slow_share(points: Points) -> float:
-    """Return the variance of the means of tenths of the record, as a share of the points' variance."""
+    """Return the variance between the means of tenths of the record, relative to the points' variance."""
     means = np.array([block.mean(axis=0) for block in np.array_split(points.value, _BLOCKS)])
     whole = float(np.sum(np.var(points.value, axis=0)))
     return float(np.sum(np.var(means, axis=0))) / whole if whole > 0.0 else 0.0

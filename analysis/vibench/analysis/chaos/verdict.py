@@ -1,6 +1,6 @@
 """Verdict on a recorded motion: periodic, quasi-periodic, chaotic or undecided.
 
-Chaos may be a transient that ends during a dwell, so the last motion of a record is found first.
+A chaotic transient may end during a dwell; the part of the record with the last motion is found first.
 """
 
 import math
@@ -31,10 +31,10 @@ from .witnesses import (
 
 _HARMONICS = 8
 _EXPLAINED = 0.02
-"""Largest residual of a closed curve fitted with harmonics of one rotation, relative to the spread."""
+"""Largest RMS distance of points from the closed curve on which they lie, relative to their spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Largest relative residual of a closed curve, even if the noise would explain more."""
+"""Upper limit of this relative distance, even if the noise would explain a larger one."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -121,34 +121,34 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""Number of points at the end of a record to test for shape; more would only take time."""
+"""Maximum number of points, from the end of a record, in tests of the shape; more would only take time."""
 ABOVE_NOISE = 5.0
-"""Least ratio of scatter to noise for tests of the shape."""
+"""Minimum ratio of scatter to noise for tests of the shape."""
 LARGEST_NOISE = 0.1
 """Largest ratio of noise to orbit; more noise could hide another motion."""
 SMALL = 0.05
 """Largest scatter of a periodic motion with linear noise, relative to the orbit."""
 SLOW = 0.5
-"""Largest share of the variance between tenths of the record; beyond it the motion changes slowly."""
+"""Largest `slow_share` of the variance; if it is larger, the motion changes slowly."""
 _FEWEST_TURNS = 3.0
 """Fewest turns of a closed curve in a record; fewer count as a slow change."""
 _LARGEST_HUM = 0.1
 """Largest mains hum relative to the orbit; more may be motion at the mains frequency."""
 _LOW_PERIOD = 4
-"""Longest low period; hum causes such a period, too, if the drive is at twice the mains frequency."""
+"""Longest period that counts as low; mains hum also causes such periods, at twice the mains frequency."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40."""
 _ASYMMETRIC = 2.5
 """Required margin for time symmetry; noise exceeds it in about 4 % of cases (better of two coordinates)."""
 _SURELY = 3.0
-"""Distance of the lower bound below the slope, in standard deviations (from tenths of a record)."""
+"""Distance of an exponent's lower bound below its estimate, in standard deviations of the estimate."""
 _DELAYS = 3
 _STEPS = 8
 
 
 class MotionKind(StrEnum):
-    """Kind of motion under a sine."""
+    """Kind of motion when the base is driven by a sine."""
 
     PERIODIC = "periodic"
     QUASI_PERIODIC = "quasi-periodic"
@@ -347,7 +347,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
-    """Test for noise after a static nonlinearity: by ranks (if monotone) and by time symmetry (if not)."""
+    """Test for noise after a static nonlinearity, by ranks (if it is monotone) or time symmetry (if not)."""
     ranked = [surrogate_test(normal_scores(each), seed=seed) for each in points.value.T]
     weakest, strongest = max(ranked, key=lambda each: each.p), max(ranked, key=lambda each: each.margin)
     if not weakest.rejects_linear_noise:

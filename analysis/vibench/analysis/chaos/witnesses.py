@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""Limit on the neighbours tried for each point, since those near in time do not count."""
+"""Up to 4 times this number of nearest points are searched for one that is not near in time."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -86,8 +86,8 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
 def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
     """Find several neighbours of each point, at least ``apart`` steps away in time.
 
-    Returns indices of the nearest points, and flags for at most ``count`` of them that are neighbours; shapes
-    (n, tried).
+    Returns the indices of each point's nearest points, and flags that select at most ``count`` of them as
+    neighbours; shapes (n, tried).
     """
     tried = min(count + 2 * apart - 1, len(points))
     index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
@@ -98,9 +98,9 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 _SATURATION = 0.25
 """Distance relative to the typical distance, above which the size of the attractor limits growth."""
 _ABOVE_NOISE = 3.0
-"""Least ratio of a distance to the noise in the fit."""
+"""Minimum ratio of the distances in the fit to the noise."""
 _SHORTEST_FIT = 3
-"""Fewest steps for a line fit."""
+"""Minimum number of steps for a line fit."""
 _BLOCKS = 10
 FEWEST_PAIRS = 50
 
@@ -274,7 +274,7 @@ _ITERATIONS = 200
 _SETTLED = 1e-8
 _LAGS = (1, 2, 3, 4)
 _SPECTRUM_KEPT = 0.05
-"""Largest relative error of a valid surrogate's spectrum."""
+"""Largest relative error of the spectrum of a valid surrogate."""
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ class SurrogateTest:
     spectrum_error: float
     """Largest relative error of a surrogate's spectrum."""
     least_margin: float = 0.0
-    """Least `margin` that rejects linear noise; smaller ones may be chance."""
+    """Minimum `margin` that rejects linear noise; a smaller margin may be chance."""
 
     @property
     def margin(self) -> float:
@@ -296,13 +296,13 @@ class SurrogateTest:
 
     @property
     def p(self) -> float:
-        """Probability of such a small statistic for linear noise (one-sided rank)."""
+        """Probability that linear noise has a statistic this small (one-sided rank test)."""
         smaller = sum(each <= self.statistic for each in self.surrogates)
         return (smaller + 1) / (len(self.surrogates) + 1)
 
     @property
     def is_valid(self) -> bool:
-        """Return whether the surrogates have the right spectrum, without which the test is invalid."""
+        """Return whether the surrogates have the spectrum of the series, as a valid test requires."""
         return self.spectrum_error <= _SPECTRUM_KEPT
 
     @property
@@ -313,7 +313,7 @@ class SurrogateTest:
 
 
 def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
-    """Return one surrogate: the same values with the same spectrum, otherwise in random order.
+    """Return one surrogate: the values of the series in a random order that keeps their spectrum.
 
     Schreiber and Schmitz, Phys. Rev. Lett. 77 (1996) 635 (iterated amplitude-adjusted Fourier transform).
     Returns the surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
