@@ -23,9 +23,9 @@ class CurveOrigin(StrEnum):
 
     MEASURED = "measured"
     SIMULATED = "simulated"
-    """Simulation under the recorded voltage or base motion, analysed with the same estimator."""
+    """Simulation driven by the recorded voltage or base motion, analysed with the same estimator."""
     PREDICTED = "predicted"
-    """Prediction for the specimen under sines."""
+    """Prediction for the specimen driven by sines."""
     STABLE = "stable branches"
     """Stable periodic motions; there may be several at one frequency."""
     UNSTABLE = "unstable branches"
@@ -156,7 +156,7 @@ class Reading:
 
 
 def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
-    """Return the values of every curve at all frequencies."""
+    """Return the values of every curve at the frequencies of the markers [Hz]."""
     return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in curves)
 
 
@@ -171,9 +171,9 @@ _LEAST_RISE_DB = 3.0
 _LEAST_RISE_SD = 8.0
 """Minimum height of a peak in standard deviations; a thousand points of noise have a range of 6.5."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (peaks, half widths): a mode has at most this many peaks, itself included, in this distance."""
+"""Pairs (n, distance in half widths): a mode has at most n peaks, itself included, in this distance."""
 _CROWD_RISE = 0.3
-"""Minimum height of peaks that are counted here, relative to the required height of a peak."""
+"""Minimum height of the peaks counted for `_CROWDS`, relative to the height required of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01
 """Relative half width assumed for a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
@@ -190,7 +190,7 @@ class CurvePeak:
     relative_sd: float
     """Relative standard deviation of the magnitude; NaN if unknown."""
     half_power_width_hz: float | None
-    """Width between the half-power frequencies; None if a higher point or the end of the curve is nearer."""
+    """Width at half power; None if the curve ends or exceeds the peak before it falls to half power."""
 
     @property
     def damping_ratio(self) -> float | None:
@@ -227,7 +227,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
             break
         peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
         away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
-        # The counts include the peak itself.
+        # These numbers include the peak itself.
         if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
             peaks.append(peak)
     return tuple(sorted(peaks, key=lambda each: each.frequency_hz))

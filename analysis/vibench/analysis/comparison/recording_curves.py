@@ -114,8 +114,8 @@ class AnalysisOptions(FrozenModel):
     """Options of an analysis; the options from estimator to confidence apply to noise only."""
 
     model: Model = Model.LEFT_OUT
-    """Simulation to overlay: rig and specimen under the recorded voltage (the twin), or the specimen alone
-    under the recorded base motion. It takes seconds to minutes per recording."""
+    """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
+    alone driven by the recorded base motion. It takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
     """Noise on the base biases h1, noise on the response biases h2, and neither biases drive."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
@@ -129,7 +129,7 @@ class AnalysisOptions(FrozenModel):
     overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
     """Overlap of neighbouring segments, as a fraction."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
-    """Probability that the bounds at a line contain the true value."""
+    """Probability that the bounds at a spectral line contain the true value."""
 
     @model_validator(mode="after")
     def _is_allowed(self) -> Self:
@@ -144,5 +144,5 @@ class AnalysisOptions(FrozenModel):
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation to compute: none, under the recorded voltage, or under the recorded base motion."""
+        """Simulation to compute: none, or driven by the recorded voltage or the recorded base motion."""
         return _SIMULATIONS[self.model]
