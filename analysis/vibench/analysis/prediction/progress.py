@@ -389,7 +389,7 @@ MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Shar
 
 def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
     """Return responses, error, share and kind of a motion as texts."""
-    share, period = motion.share, "" if motion.period is None else f", {motion.period} drive periods"
+    share, period = motion.share, "" if motion.period is None else f", period {motion.period}"
     return (
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",
         "–" if motion.response_ii is None else f"{motion.response_ii:.4g}",

@@ -17,6 +17,7 @@ from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.acquisition.recording import RecordingState, open_recording
 from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
+from vibench.gui.forms.quantity_edit import LineField
 from vibench.gui.pages.files import files_page as _files_page
 from vibench.gui.pages.files.files_page import FilesPage
 from vibench.gui.pages.files.recording_table import (
@@ -118,6 +119,16 @@ def test_the_list_describes_state_plan_and_problems_of_every_file(page):
     assert cell(page, "whole", "Level") == "1 Vpp"
     assert "full scale" in cell(page, "whole", "Verdict")
     assert cell(page, "whole", "Length") == "10 s"
+
+
+def test_columns_and_fields_show_their_texts_on_the_smallest_screen(page):
+    page.resize(860, 560)
+    table, fonts = page.table, page.fontMetrics()
+    for column in range(1, len(HEADINGS)):
+        for row in range(table.model().rowCount()):
+            text = table.model().index(row, column).data()
+            assert table.columnWidth(column) >= min(fonts.horizontalAdvance(text), 200), text
+    assert page.findChild(LineField).width() > fonts.averageCharWidth() * 20
 
 
 def test_a_recording_without_its_seal_gets_a_warning(opened, wait_for):

@@ -147,7 +147,7 @@ def test_coexisting_motions_are_shown_as_dots_and_table_rows_with_shares(page):
         "2.15",
         "1e-06",
         "25 % (10 to 49 %)",
-        "periodic, 2 drive periods",
+        "periodic, period 2",
     ]
     page._grow((point("a", 562.8),))
     for _ in page.plots.plots:

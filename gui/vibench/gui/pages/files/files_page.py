@@ -295,13 +295,6 @@ class FilesPage(Page):
         search.textChanged.connect(self.table.search)
         self._goes_to = ElidedLabel(rank="second")
         self._count = ElidedLabel(rank="second")
-        self._compare = push_button(
-            "Co&mpare", "Overlay the selected recordings on the Compare page", self._hand_to_compare
-        )
-        self._export = push_button("E&xport…", "Export the recording for other programs", self._choose_export)
-        self._note = push_button("Add a &note…", "Store a note in the recording", self._write_note)
-        for button in (self._compare, self._export, self._note):
-            button.setEnabled(False)
         bar = row(
             label_for("F&older", self._folder_line, "Folder of the recordings"),
             (self._folder_line, 3),
@@ -310,9 +303,6 @@ class FilesPage(Page):
             label_for("Sea&rch", search, "Search in the list"),
             (search, 1),
             self._count,
-            self._compare,
-            self._export,
-            self._note,
         )
         browser = column(bar, self._goes_to, self.table)
         browser.setAccessibleName("Browser")
@@ -320,6 +310,13 @@ class FilesPage(Page):
 
     def _viewer(self) -> QWidget:
         self._title = ElidedLabel("No recording is open", rank="title")
+        self._compare = push_button(
+            "Co&mpare", "Overlay the selected recordings on the Compare page", self._hand_to_compare
+        )
+        self._export = push_button("E&xport…", "Export the recording for other programs", self._choose_export)
+        self._note = push_button("Add a &note…", "Store a note in the recording", self._write_note)
+        for button in (self._compare, self._export, self._note):
+            button.setEnabled(False)
         self._facts = SentenceLabel("Choose a recording in the list above.", rank="second")
         self._view = ElidedLabel()
         self._markers = push_button("Mar&kers", "Measure between two markers", lambda: None)
@@ -332,6 +329,7 @@ class FilesPage(Page):
             push_button("Zoom &in", "Show less, closer (+)", lambda: self.time_histories.zoom(0.5)),
             push_button("Zoom o&ut", "Show more (-)", lambda: self.time_histories.zoom(2.0)),
         )
-        viewer = column(self._title, self._facts, (self.pictures, 1), bar)
+        heading = row((self._title, 1), self._compare, self._export, self._note)
+        viewer = column(heading, self._facts, (self.pictures, 1), bar)
         viewer.setAccessibleName("Recording")
         return viewer

@@ -18,7 +18,7 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+from PySide6.QtWidgets import QAbstractItemView, QTableView
 
 from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.campaign import (
@@ -244,7 +244,7 @@ class CampaignChoice(Choice):
     def __init__(self) -> None:
         super().__init__("Campaign")
         self.setToolTip("Show only recordings of one campaign")
-        self.setMinimumContentsLength(22)
+        self.setMinimumContentsLength(16)
         self._campaigns: tuple[ListedCampaign, ...] = ()
         self.currentIndexChanged.connect(lambda _index: self._choose())
         self.hide()
@@ -272,7 +272,6 @@ PICTURE, NAME = 0, 1
 _NUMBERS = tuple(HEADINGS.index(each) for each in ("Level", "Length", "Size"))
 _THIS_ROW_ALONE = QItemSelectionModel.SelectionFlag.ClearAndSelect | QItemSelectionModel.SelectionFlag.Rows
 _THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.SelectionFlag.Rows
-_WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
 _MEASURED_ROWS = 24
@@ -407,7 +406,7 @@ class RecordingTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE.height() + 6)
         self.horizontalHeader().setResizeContentsPrecision(_MEASURED_ROWS)
         self.horizontalHeader().setHighlightSections(False)
-        self.horizontalHeader().setSectionResizeMode(_WIDE, QHeaderView.ResizeMode.Stretch)
+        self.horizontalHeader().setStretchLastSection(True)
         self.setColumnWidth(PICTURE, THUMBNAIL_SIZE.width() + 10)
 
     def paintEvent(self, event: QPaintEvent) -> None:
