@@ -242,13 +242,13 @@ class MotionBenchmark:
         """Sentence that recommends a level."""
         match self.motion.regime:
             case Regime.FREE:
-                return "Motion without contact is exact: all levels are the same."
+                return "Without contact, the solution has a closed form, so all levels are equal."
             case Regime.PERIODIC | Regime.TRANSIENT:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
                     f"`quick` is sufficient: Response I scatters by {self.levels[0].response_i_scatter:.1%} "
-                    "between starts, and no level reduces this scatter."
+                    "between starts, whatever the level."
                 )
 
     @property
@@ -261,19 +261,17 @@ class MotionBenchmark:
         )
 
     def _periodic_advice(self) -> str:
-        quick, standard, reference = self.levels
-        steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
-        errors = f"{steps} in the state at the three levels"
+        quick, _, reference = self.levels
         price = f"reference takes {reference.cost / quick.cost:.1f} times as long as quick"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
-                return f"Each level reduces the error: {errors}; {price}."
+                return f"Each level reduces the error; {price}."
             case [Accuracy.STANDARD]:
-                return f"Only `reference` reduces the error: {errors}; {price}."
+                return f"Only `reference` reduces the error; {price}."
             case [Accuracy.REFERENCE]:
-                return f"Standard reduces the error, reference does not: {errors}; {price}."
+                return f"Standard reduces the error, reference does not; {price}."
             case _:
-                return f"No level reduces the error: {errors}; {price}."
+                return f"No level reduces the error; {price}."
 
 
 def _is_better(level: LevelFigures, before: LevelFigures) -> bool:

@@ -24,11 +24,11 @@ from accuracy_motions import (
 
 from vibench.sim import Accuracy
 
-_HEAD = "| level | simulated s per s | error of the state | of Response I | of Response II | exponent [1/s] |"
+_HEAD = "| level | speed [s/s] | state error | Response I error | Response II error | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
 _LOTTERY_HEAD = (
-    "| scene | motion | Response I | error | predicted share | share found | covered "
-    "| chaos dies out [1/s] | cost |"
+    "| scene | motion | Response I | its error | predicted share | share in further runs | in interval "
+    "| end of chaos, rate [1/s] | relative time |"
 )
 ABSENT = "–"
 
@@ -42,26 +42,31 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
     yield from (
         "# Speed and accuracy",
         "",
-        "`standard` is the default. Use `quick` for a first look, and `reference` to check a result.",
-        f"A periodic motion is correct to {', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}.",
-        "In chaos no level predicts a single motion; only averages are meaningful.",
+        "`standard` is the default accuracy level of a simulation. Use `quick` for a first look, and",
+        "`reference` to check a result. In a periodic motion, the error of the state is at most",
+        f"{', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}. An error of 1 means 100 µm in a",
+        "displacement or 0.1 m/s in a velocity. In chaos, no level predicts a single motion; only averages",
+        "are meaningful.",
     )
     yield from _promises(benchmark)
+    first, software = benchmark.motions[0], json.loads(benchmark.software)
     yield from (
         "",
         "## How it was measured",
         "",
-        "Made by `python benchmarks/accuracy_page.py`, and not edited by hand. Three scripts add their",
-        "sections: `python benchmarks/error_curves.py` the cost of a target, `python",
-        "benchmarks/work_precision.py --markdown docs/accuracy.md` other solvers, and `python",
-        "benchmarks/error_targets.py --sum FILE --markdown docs/accuracy.md` requested errors.",
-        f"Machine: {benchmark.machine}; vibench {json.loads(benchmark.software)['vibench']}.",
+        "Made by `python benchmarks/accuracy_page.py`; do not edit by hand. Three scripts in the same folder",
+        "add sections: `error_curves.py`, `error_targets.py` and `work_precision.py`.",
+        f"Machine: {benchmark.machine}; vibench {software['vibench']}. The tables below show:",
         "",
-        "An error of the state is the largest of six components, in units of 100 µm and 0.1 m/s, compared",
-        "with an independent solution (scipy's DOP853 at 1e-12, restarted at every contact). Errors of the",
-        "responses are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6;",
-        "their numbers are simulated seconds per second and the error of the state. Times are for one",
-        "core.",
+        "- speed: simulated seconds per second of one core;",
+        "- state error: the largest error of the six components, in the units above. The true state is an",
+        "  independent solution: scipy's DOP853 at 1e-12, restarted at every contact;",
+        "- errors of the responses, relative to level `reference`;",
+        "- the largest Lyapunov exponent, with its standard error;",
+        "- scipy's solvers at a relative tolerance of 1e-6: speed, and in brackets the state error.",
+        "",
+        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after some",
+        f"{first.solver_span_s:.1g} s.",
     )
     for each in benchmark.motions:
         yield from _motion(each)
@@ -77,10 +82,12 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "",
         "## Sensitive dependence on the start",
         "",
-        f"Each scene is simulated until it settles, and from {lotteries[0].starts} further starts, a",
-        "millionth of the gap apart, for at most 300 s. A chaotic or undecided motion may still change.",
-        "All intervals of shares hold together in 19 of 20 cases, also if a motion changes later. Cost is",
-        "the time of the whole prediction divided by the time of one run.",
+        "In these scenes, a tiny change of the initial conditions (the *start*) may lead to another final",
+        "motion. A prediction states the share of starts that reach each motion, with an interval. The table",
+        f"compares this share with {lotteries[0].starts} further runs, from starts a millionth of the gap",
+        "apart. Each run simulates at most 300 s, so a chaotic or undecided motion may still change.",
+        "`periodic, 1` repeats after one drive period. All intervals hold together in 19 of 20 cases, also",
+        "if a motion changes later. The relative time is that of the prediction divided by that of one run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -117,13 +124,16 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "",
         "## Transients, from rest",
         "",
-        "In a settled motion, integration errors decay; in a transient a small error may grow a",
-        "thousandfold. Each level promises the settled error above times the largest growth. The stated",
-        "error of the responses comes from a stricter run from the same start. The state is compared after",
-        "0.1 s with the independent solution, the responses of the second half with the reference level.",
-        "Each cell has the error of the state (promised), then the error of the responses (stated).",
+        "In a settled motion, integration errors decay. In a transient, a small error may grow a",
+        "thousandfold. The promise for the state is the promise above times this growth. Cells have four",
+        "numbers:",
         "",
-        f"| motion | growth | {' | '.join(Accuracy)} |",
+        "1. state error after 0.1 s, against the independent solution;",
+        "2. in brackets, the promised state error;",
+        "3. error of the responses in the second half of the run, relative to level `reference`;",
+        "4. in brackets, the stated error of the responses, from a stricter run.",
+        "",
+        f"| motion | growth of a small error | {' | '.join(Accuracy)} |",
         "|---|---|---|---|---|",
     )
     for name, group in groupby(transients, key=lambda each: each.motion.name):
@@ -142,7 +152,7 @@ def _motion(found: MotionBenchmark) -> Iterator[str]:
         "",
         f"## {found.motion.regime.value.capitalize()}: {found.motion.name}",
         "",
-        f"State compared after {found.span_s:.3g} s. {found.advice}",
+        found.advice,
         "",
         _HEAD,
         _RULE,
@@ -150,7 +160,7 @@ def _motion(found: MotionBenchmark) -> Iterator[str]:
     for level in found.levels:
         yield _level(level)
     solvers = "; ".join(map(_solver, found.solvers))
-    yield from ("", f"scipy, compared after {found.solver_span_s:.3g} s: {solvers}.")
+    yield from ("", f"scipy: {solvers}.")
 
 
 def _level(level: LevelFigures) -> str:
@@ -172,7 +182,15 @@ def _number(value: float | None) -> str:
 
 
 def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
-    yield from ("", "## Promises", "", "| level | promised | worst found | kept |", "|---|---|---|---|")
+    yield from (
+        "",
+        "## Promised and measured errors",
+        "",
+        "State errors without contact and in periodic motion:",
+        "",
+        "| level | promised | largest measured | within the promise |",
+        "|---|---|---|---|",
+    )
     for accuracy in Accuracy:
         worst = benchmark.worst_error(accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
@@ -185,7 +203,12 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
             names.setdefault(pair, []).append(each.motion.name)
     if names:
         lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
-        yield from ("", f"Levels that reduce an error by less than a factor of {LEAST_GAIN:g}:", "", *lines)
+        yield from (
+            "",
+            f"In these motions, a level reduces the error by less than a factor of {LEAST_GAIN:g}:",
+            "",
+            *lines,
+        )
 
 
 def main() -> None:

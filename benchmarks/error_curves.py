@@ -43,7 +43,7 @@ LABELLED_M = 10e-6
 LEAD_S, STARTS = 3.0, 64
 COUNTS = (2, 4, 8, 16, 32, STARTS)
 PICTURES = ("tradeoff", "model_similarity", "chaos_error")
-HEADING, NEXT = "## What a target costs", "## Promises"
+HEADING, NEXT = "## What a target costs", "## Promised and measured errors"
 
 
 def paper_cases():
@@ -229,21 +229,22 @@ def section(curves, models, chaos):
     yield from (
         HEADING,
         "",
-        "Request an error below 100 %, a time, or both: `vibench predict --error 1% --time 2s`. The",
-        "result states the error reached. Figures and tables of this section were made by",
-        "`python benchmarks/error_curves.py --markdown docs/accuracy.md` with",
-        f"vibench {json.loads(software())['vibench']}. Times are processor time of one core.",
+        "Request a relative error below 100 %, a time limit, or both:",
+        "`vibench predict --error 1% --time 2s`. The result states the error reached.",
+        f"Measured with vibench {json.loads(software())['vibench']}; times are processor time of one core.",
         "",
         "![Error over time of every method, the paper's four cases](images/tradeoff.png)",
         "",
         "`vibench tradeoff --out DIR` draws this picture on your machine; `--amplitude` and `--frequency`",
-        "select your own scene. Without contact the response is a closed form. Near a stable",
-        "periodic motion Newton's iteration completes the solution, so 1e-6 takes the same time as 1e-2. In",
-        "chaos the error is the scatter of a mean over starts, and no accuracy level reduces it. An error",
-        "of 1 % means there: with other starts, the mean changes by at most 1 % in 19 cases of 20. A single",
-        "run may differ by far more.",
+        "select another drive.",
         "",
-        "| scene | requested | stated | time | 30 s at standard: stated | time |",
+        "- Without contact, the response has a closed form.",
+        "- A stable periodic motion is found by Newton's iteration; 1e-6 takes as long as 1e-2.",
+        "- In chaos, the result is a mean over runs from different initial conditions (*starts*). Its error",
+        "  is the uncertainty of this mean, and no accuracy level reduces it. At 1 %, other starts change",
+        "  the mean by at most 1 % in 19 of 20 cases. A single run may differ by far more.",
+        "",
+        "| scene | requested error | stated error | time | stated error, 30 s at `standard` | its time |",
         "|---|---|---|---|---|---|",
     )
     for name, points in curves.items():
@@ -255,13 +256,15 @@ def section(curves, models, chaos):
         "",
         "![Similarity of continuous models with the stops over their cost](images/model_similarity.png)",
         "",
-        "The paper replaces stops by continuous models. Here R is the similarity of Response I from",
-        f"{GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz, 30 s from rest, by eqs. 6 and 7.",
-        "Up to 10 µm the stops take less time than any continuous model, because motion between",
-        "contacts is exact. At 50 µm models of the lowest orders take less time, but are similar at few",
-        "frequencies only.",
+        "The paper replaces the stops (`hertz`) by continuous forces: odd powers n of p, the displacement of",
+        "m1 relative to m2 (`3+5` is a sum). R is the share of frequencies at which Response I agrees with",
+        "that of the stops, by eqs. 6 and 7 of the paper. The frequencies are",
+        f"{GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz, with 30 s from rest at each.",
         "",
-        "| model | time of a point | "
+        "Up to 10 µm, the stops take less time than these models, because motion between contacts has a",
+        "closed form. At 50 µm, models of low order take less time, but agree at few frequencies only.",
+        "",
+        "| model | mean time per frequency | "
         + " | ".join(f"R at {1e6 * amplitude_m:g} µm" for amplitude_m in AMPLITUDES_M)
         + " |",
         "|---|---|" + "---|" * len(AMPLITUDES_M),
@@ -274,12 +277,14 @@ def section(curves, models, chaos):
         "",
         "![Error of the mean over time, by window and starts](images/chaos_error.png)",
         "",
-        f"Chaos at {PAPER_HZ:g} Hz and 5 µm: the table lists the largest stated error of the four responses,",
-        f"after {LEAD_S:g} s of settling. The error falls as the root of the number of starts. Windows far",
-        "shorter than the settling time cost more for the same error, because every start settles again.",
-        "Response I is the largest value in the window, and depends on its length: 5 s, unless",
-        "`--window` sets another. If settling takes longer than a window, each start is used for several",
-        "windows.",
+        f"The table is for chaos at {PAPER_HZ:g} Hz and 5 µm, after {LEAD_S:g} s of settling. It lists the",
+        "largest stated error of the four responses (I and II, of m0 and of p).",
+        "",
+        "- The error falls with the root of the number of starts.",
+        "- Windows far shorter than the settling take more time for the same error, because every start",
+        "  settles again.",
+        "- Response I, the largest value in the window, depends on the window's length (5 s; `--window`",
+        "  changes it).",
         "",
         "| window | " + " | ".join(f"{count} starts" for count in COUNTS) + " |",
         "|---|" + "---|" * len(COUNTS),
@@ -291,7 +296,7 @@ def section(curves, models, chaos):
 
 
 def main():
-    """Measure, draw, and insert the section before the promises of the page."""
+    """Measure, draw, and insert the section before the promised errors of the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--markdown", type=Path, default=Path("docs/accuracy.md"))
     given = parser.parse_args()

@@ -49,7 +49,15 @@ SHOWN_HZ = (90.0, 95.0, 100.0, 105.0, 250.0, 260.0, 270.0, 280.0)
 NEAR_HZ, SECOND_HZ = np.arange(80.0, 110.0, 0.01), np.arange(230.0, 310.0, 0.01)
 SPEEDS = (0.03, 0.1, 0.3)
 """Typical approach velocities of the impacts at these drives [m/s]."""
+REACH_HEADINGS = (
+    "A0 at which p reaches the gap at this peak [µm]",
+    "frequencies at which p reaches the gap at 5 µm [Hz]",
+)
 METHODS = (ode45(), *(runge_kutta(each) for each in (2e-5, 1e-5, 5e-6)))
+METHOD_HEADINGS = (
+    "energy after / before an impact at 0.03, 0.1, 0.3 m/s",
+    "exponent at 260 Hz and 5 µm [1/s]",
+)
 SHORT_M, LONG_S = 1e-5, 1e-3
 """A gap that is crossed quickly [m], and a time after which every impact is over [s]."""
 MOTIONS, DECAYED_S = 50, 0.25
@@ -62,7 +70,7 @@ def main():
     """Print the tables of the page."""
     case = Case(accuracy=Accuracy.QUICK)
     evidence = Evidence(solve_study)
-    head = "damping", "peak near 95 Hz", "A0 at which p reaches the gap there [um]", "at 5 um between [Hz]"
+    head = "damping", "peak of \\|x / U\\| near 95 Hz", *REACH_HEADINGS
     show(head, (reach(each.of(case)) for each in (*map(damping, SCORED_S), ALIKE)))
     settings = (damping(1e-5).of(case), case, ALIKE.of(case), BY_ODE45.of(case))
     levels = [Reading(evidence, each).level(MODERATE_M) for each in settings]
@@ -70,7 +78,7 @@ def main():
     rows = ((f"{f:g}", *(f"{each[f]:.0f}" for each in columns)) for f in SHOWN_HZ)
     show(("frequency [Hz]", *(each.name for each in settings)), rows)
     exact = ("exact flight, resolved contact", "1, 1, 1", f"{columns[1][260.0]:.0f}")
-    show(("method", "energy kept", "exponent [1/s]"), (exact, *(textbook(case, each) for each in METHODS)))
+    show(("method", *METHOD_HEADINGS), (exact, *(textbook(case, each) for each in METHODS)))
 
 
 def show(headings, rows):

@@ -4,12 +4,11 @@
 (numbalsoda is built from source and needs a Fortran compiler). A peer that is not installed is omitted,
 and the page says so.
 
-Every solver starts in the same settled state; its error is the difference from the independent solution
-after 0.2 s, in chaos after 0.03 s. Cost is processor time over simulated time in runs of three seconds
-(scipy: 0.3 s), the least of several runs, without preparation. scipy has a compiled right-hand side;
-numbalsoda is compiled completely; heyoka's Taylor method has terminal events at the stops. "At its best"
-heyoka uses variables in which its series converges (in contact the penetration is w^2, and time runs as w):
-one trajectory at a time, and eight in its batch mode, with the time divided by eight.
+Every solver starts in the same settled state. Its error is the difference from the independent solution
+after 0.2 s (in chaos, 0.03 s). Its cost is processor time over simulated time: the least of several runs of
+3 s (scipy: 0.3 s), without preparation. scipy has a compiled right-hand side; numbalsoda is compiled
+completely. heyoka uses Taylor series, with terminal events at the stops. "At its best", heyoka uses variables
+in which the series converges. "Eight at a time" is its batch mode, with the time divided by eight.
 """
 
 import argparse
@@ -294,11 +293,14 @@ def write_section(page, curves):
         HEADING,
         "",
         __doc__.split("\n\n", 2)[2].strip(),
+        "",
         f"Measured with vibench {version('vibench')}.{absent}",
         "",
-        "Each cell has the solver's time over vibench's for the same error (never: no tolerance reaches",
-        "it). The second entry is for a tolerance of 1e-6: the solver's time over vibench's, and the",
-        "solver's error.",
+        "The row of vibench has simulated seconds per second, and the error in brackets. Other cells have:",
+        "",
+        "1. the solver's time over vibench's for the same error (`never`: no tolerance reaches this error);",
+        "2. the solver's time over vibench's at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
+        "3. in brackets, the solver's error at this tolerance.",
         "",
         "![Error over cost](images/work_precision.png)",
         "",

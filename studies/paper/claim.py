@@ -37,6 +37,8 @@ class Expectation:
             return f"≥ {self.shown(self.low)}"
         if math.isinf(self.low):
             return f"≤ {self.shown(self.high)}"
+        if self.low == self.high:
+            return self.shown(self.low)
         return f"{self.shown(self.low, '')} to {self.shown(self.high)}"
 
     def shown(self, value: float, unit: str | None = None) -> str:
@@ -64,10 +66,10 @@ def at_most(name: str, unit: str, high: float) -> Expectation:
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
     """Return the requirements of a peak near each frequency."""
-    return tuple(about(f"peak at {each:g} Hz", "Hz", each, within_hz) for each in wanted_hz)
+    return tuple(about(f"{each:g} Hz peak", "Hz", each, within_hz) for each in wanted_hz)
 
 
-NO_THIRD = at_most("next peak over the second", "", 0.5)
+NO_THIRD = at_most("third peak over second", "", 0.5)
 
 
 @dataclass(frozen=True)

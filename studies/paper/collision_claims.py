@@ -24,22 +24,22 @@ _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
 
 
 @claim(
-    "section 3.1, Fig. 3",
+    "3.1, Fig. 3",
     "Share of frequencies with collisions at 1, 5, 10 and 50 µm, and its smallest increase.",
-    at_most("1 µm", "%", 0.05),
-    at_least("5 µm", "%", 0.0),
-    at_least("10 µm", "%", 0.0),
-    at_least("50 µm", "%", 0.5),
-    at_least("smallest step", "%", 0.0),
+    at_most("frequencies colliding at 1 µm", "%", 0.05),
+    at_least("at 5 µm", "%", 0.0),
+    at_least("at 10 µm", "%", 0.0),
+    at_least("at 50 µm", "%", 0.5),
+    at_least("smallest increase", "%", 0.0),
 )
 def regions_grow(r: Reading) -> Values:
-    """With more drive, m1 and m2 collide at more frequencies."""
+    """With larger A0, m1 and m2 collide at more frequencies."""
     shares = [np.mean(r.level(each).collides) for each in AMPLITUDES_M]
     return (*shares, np.min(np.diff(shares)))
 
 
 @claim(
-    "section 3.1, Fig. 4(b)",
+    "3.1, Fig. 4(b)",
     "Largest ratio of |p| to the gap at 5 µm, among the colliding frequencies.",
     at_most("largest |p| over the gap", "", 1.1),
 )
@@ -51,10 +51,10 @@ def p_saturates(r: Reading) -> Values:
 
 
 @claim(
-    "section 2, Fig. 2(c)",
+    "2, Fig. 2(c)",
     "Largest and smallest ratio of Response II to I at 5 µm, among the colliding frequencies.",
-    at_most("largest", "", 1.0),
-    at_most("smallest", "", 0.7),
+    at_most("largest II / I", "", 1.0),
+    at_most("smallest II / I", "", 0.7),
 )
 def ii_below_i(r: Reading) -> Values:
     """With collisions, Response II may be much lower than Response I."""
@@ -64,57 +64,57 @@ def ii_below_i(r: Reading) -> Values:
 
 
 @claim(
-    "section 3.1, Fig. 5(a)",
+    "3.1, Fig. 5(a)",
     "Share of the frequencies at which Response I is larger without damping, at 5 µm.",
-    at_least("share", "%", 1.0),
+    at_least("frequencies with larger response", "%", 1.0),
 )
 def damping_lowers_i(r: Reading) -> Values:
-    """Without damping Response I is larger at all frequencies."""
+    """Without damping, Response I is larger at all frequencies."""
     damped, undamped, _ = _fig_5(r)
     return (np.mean(undamped.response_i > damped.response_i),)
 
 
 @claim(
-    "section 3.1, Fig. 5(a, c)",
+    "3.1, Fig. 5(a, c)",
     "Increase of the share of colliding frequencies: without damping, and at 7 µm.",
-    at_least("without damping", "%", 0.01),
-    at_least("at 7 µm", "%", 0.01),
+    at_least("increase without damping", "%", 0.01),
+    at_least("increase at 7 µm", "%", 0.01),
 )
 def damping_shrinks_regions(r: Reading) -> Values:
-    """Damping, or 5 instead of 7 µm, reduces the regions of collisions."""
+    """Damping, or an A0 of 5 instead of 7 µm, reduces the frequencies with collisions."""
     share, undamped, higher = (float(np.mean(each.collides)) for each in _fig_5(r))
     return undamped - share, higher - share
 
 
 @claim(
-    "section 3.1, Fig. 5(b, d)",
+    "3.1, Fig. 5(b, d)",
     "Median ratio of Response II (without damping; at 7 µm) to Response II at 5 µm with damping, over the "
     "frequencies from 220 to 320 Hz at which the former collides.",
-    at_most("without damping", "", 1.0),
-    at_most("at 7 µm", "", 1.0),
+    at_most("undamped over damped", "", 1.0),
+    at_most("7 over 5 µm", "", 1.0),
 )
 def contrary_ii(r: Reading) -> Values:
-    """In the second colliding region less damping, or more drive, lowers Response II."""
+    """In the second range of collisions, less damping or larger A0 lowers Response II."""
     damped, *stronger = _fig_5(r)
     ratios = [(each.response_ii / damped.response_ii)[_second_region(each)] for each in stronger]
     return tuple(np.median(each) if each.size else np.nan for each in ratios)
 
 
 @claim(
-    "section 5, Fig. 13(d)",
+    "5, Fig. 13(d)",
     "First and last colliding frequency around 266 Hz at 5 µm, with every run from rest.",
-    about("first", "Hz", _SWEEP_COLLIDES_HZ[0], _ROUGHLY_HZ),
-    about("last", "Hz", _SWEEP_COLLIDES_HZ[1], _ROUGHLY_HZ),
+    about("lowest frequency", "Hz", _SWEEP_COLLIDES_HZ[0], _ROUGHLY_HZ),
+    about("highest frequency", "Hz", _SWEEP_COLLIDES_HZ[1], _ROUGHLY_HZ),
 )
 def second_region(r: Reading) -> Values:
-    """The second colliding region reaches from about 240 to 290 Hz."""
+    """The second range of collisions extends from about 240 to 290 Hz."""
     curve = r.level(MODERATE_M)
     found = curve.frequency_hz[_second_region(curve)]
     return (found[0], found[-1]) if found.size else (np.nan, np.nan)
 
 
 @claim(
-    "section 5, Fig. 13(d)",
+    "5, Fig. 13(d)",
     "Lowest and highest drive frequency at an impact of the sweep, at A0 = 5 µm.",
     about("first impact", "Hz", _SWEEP_COLLIDES_HZ[0], _ABOUT_HZ),
     about("last impact", "Hz", _SWEEP_COLLIDES_HZ[1], _ABOUT_HZ),
@@ -128,12 +128,12 @@ def second_region(r: Reading) -> Values:
     ),
     draws=16,  # the last impact of a sweep depends on the end of chaos
     remark=(
-        "The paper does not give the sweep's base amplitude, nor how it changed with frequency. "
-        "Collisions continue beyond the frequency at which they would start, so the end depends on the sweep."
+        "The paper does not state the sweep's base amplitude, or its change with frequency. "
+        "Once started, collisions continue at frequencies where they would not start, so their end is random."
     ),
 )
 def sweep(r: Reading) -> Values:
-    """In a sweep from 150 to 350 Hz within 200 s, m1 and m2 collide at about 240 to 290 Hz."""
+    """In a sweep from 150 to 350 Hz within 200 s, m1 and m2 collide from about 240 to 290 Hz."""
     case, specimen = r.case, r.specimen()
 
     def run() -> Values:

@@ -15,16 +15,17 @@ from .claim import Claim, Expectation, Finding, Judgement, Verdict, judgement
 from .reading import Evidence
 from .settings import DampingScore, claims_by_setting, score_table, scores
 
-_HEADINGS = ("claim", "place", "measured", "required", "verdict")
+_HEADINGS = ("claim", "section, figure", "measured", "required", "verdict")
 HEAD = f"| {' | '.join(_HEADINGS)} |"
+_TITLE = "Claims of the paper, checked by simulation"
 _METHOD = """\
-Every claim of Gong et al. (2025) that has a number or a direction is checked with a simulation
-of their specimen. The paper gives hardly any tolerances. The bounds are ours, wide enough for chaos,
-which differs by some per cent from run to run; some bounds were set after a first look at the results.
-If chaos ends at random, a claim is measured from several starts, a millionth of the gap apart, and
-the range is given. If a claim does not hold, options are tested in order until it holds.
-DIR/report.html lists all options, how each claim was measured, and the claims by setting.
-`vibench demo` repeats the experiment of Figs. 12 to 14."""
+Each claim of Gong et al. (2025) with a number or a direction is checked with a simulation of their
+specimen. The paper states few tolerances, so the required bounds are our choice. They allow for chaos,
+which differs by some per cent from run to run. Some were set after a first look at the results.
+If chaos ends at random, a claim is measured from several starts (initial states a millionth of the gap
+apart), and the range is given. If a claim fails, options are tested in order until it holds.
+A0 is the base amplitude, n the power of a continuous contact law, similarity the rate of eq. 7, and
+the exponent the largest Lyapunov exponent. DIR/report.html lists options, methods and claims by setting."""
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
@@ -97,7 +98,7 @@ def reproduction_document(found: Reproduction, pictures: Sequence[tuple[str, str
 
 
 def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator[str]:
-    yield from ("# Claims that hold", "", f"Made by `{COMMAND}`; not edited by hand.", _METHOD, "")
+    yield from (f"# {_TITLE}", "", f"Made by `{COMMAND}`; not edited by hand.", _METHOD, "")
     yield from (found.options, found.made_with, "", found.sentence.replace(", ", ",\n"))
     apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
     if apart:
@@ -150,7 +151,8 @@ def verdict_text(result: Judgement) -> str:
 
 def wanted_text(claim: Claim) -> str:
     """Return the requirements of a claim."""
-    return "; ".join(each.sentence for each in claim.wanted)
+    sentences = [each.sentence for each in claim.wanted]
+    return f"each {sentences[0]}" if sentences[1:] and len(set(sentences)) == 1 else "; ".join(sentences)
 
 
 def _difference(result: Judgement) -> str:
@@ -213,7 +215,7 @@ def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigu
     failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
     missing = f" Claims that do not hold: {', '.join(failed)}." if failed else ""
     return Page(
-        title="Claims that hold",
+        title=_TITLE,
         about="Claims of Gong et al. (2025), checked with a simulation of their specimen.",
         warnings=(),
         findings=found.sentence + missing,

@@ -59,7 +59,7 @@ def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
     best = ", ".join(f"{each.damping_time_s:.3g} s" for each in scores if len(each.held) == most)
     return report.ReportTable(
         "Score by damping",
-        ("c / k", "hold", "largest exponent at 1 µm [1/s]", "at 5 µm [1/s]", "do not hold"),
+        ("c / k", "claims that hold", "largest exponent at 1 µm [1/s]", "at 5 µm [1/s]", "claims that fail"),
         tuple(
             (
                 f"{each.damping_time_s:.3g} s",
@@ -70,9 +70,9 @@ def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
             )
             for each in scores
         ),
-        f"The paper's c = 0.01 k, read in SI units, would give damping ratios of {first}, {second} and "
-        f"{third}; above 1 a mode does not oscillate. Read in mm, g and ms, c / k is 1e-05 s. Of the claims "
-        f"that are measured at every damping, the most hold at {best}.",
+        f"In SI units, the paper's c = 0.01 k gives damping ratios of {first}, {second} and {third}; above 1 "
+        f"a mode does not oscillate. In mm, g and ms, c / k is 1e-05 s. Of the claims that are measured at "
+        f"every damping, the most hold at {best}.",
     )
 
 
@@ -104,7 +104,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
     return report.DrawnFigure(
         name="reproduction_damping",
         title="Claims that hold, by damping",
-        caption="Dotted: upper limit of near zero, and lower limit of what the paper calls severe.",
+        caption="Dotted: upper bound of exponents near zero, lower bound of exponents called severe.",
         figure=figure,
         tables=(report.table("reproduction_damping", damping_time_s=damping_s, **columns),),
     )
@@ -129,5 +129,5 @@ def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -
         ("claim", *(each.name for each in settings)),
         (("hold", *totals), *kept),
         "All runs start from rest. Claims that hold under every setting are counted in the first row only. "
-        "Empty cells were not computed, because claims on continuous models take too long.",
+        "Claims on continuous models take too long to compute for every setting; their cells are empty.",
     )
