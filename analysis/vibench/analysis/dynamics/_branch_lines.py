@@ -1,4 +1,4 @@
-"""Branches of a request: columns of numbers, special points, and cost."""
+"""Branches of a request: columns of numbers, special points, and computing time."""
 
 import time
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from ._branch_request import BranchMethod, BranchRequest
 
 @dataclass(frozen=True)
 class LineEvent:
-    """A special point of a branch."""
+    """Special point of a branch: a bifurcation or a grazing contact."""
 
     DOCUMENT: ClassVar = "kind frequency_hz amplitude_m"
 
@@ -67,7 +67,7 @@ class BranchLine(Labelled):
     periods: int
     """Drive periods per period of the motion."""
     shape: str
-    """mirrored (its own mirror image after half its period) or repeated."""
+    """``"mirrored"`` if the motion is its own mirror image after half its period, else ``"repeated"``."""
     has_twin: bool
     """Whether the mirror images of these motions form another branch."""
     is_isolated: bool
@@ -87,7 +87,7 @@ class BranchLine(Labelled):
 
     @property
     def motions(self) -> list[dict[str, Any]]:
-        """Values of m0 and of p = y - z at each point."""
+        """One dictionary per point, with responses of m0 and of p = y - z."""
         found = columns(
             self,
             "frequency_hz amplitude_m is_stable largest_multiplier growth_time_s impacts "
@@ -152,14 +152,14 @@ def line_of(found: FoundBranch) -> BranchLine:
         has_twin=found.has_twin,
         is_isolated=found.is_isolated,
         origin=found.origin.value,
-        begin="it was begun there" if branch.begin is None else branch.begin.value,
+        begin="the search started here" if branch.begin is None else branch.begin.value,
         end=branch.end.value,
         elapsed_s=found.elapsed_s,
     )
 
 
 def _response_at(found: FoundBranch, index: int, value: float) -> float:
-    """Return Response II of m0, interpolated between a point and the next."""
+    """Return Response II of m0 at a parameter ``value`` between point ``index`` and the next point."""
     branch = found.branch
     two = slice(index, index + 2)
     place, size = branch.parameters[two], branch.response_ii[two, 0]
@@ -197,7 +197,7 @@ class BranchDiagram(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Return a sentence on number, error and cost of the branches."""
+        """Return a sentence on number, error and computing time of the branches."""
         over = "" if self.is_complete else " The time limit was reached: more branches may exist."
         if not self.lines:
             return f"{self._none_found}; {self.elapsed_s:.1f} s.{over}"
@@ -225,7 +225,7 @@ class BranchDiagram(Labelled):
 
     @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
-        """For each branch, the motions that the bench's loop is fast enough to hold; None without a bench."""
+        """Flags of the motions on each branch that the bench can hold; None without a bench."""
         least_s = self.least_growth_time_s
         return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 

@@ -28,7 +28,7 @@ from ..signals.arrays import Reals
 from ._specimen_choice import SpecimenChoice
 
 EXACT_ENOUGH = 1e-4
-"""Largest relative change of the fundamental of p by neglected harmonics."""
+"""Largest relative change of the fundamental of p due to the neglected harmonics."""
 
 
 class BranchMethod(StrEnum):
@@ -50,20 +50,20 @@ class BranchRequest(SpecimenChoice):
     along: Parameter = Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
-    """Amplitude of the base displacement, along frequency."""
+    """Amplitude of the base displacement when the frequency varies."""
     frequency_hz: PositiveFloat = 260.0
-    """Frequency of the drive, along amplitude."""
+    """Frequency of the drive when the amplitude varies."""
     start: PositiveFloat = 50.0
     """Lower end of the range, in Hz or in m."""
     stop: PositiveFloat = 600.0
     """Upper end of the range, in Hz or in m."""
     error: TargetError | None = None
-    """Relative error of every motion, 0.01 or "1 %"; by default 1e-4 of the fundamental of p. Shooting
-    always reaches 1e-8; a balance uses as many harmonics as needed."""
+    """Error of every motion relative to the fundamental of p, 0.01 or "1 %"; 1e-4 by default. Shooting always
+    reaches 1e-8; harmonic balance uses as many harmonics as needed."""
     time_s: TargetTime | None = None
     """Time limit of the search, 20 or "20 s"; the result has the branches found by then."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
-    """Highest harmonic of a balance."""
+    """Highest harmonic of the harmonic balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
     """Number of values in the range at which motions are searched."""
     starts: Annotated[int, Field(ge=0, le=10_000)] = 12
@@ -73,7 +73,7 @@ class BranchRequest(SpecimenChoice):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
-    """Along amplitude: follow the phase resonance of the one mode between these frequencies [Hz]."""
+    """When the amplitude varies: follow the phase resonance of the mode between these frequencies [Hz]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """For a phase resonance: the quantity of m0 that lags the base by a quarter of a period."""
     loop_time_s: PositiveFloat | None = None

@@ -41,9 +41,9 @@ WAVES = 61
 LINES = 800
 """Number of frequencies for the transmissibility without contact."""
 MOST_SHOWN = 4
-"""Number of cells of one chain to draw."""
+"""Maximum number of cells to draw if there is only one chain."""
 ABOVE_BANDS = 1.15
-"""Highest frequency of the transmissibility, relative to the highest band."""
+"""Highest frequency of the transmissibility, relative to the upper edge of the highest band."""
 REACHED = Outcome.REACHED_END.text
 DECIBELS = 20.0 / math.log(10.0)
 
@@ -93,7 +93,7 @@ class ChainRun(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class ChainAnswer(Labelled):
-    """All results for one request."""
+    """All results for one request of a chain."""
 
     OWN_UNITS: ClassVar = {"wave_numbers": "rad"}
     DOCUMENT: ClassVar = (
@@ -132,7 +132,7 @@ class ChainAnswer(Labelled):
         return np.linspace(top / LINES, top, LINES)
 
     def linear_transmission(self, cells: int) -> Reals:
-        """Return |x of m0 over U| without contact, at `linear_hz`, shape (LINES, cells)."""
+        """Return |displacement of m0 over U| without contact, at `linear_hz`, shape (LINES, cells)."""
         return np.asarray(np.abs(chain_transmissibility(self.request.chain(cells), self.linear_hz)[:, :, 0]))
 
     @property
@@ -170,7 +170,7 @@ class ChainAnswer(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Return a sentence on band gaps, runs and cost."""
+        """Return a sentence on band gaps, runs and computing time."""
         gaps = ", ".join(
             f"{gap.lower_hz:.4g} Hz and above"
             if math.isinf(gap.upper_hz)
@@ -196,15 +196,15 @@ class ChainAnswer(Labelled):
 SAMPLES_PER_PERIOD = 8
 """Samples per period of the highest relevant frequency, enough for mean energies."""
 MOST_NUMBERS = 3e7
-"""Most numbers in the samples of a run: 0.25 GB."""
+"""Maximum number of values stored for a run: 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Number of stretches whose RMS is shown for a whole run."""
+"""Maximum number of equal parts of a whole run whose RMS is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
-"""Averaging time [s] of energies under a steady sine, after the responses were observed. With a requested
-error or time, it is at most this share of the run time before."""
+"""Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
+time was requested, it is at most this share of the time simulated before."""
 SWEEP_PARTS = 120
-"""Number of frequencies of a swept transmission; each is averaged over `FEWEST_PERIODS` or more."""
+"""Most frequencies of a swept transmission, each averaged over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
 """Number of segments averaged for the transmission under a recorded motion."""

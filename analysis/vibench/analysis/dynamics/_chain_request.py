@@ -22,7 +22,7 @@ class ChainDrive(StrEnum):
     """Motion of the base of a chain."""
 
     NONE = "none"
-    """None: bands, gaps and transmissibility without contact."""
+    """No motion: only bands, gaps and transmissibility without contact."""
     STEADY = "steady"
     """A steady sine at each frequency, each from rest."""
     SWEPT = "swept"
@@ -51,7 +51,7 @@ class ChainRequest(SpecimenChoice):
     recording: str = ""
     """Path of the recording whose base motion drives the chain."""
     duration_s: PositiveFloat = 2.0
-    """Window of a steady sine, length of a sweep, or longest part of a recording."""
+    """Observation time under a steady sine, length of a sweep, or maximum length of a recording."""
     settle_s: NonNegativeFloat = 2.0
     """Settling time from rest under a steady sine."""
     exponent_s: NonNegativeFloat = 0.0
@@ -91,7 +91,7 @@ class ChainRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """Refuse options that a requested error or time sets, and drives for which it is not supported."""
+        """Refuse options that a requested error or time determines, and drives other than a steady sine."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:

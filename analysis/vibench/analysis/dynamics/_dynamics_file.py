@@ -36,7 +36,7 @@ _UNITS = {
 }
 """Units of the columns of a branch; each column is a dataset."""
 _WORDS = ("periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s")
-"""Attributes of a branch."""
+"""Fields of a branch that are stored as attributes."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
 _SPECTRUM_UNITS = {
     "frequency_hz": "Hz",

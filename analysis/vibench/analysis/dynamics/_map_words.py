@@ -24,7 +24,7 @@ MOTION_CLASSES = (
 )
 """Classes of motions in a map, and their colours."""
 NO_NUMBERS = ("name", "about", "sources")
-"""Keys of a specimen that have no influence on its motion."""
+"""Keys of a specimen's description that have no influence on its motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class RecordedLevel:
 
 
 def motion_classes(results: MapResults) -> Reals:
-    """Return the index in `MOTION_CLASSES` of each point for the first start; NaN if unknown.
+    """Return the index in `MOTION_CLASSES` of the motion from the first initial state; NaN if unknown.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def motion_classes(results: MapResults) -> Reals:
 
 
 def motion_words(results: MapResults, motion: MapMotion) -> str:
-    """Return the name and share of a motion; the share has an interval only if it is an estimate."""
+    """Return the name of a motion and its share of the points, with an interval if it is an estimate."""
     kind = motion.motion.removesuffix(" so far") if motion.period is None else f"period {motion.period}"
     kind = kind if motion.has_impacts else "no impacts"
     text = f"{kind}, Response I {motion.response_i:.3g}: {motion.share.share:.2%} of the points"
@@ -103,7 +103,7 @@ def _specimen_words(specimen: SpecimenTable) -> str:
 
 
 def _fixed(plan: Map) -> list[str]:
-    """Return the fixed parameters of a map, except a start at zero."""
+    """Return the fixed parameters of a map; initial values of zero are left out."""
     law = [] if plan.model is None else [f"model = {plan.model}"]
     values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
     is_set = {name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()}

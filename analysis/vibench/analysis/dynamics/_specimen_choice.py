@@ -22,7 +22,7 @@ ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CO
 
 
 def _at(field: str, error: ValueError) -> ValidationError:
-    """Return the error of one field, so that a form shows it beside the field."""
+    """Return a validation error located at one field, so that a form shows it beside the field."""
     kind = PydanticCustomError("value_error", "{said}", {"said": str(error)})
     return ValidationError.from_exception_data(field, [{"type": kind, "loc": (field,), "input": None}])
 

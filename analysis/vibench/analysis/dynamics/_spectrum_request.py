@@ -21,7 +21,7 @@ LONGEST_S = 1e5
 ROUNDING = 1e-9
 """Relative rounding tolerance when the range is a multiple of the step."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
-"""Elastic contact laws, for which the sum of exponents is known from the dampers."""
+"""Elastic contact laws, for which the sum of the exponents follows from the dampers."""
 
 
 class SpectrumRequest(SpecimenChoice):
@@ -30,9 +30,9 @@ class SpectrumRequest(SpecimenChoice):
     along: Parameter = Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
-    """Amplitude of the base displacement, along frequency."""
+    """Amplitude of the base displacement when the frequency varies."""
     frequency_hz: PositiveFloat = 260.0
-    """Frequency of the drive, along amplitude."""
+    """Frequency of the drive when the amplitude varies."""
     start: PositiveFloat = 240.0
     """Lower end of the range, in Hz or in m."""
     stop: PositiveFloat = 280.0
@@ -118,7 +118,7 @@ class SpectrumPoint:
     motion: str
     source: str
     blocks: int
-    """Number of independent stretches for the least certain exponent; few give wide intervals."""
+    """Number of independent blocks of the run for the least certain exponent; few give wide intervals."""
     impact_rate_hz: float
     outcome: str
     elapsed_s: float
@@ -159,7 +159,7 @@ def point_of(
 
 @dataclass(frozen=True)
 class ExponentSpectrum(Labelled):
-    """All results for one request."""
+    """Lyapunov exponents at all points of one request."""
 
     DOCUMENT: ClassVar = "options=request points largest_sum_difference elapsed_s"
 
@@ -173,7 +173,7 @@ class ExponentSpectrum(Labelled):
 
     @property
     def largest_sum_difference(self) -> float:
-        """Largest relative difference of the sums from the dampers' rate; NaN for inelastic contact."""
+        """Largest relative difference of a sum of exponents from `dampers_per_s`; NaN if not elastic."""
         if not self.request.is_elastic:
             return math.nan
         known = [abs(each.sum_difference) for each in self.points if math.isfinite(each.sum_difference)]
@@ -181,7 +181,7 @@ class ExponentSpectrum(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Return a sentence on the points, the check of their sums, and the cost."""
+        """Return a sentence on the points, the check of their sums of exponents, and the computing time."""
         chaotic = sum(each.verdict == "chaotic" for each in self.points)
         if not self.request.is_elastic:
             check = "the contact dissipates energy, so sums of exponents are not checked against the dampers"
@@ -194,7 +194,7 @@ class ExponentSpectrum(Labelled):
 
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
-    """Compute the exponents of each value of a request in order, and yield each."""
+    """Compute and yield the exponents at each value of the varied parameter, in order."""
     specimen = request.shaken
     for value in request.values:
         began = time.perf_counter()
