@@ -57,13 +57,13 @@ _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03
 SAME_RATE = 1e-4
 """Relative tolerance between two stated sample rates; different clocks deviate by less."""
 EVEN = 1e-3
-"""Largest spread of times around an even axis with an exact rate, in sample intervals."""
+"""Largest spread of times around an even axis whose rate counts as exact, in sample intervals."""
 _PLACED = 0.1
-"""Tolerance of a time on an even axis, in addition to rounding, in sample intervals."""
+"""Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative deviation from a multiple of the typical interval; share of such intervals in coarse times."""
+"""Relative distance of irregular intervals from multiples of the typical one; their share in coarse times."""
 _SINGLE = 0.2
-"""Quantile of the intervals that is a single one, even if two samples in five were lost."""
+"""Quantile of the intervals that is one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 10
 """Minimum number of differing intervals to recognize rounding; fewer could be regularly lost samples."""
 _ROUNDED_SPREAD = 1.05
@@ -73,7 +73,7 @@ _COARSE_SPREAD = 1.25
 _RISING = 0.9
 """Minimum share of non-negative intervals in a channel of times."""
 _BIN = 512
-"""Number of samples in a group; only the two extremes of each group are kept."""
+"""Number of times in a group; only the smallest and the largest deviation of each group are kept."""
 _LEAST_RISING = 64
 """Minimum number of evenly rising values for a channel not named time to count as times."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
@@ -89,7 +89,7 @@ _LONGEST_PAUSE = 10
 
 
 def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the time fields of a `SourceChannel` from facts of a file; the nearest facts come first.
+    """Return the time fields of a `SourceChannel` from facts in a file: the channel's own facts come first.
 
     A fact is a sample rate, an interval, a start, or a unit of these. A name may end with the unit:
     ``"dt_ms"``, ``"Sample rate [kHz]"``.
@@ -151,7 +151,7 @@ def _are_several(value: Any) -> bool:
 
 
 def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
-    """Return the stated time of a channel's first sample [s]; the nearest facts come first.
+    """Return the stated time of a channel's first sample [s]; the channel's own facts come first.
 
     If the file states a date and an offset, as in NI waveforms, their sum is returned.
     """
@@ -190,7 +190,7 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or unit in _NO_UNITS else None
     is_named = found is not None and unit in SECONDS
-    # Equal times were rounded too much to contradict anything.
+    # Times that are all equal were rounded too much to be a contradiction.
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
@@ -275,7 +275,7 @@ class TimeAxis:
 
 
 def agrees(rate_hz: float, bounds_hz: tuple[float, float]) -> bool:
-    """Return whether a rate is within bounds, widened by the difference of two clocks."""
+    """Return whether a rate is within bounds, widened by the largest difference of two clocks."""
     low, high = bounds_hz
     return low * (1 - SAME_RATE) <= rate_hz <= high * (1 + SAME_RATE)
 
@@ -445,7 +445,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
 def restarts(
     starts_s: Mapping[int, float], rate_hz: float | None, samples: int
 ) -> tuple[tuple[tuple[int, int], ...], str]:
-    """Return the runs (as in `TimeAxis`) of a channel with several starts, and a contradiction or ""."""
+    """Return the runs (as in `TimeAxis`) of a channel with several start times, and a contradiction or ""."""
     runs = [(0, 0)]
     first_s = next(iter(starts_s.values()), 0.0)
     for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):
@@ -477,7 +477,7 @@ class Alignment:
     remarks: tuple[str, ...]
     """Remarks on the times in the file, and on times that the mapping replaces."""
     is_contradicted: bool
-    """Whether the replaced times show another sample rate or lost samples."""
+    """Whether the file's times, replaced by the mapping, show another sample rate or lost samples."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:

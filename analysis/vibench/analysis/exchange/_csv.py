@@ -68,7 +68,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Advance to a date, with day and month in the order nearest to the last; return if it is valid."""
+        """Advance to a date, in the order of day and month nearest to the last; False if it is invalid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)

@@ -45,7 +45,7 @@ def require_whole(path: Path) -> None:
     """Raise ValueError for a file with inconsistent elements or unknown types."""
     content = memoryview(path.read_bytes())
     if len(content) < HEAD_BYTES:
-        raise ValueError("it ends within its head")
+        raise ValueError("it ends within its header")
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[HEAD_BYTES - 2 : HEAD_BYTES]))
     # Version 4 files have no such header; scipy checks their few types itself.
     if order is not None:

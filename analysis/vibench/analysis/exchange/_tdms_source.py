@@ -20,7 +20,7 @@ SIGNATURE = b"TDSm"
 LONGEST_NS = 1000 * 86400 * 10**9
 """Period of time stamps: a thousand days [ns], so that a double resolves them to 15 ns."""
 SCALES = {"Linear", "Polynomial", "RTD", "Table", "Thermocouple", "Thermistor", "Strain", "Add", "Subtract"}
-"""Scales that npTDMS applies with the numbers in the file."""
+"""Types of scales that npTDMS applies, with the parameters in the file."""
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 START_ERROR_S = 1e-6
 """Resolution of start times, which are stored in microseconds [s]."""
