@@ -95,7 +95,7 @@ def test_noise_with_collisions_is_refused(vibench_here, tmp_path, level_vpp):
     said = " ".join(result.stdout.split())
     assert result.returncode == 0, result.stderr
     assert "Fitted" not in said
-    assert "No value is fitted to noise: about any linear response, m0 scatters" in said
+    assert "No value is fitted to noise: m0 scatters" in said
     assert "so masses may collide or rub; measure weaker noise." in said
     assert not (tmp_path / "report" / "specimen.toml").exists()
     as_json = vibench_here("analyse", "levels", "--fit", "--no-simulate", "--json", cwd=tmp_path)

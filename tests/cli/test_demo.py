@@ -181,7 +181,7 @@ def test_the_demo_report_begins_with_the_three_findings_of_the_paper(demo, resul
     agrees = sum(bool(each) and all(each) for each in compared)
     words = {7: "agrees with all seven recordings", 6: "agrees with six"}
     assert words[agrees] in page.findings
-    for statistic in ("rank ", "largest |z|", "draws from slightly different starts"):
+    for statistic in ("rank ", "largest |z|", "draws from slightly different initial states"):
         assert statistic in page.text
         assert statistic not in page.visible
 

@@ -16,7 +16,7 @@ SHOWN = {
     "response_ii": "Response II of m0 over A0",
     "relative_i": "Response I of p over A0",
     "relative_ii": "Response II of p over A0",
-    "impact_rate": "impacts a second",
+    "impact_rate": "impacts per second",
     "contact_energy": "largest energy in a stop [J]",
     "lyapunov": "largest Lyapunov exponent [1/s]",
     "duration": "simulated time [s]",

@@ -57,7 +57,7 @@ def test_a_transmission_figure_shows_measurement_and_simulation(noise_file):
     np.testing.assert_array_equal(
         measured.get_xdata(), found.analysis.response.frequency_response.frequency_hz
     )
-    simulated = line(top, "simulated under the recorded base")
+    simulated = line(top, "simulated from the recorded base motion")
     np.testing.assert_array_equal(simulated.get_ydata(), found.overlay.response.frequency_response.magnitude)
     assert measured.get_color() != simulated.get_color() == SIMULATED
     assert difference.get_xlabel() == "frequency [Hz]"
