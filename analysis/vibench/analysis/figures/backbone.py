@@ -31,7 +31,7 @@ _LEVEL = "base acceleration [m/s²]"
 _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
 _LOST = "no resonance found at this level"
-_SIMULATED = "simulated under the recorded base"
+_SIMULATED = "simulated from the recorded base motion"
 _MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 2, "linewidth": 0.8}
 
 
@@ -83,7 +83,7 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 
 
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
-    """Return amplitudes in a readable unit, with the factor from metres and the name of the unit."""
+    """Return amplitudes in a readable unit, the factor from metres to this unit, and its name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
     scale, unit = style.prefixed(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit

@@ -1,4 +1,4 @@
-"""Figure of the smallest and largest values of every channel, from bench check to last ramp."""
+"""Figure of the smallest and largest values of every channel, from the bench check to the last ramp."""
 
 from ..recordings.channel_levels import ChannelLevel
 from ..recordings.facts import RecordingFacts

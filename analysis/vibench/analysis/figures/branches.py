@@ -42,7 +42,7 @@ def branches_figure(
     diagram
         Computed branches.
     measured
-        Responses of stepped sines and sweeps; drawn for branches along frequency.
+        Responses of stepped sines and sweeps; drawn if the branches are over frequency.
     tracked
         Tracked resonances; a branch of phase resonance shows their frequencies in its first panel.
     """
@@ -79,7 +79,7 @@ def branches_figure(
 
 
 def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
-    """Draw a branch, ``size`` over ``place``, into ``axes``: stable parts solid, unstable parts dashed."""
+    """Draw ``size`` over ``place`` along a branch; stable parts are solid, unstable parts dashed."""
     colour = (
         style.PREDICTED
         if line.periods == 1
@@ -116,7 +116,7 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
 def _growth(
     axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
 ) -> None:
-    """Draw the growth times of unstable motions; the bench cannot hold motions below the line."""
+    """Draw the e-folding times of unstable motions; the bench cannot hold motions below ``least_s``."""
     for line, held in zip(diagram.lines, holdable, strict=True):
         place, grows = _place(diagram, line), ~line.is_stable
         for label, chosen, colour in (
@@ -130,7 +130,7 @@ def _growth(
     low, high = axes.get_ylim()
     axes.axhspan(min(low, 0.5 * least_s), least_s, color=style.COLLIDING, alpha=0.6)
     axes.set_ylim(min(low, 0.5 * least_s), max(high, 2.0 * least_s))
-    axes.set_ylabel("time to\ngrow by e [s]")
+    axes.set_ylabel("e-folding\ntime [s]")
 
 
 def _place(diagram: BranchDiagram, line: BranchLine) -> Reals:

@@ -1,4 +1,4 @@
-"""Figure of a chain: waves, transmission between cells, motion over place and time, energy."""
+"""Figure of a chain: waves, transmission to each cell, motion over cell and time, energies."""
 
 import math
 
@@ -78,7 +78,7 @@ def _waves(axes: Axes, found: ChainAnswer) -> None:
     axes.set_ylim(0.0, 1.0)
     decay = axes.twinx()
     decay.plot(found.linear_hz, found.attenuation_db, color=style.BOUNDS, linewidth=0.8)
-    decay.set_ylabel("decay [dB a unit]", color=style.BOUNDS)
+    decay.set_ylabel("decay [dB per unit]", color=style.BOUNDS)
     decay.set_ylim(0.0, 1.1 * float(np.max(found.attenuation_db)))
     decay.grid(visible=False)
     axes.tick_params(labelbottom=False)
@@ -136,7 +136,7 @@ def _per_cell(energies: Axes, impacts: Axes, run: ChainRun) -> None:
         style.magnitude_axis(energies)
     energies.set_ylabel(f"mean energy [{unit}]")
     impacts.bar(place, run.impacts / run.observed_s, color=style.MEASURED, width=0.7)
-    impacts.set_ylabel("impacts a second")
+    impacts.set_ylabel("impacts per second")
     for axes in (energies, impacts):
         axes.set_xlabel("cell, from the base")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -119,7 +119,7 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
         bands = ", ".join(
             f"{each.decibel:.1f} dB around {each.towards_hz:.0f} Hz" for each in analysis.terminal
         )
-        sentences.append(f"{text} Measured bands: {bands} re the drive line." if bands else text)
+        sentences.append(f"{text} Measured bands: {bands} relative to the drive line." if bands else text)
     window_s = rising[0][0].response.window_s
     text = (
         f"Displacement of {rising[0][0].facts.mass} and its spectrum over the last {window_s:.3g} s "
@@ -129,7 +129,7 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
         return text
     return (
         f"{text} Chaotic motions, measured and simulated, can agree in their statistics only, not in their "
-        "time signals; one simulated draw is shown."
+        "time signals; one simulated run is shown."
     )
 
 

@@ -1,4 +1,4 @@
-"""Median and 95 % band of simulated draws, for figures, tables and captions."""
+"""Median and 95 % band of simulated runs (draws), for figures, tables and captions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from ..tables import Table, columns, table
 from . import style
 
 ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
-"""Attribute of a result that contains each response to sines."""
+"""Attribute of a result for each response to sines, keyed by the name of the response."""
 RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Response II\n|x at f| / A0"}
 
 
@@ -31,8 +31,8 @@ def draw_sines(axes: Axes, along: Reals, sines: ResponsePrediction, what: str, l
 def simulated_label(run: SimulatedRun) -> str:
     """Return the legend label of the simulated curve."""
     if not run.driven.by_voltage:
-        return "simulated under the recorded base"
-    return "simulated under the recorded voltage"
+        return "simulated from the recorded base motion"
+    return "simulated from the recorded voltage"
 
 
 def draw_band(
@@ -42,7 +42,7 @@ def draw_band(
     name: str,
     shown: Callable[[Reals], Reals] = lambda values: values,
 ) -> Reals | None:
-    """Fill the 95 % band of one quantity and return its median; None unless there are several draws.
+    """Draw the 95 % band of one quantity as an area, and return its median; None without several draws.
 
     ``along`` contains the abscissae of the quantity; ``shown`` converts its values to those of the axis.
     """
@@ -61,15 +61,15 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
         return (
-            f"Simulated under the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
+            f"Simulated from the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
             f"median difference {overlay.difference.median_abs_db:.2g} dB, "
             f"{100 * overlay.difference.share_within_two:.0f} % of the values within two standard errors. "
             "Simulated impacts do not move the recorded base, so chaotic motions differ from measured ones."
         )
     parts = [
         (
-            f"Rig and specimen simulated together under the {run.driven.value}, {run.draws} draws from "
-            f"slightly different starts, {run.impact_rate_hz:.0f} impacts per second"
+            f"Rig and specimen simulated together from the {run.driven.value}, {run.draws} draws from "
+            f"slightly different initial states, {run.impact_rate_hz:.0f} impacts per second"
         ),
         *overlay.agreement,
     ]
@@ -79,7 +79,7 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
 
 
 def agreement_text(overlay: AbstractOverlay[Any]) -> str:
-    """Return agreement and escape rate as the end of a sentence; empty if simulated under a base motion."""
+    """Return the end of a sentence with agreement and escape rate; empty if the base motion is the input."""
     if not overlay.run.driven.by_voltage:
         return ""
     parts = [*overlay.agreement]

@@ -1,4 +1,4 @@
-"""Figures of the hidden motion in one recording: p between the stops, and the impacts."""
+"""Figures of motion estimated from one recording: p = y - z between the stops, and the impacts."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ _POINTS = 200
 
 
 def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
-    """Draw p between the stops over the whole stretch, and over a short part of it."""
+    """Draw p between the stops over the whole analysed part of the recording, and enlarged over a few ms."""
     with style.styled():
         figure = style.new_figure(4.4)
         whole, zoom = figure.subplots(2, 1)
@@ -89,7 +89,7 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 
 def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
-    """Draw impulses over time, force over penetration, energy lost at impacts, and measured gaps."""
+    """Draw impulses over time, force over penetration, energy lost at each impact, and measured gaps."""
     with style.styled():
         figure = style.new_figure(5.2)
         (impulses, force), (energy, gaps) = figure.subplots(2, 2)

@@ -47,10 +47,10 @@ def map_figure(
     Parameters
     ----------
     results
-        Results of a map, complete or still being computed.
+        Results of a map, which may still be incomplete.
     shown
         Quantity of `SHOWN` to draw below the kinds of motion. By default Response I; for a basin map, the
-        duration for which each start was followed.
+        simulated time from each initial state.
     diagram
         Branches to draw into a diagram along one quantity.
     levels
@@ -193,7 +193,7 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
             draw_line(panels[1], line, place, _section(line))
     style.magnitude_axis(panels[0])
     panels[0].set_ylabel("Response I of m0 over A0")
-    panels[1].set_ylabel("p once a drive period [µm]")
+    panels[1].set_ylabel("p once per drive period [µm]")
     panels[1].set_xlabel(label)
     if quantity.axis == "frequency":
         style.frequency_axis(panels[1], float(values[0]), float(values[-1]))
@@ -207,7 +207,7 @@ def _section(line: BranchLine) -> Reals:
 
 
 def motion_table(motions: Sequence[MapMotion]) -> Table:
-    """Return a table of a map's motions with their responses and shares."""
+    """Return a table of a map's motions with their responses and their shares of the points."""
     return table(
         "map_motions",
         motion=[str(each.motion) for each in motions],

@@ -199,7 +199,7 @@ _EXCITATION_HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
 """Samples per period of the highest frequency: enough for a figure, few enough for a long sweep."""
 _SMALLEST_PART = 0.2
-"""Smallest line, relative to the largest (-14 dB), that the frequency axis must contain."""
+"""The frequency axis contains all lines above this share of the largest line (-14 dB)."""
 _EXCITATION_COLUMNS = 2000
 
 

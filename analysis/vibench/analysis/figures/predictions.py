@@ -20,12 +20,12 @@ _LEAST = 1e-14
 
 
 def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigure:
-    """Draw the error of the responses over time, one panel for each scene and one line for each method.
+    """Draw error over computing time; each scene (specimen and drive) has a panel, each method a line.
 
     Parameters
     ----------
     curves
-        Error and processor time of each method, measured by `vibench tradeoff`, keyed by scene.
+        Error of the responses and processor time of each method, from `vibench tradeoff`, keyed by scene.
 
     """
     methods = list(dict.fromkeys(each.method for points in curves.values() for each in points))
@@ -152,15 +152,15 @@ def _numbers(found: ExponentSpectrum) -> Table:
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
-"""Range of p before and beyond a stop. Power laws start at -gap; the paper fits up to 1 um beyond."""
+"""Drawn range of p before and beyond a stop [m]; the paper fits its contact laws up to 1 um beyond."""
 _GREY = "#9a9a9a"
 _SPEED_M_PER_S = 0.1
-"""Speed for laws that depend on it: the impact speed in the paper's specimen at 5 um and 260 Hz."""
+"""Speed at which laws with losses are drawn: the impact speed of the paper's specimen at 5 um, 260 Hz."""
 _POINTS = 801
 
 
 def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigure:
-    """Draw the force that pushes m1 back over p = y - z; each specimen has a panel titled by its key.
+    """Draw the contact force on m1 over p = y - z, with one panel per specimen, titled by its key.
 
     The stop with the smaller gap is shown. A law that depends on speed is drawn for loading and unloading at
     0.1 m/s. Rigid stops have no finite force and are drawn as a wall.

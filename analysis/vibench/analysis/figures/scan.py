@@ -75,5 +75,5 @@ def scan_caption(scan: Scan) -> str:
     return (
         f"Measured transmission from base to {len(scan.points)} points, and its phase, at "
         f"{f'the resonances {where} Hz' if where else 'no resonance, because none is significant'}. "
-        f"Values and bars ({100 * confidence:g} % bounds) are those of the line nearest to each resonance."
+        f"Values and bars ({100 * confidence:g} % bounds): at the spectral line nearest to each resonance."
     )

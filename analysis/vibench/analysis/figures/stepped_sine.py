@@ -1,4 +1,4 @@
-"""Figure of Responses I and II at each frequency or level of a stepped sine, per direction."""
+"""Figure of Responses I and II at each frequency or level of a stepped sine, for steps up and down."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class SteppedLook(Generic[P]):
     axis: str
     title: Callable[[P, SteppedResponse], str]
     caption: Callable[[P, SteppedResponse], str]
-    """First sentences of the caption, before those on feedback and simulation."""
+    """First sentences of the caption; sentences on feedback and simulation follow."""
 
 
 def stepped_sine_figure(

@@ -23,9 +23,9 @@ from ..tables import Table, write_tables
 
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"
-"""Colour of simulations under the recorded voltage or base motion (vermillion of Okabe and Ito)."""
+"""Colour of simulations driven by the recorded voltage or base motion (vermillion of Okabe and Ito)."""
 PREDICTED = "#0072b2"
-"""Colour of simulations under sines (blue)."""
+"""Colour of predicted responses to sines (blue)."""
 LINEAR = "#56b4e9"
 """Colour of the specimen without contact (sky blue, always dashed)."""
 TERMINAL = "#8a3b7a"
@@ -56,9 +56,9 @@ _EDGE = 1e-3
 """Relative margin at both ends of a frequency axis; measured lines are a few ppm off round numbers."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratio of the ends of a frequency axis; linear below 5, with ticks at 3 and 7 below 60."""
+"""Ratios of the ends of a frequency axis: below the first, linear; below the second, ticks at 3 and 7."""
 _FEW_DECADES = (1.5, 0.5)
-"""Decades of a magnitude axis below which some, or all, ticks between powers of ten are labelled."""
+"""Axes of fewer decades than these have labels at some, or all, ticks between powers of ten."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
@@ -143,7 +143,7 @@ def magnitude_axis(axes: Axes) -> None:
 
 
 class _Between(LogFormatter):
-    """Formatter that labels the same ticks as Matplotlib's, but writes 0.4 instead of 4e−01."""
+    """Formatter that labels the same ticks as Matplotlib's formatter, but writes 0.4 instead of 4e−01."""
 
     def __call__(self, value: float, place: int | None = None) -> str:
         return _plain(value) if super().__call__(value, place) else ""
@@ -158,7 +158,7 @@ def _plain(value: float, _place: int | None = None) -> str:
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
-    """Return a factor, and a unit with SI prefix, that bring a quantity between 1 and 1000."""
+    """Return a factor that scales ``largest`` to between 1 and 1000, and the unit with its SI prefix."""
     fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
     scale, prefix = fitting[-1]
     return 1 / scale, f"{prefix}{unit}"
