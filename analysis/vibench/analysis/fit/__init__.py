@@ -1,4 +1,4 @@
-"""Fit the specimen on the shaker to the recordings of one campaign.
+"""Fit the parameters of the specimen on the shaker to the recordings of one campaign.
 
 Damping and frequencies come from the weakest noise, the gap of each side from tracking a colliding motion. A
 model that contradicts the recordings is refused, and the assumptions that may be wrong are ranked. Every

@@ -24,7 +24,7 @@ from .specimen_fit import SpecimenFit
 from .statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
-"""Limits of Response I over Response II (1 for a sine): no collisions below, collisions above."""
+"""Ratios of Response I to II (1 for a sine): no collisions below the first, collisions above the second."""
 _LENGTH_S = 3.0
 """Length of the tracked stretch [s], long enough for four restarts."""
 _MOST_RECORDINGS = 3
@@ -57,7 +57,7 @@ class CollisionNumbers:
     recording: str
     parameters: tuple[FoundParameter, ...]
     misfit: float
-    """Mean squared innovation of the track, or squared distance of the statistics; ideally about 1."""
+    """Mean squared innovation of the tracking, or squared distance of the statistics; ideally about 1."""
 
     @property
     def determined(self) -> tuple[FoundParameter, ...]:
@@ -95,7 +95,7 @@ class CollisionNumbers:
 
     @property
     def contradicted(self) -> tuple[str, ...]:
-        """Parameters that differ from their description by more than their bounds' width, worst first."""
+        """Parameters that differ from the described value by more than their bounds' width, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
             for each in self.determined
@@ -115,7 +115,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
 def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track colliding recordings; return the parameters of the recording with the narrowest gap bounds.
 
-    The text is empty; if no recording can be tracked, None is returned with the reason.
+    The second result is empty. If no recording can be tracked, the first is None and the second the reason.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -143,9 +143,9 @@ def numbers_from_statistics(
     linear: SpecimenFit | None,
     observer: Observer,
 ) -> tuple[CollisionNumbers | None, str]:
-    """Return parameters from statistics of the first suitable recording, compared with simulated specimens.
+    """Return parameters by comparing statistics of the first suitable recording with simulated specimens.
 
-    The text is empty; if no recording is suitable, None is returned with the reason.
+    The second result is empty. If no recording is suitable, the first is None and the second the reason.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
@@ -162,7 +162,7 @@ def numbers_from_statistics(
         numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
         if numbers.determined:
             return numbers, ""
-        why.setdefault("statistics narrow no value beyond its description", []).append(each.name)
+        why.setdefault("statistics determine no value better than the description", []).append(each.name)
     return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
 
 

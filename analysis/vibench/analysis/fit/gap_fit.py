@@ -66,8 +66,8 @@ def fit_gap(
     Parameters
     ----------
     sweeps
-        Measured sweeps. The onset is the edge at which a sweep enters a colliding region; at the other edge,
-        collisions persist.
+        Measured sweeps. The onset is the edge at which a sweep enters a colliding region; at the edge where
+        it leaves the region, collisions persist.
     linear
         Specimen for the linear motion; its own gap is only the nominal value of the result.
     fit
@@ -171,7 +171,7 @@ _SAME_HZ = 0.5
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Return the gap of the narrowest bracket between dwells without and with collisions.
+    """Return the gap with the narrowest bounds, each from one dwell without and one with collisions.
 
     Raises NotEnoughData when no frequency has dwells on both sides of the onset.
     """

@@ -34,14 +34,14 @@ CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
 """Reference frequency of the channels' phases."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
-"""Factors by which all frequencies are scaled for further starts of the search."""
+"""Factors on all natural frequencies for further starting points of the search."""
 _STEP = 1e-6
 """Logarithmic step of central differences; far above rounding, far below the width of a resonance."""
 
 _HOPELESS = 5.0
 """Multiple of the chi square limit above which no weighting can make a fit valid."""
 _MOST_STEPS = 60
-"""Maximum number of evaluations; a further mode without evidence has no optimum."""
+"""Maximum number of evaluations; if the data show no further mode, its fit has no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
 """Function of specimen, frequencies [Hz] and further parameters that returns m0 / base."""
@@ -90,7 +90,7 @@ class Descended:
     covariance: Reals
     """Covariance of the logarithms, for a correct model."""
     freedoms: Reals
-    """Degrees of freedom of each uncertainty; few if few lines determine the parameter."""
+    """Degrees of freedom of the uncertainty of each parameter; few if few lines determine it."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -105,7 +105,7 @@ class Lines:
     weights: Reals
     """Weights of the magnitudes, then of the phases."""
     averages: float
-    """Independent averages for each line's scatter."""
+    """Number of independent averages from which the scatter of each line is estimated."""
     correlation: tuple[float, float]
     """Number of lines per independent line, for parameters and for chi square."""
     nominal: Specimen
@@ -207,7 +207,7 @@ def lines_of(
 
 
 def fit_lines(lines: Lines) -> Descended:
-    """Fit from the described specimen; if that fails, also from stiffer and softer ones."""
+    """Fit from the described specimen; if that fails, also from stiffer and softer specimens."""
     usual = Freedom()
     best = _from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:

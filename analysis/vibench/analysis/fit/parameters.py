@@ -78,7 +78,7 @@ class FittedValue:
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Return one parameter of a specimen; if the links differ in damping time, link 0 counts."""
+    """Return one parameter of a specimen; if links differ in damping time, that of link 0 is returned."""
     masses, stiffnesses = specimen.masses, specimen.stiffnesses
     match parameter:
         case Parameter.DAMPING_TIME:

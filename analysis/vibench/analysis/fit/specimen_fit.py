@@ -142,7 +142,7 @@ def not_linear(nominal: Specimen, sentence: str) -> SpecimenFit:
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Return the covariance due to the clock error, which scales frequencies directly and times inversely."""
+    """Return the covariance due to the clock's error, which scales all frequencies, and times inversely."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

@@ -21,21 +21,21 @@ from .specimen_fit import SpecimenFit
 
 # Approximate Bayesian computation with regression: parameters of a model from statistics of its runs.
 #
-# Parameters are drawn from a box, and a run is simulated for each. Each parameter is regressed on the
-# statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The posterior is the
-# prediction for the observed statistics plus leave-one-out errors. Its intervals have the stated coverage for
-# parameters in the box, even for a poor regression (conformal prediction; Vovk, Gammerman and Shafer 2005).
-# Then the box is narrowed and sampled again (Deistler, Goncalves and Macke 2022).
+# Parameters are drawn from a box (a range of each), and a run is simulated for each. Each parameter is
+# regressed on the statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The
+# posterior is the prediction for the observed statistics plus leave-one-out errors. Its intervals have the
+# stated coverage for parameters in the box, even for a poor regression (conformal prediction; Vovk, Gammerman
+# and Shafer 2005). Then the box is narrowed and sampled again (Deistler, Goncalves and Macke 2022).
 
 ROUNDS = (120, 120, 240)
 """Number of runs in each box, from the widest box to the narrowest."""
 _MARGIN = 1.25
-"""Half width of the next box as a multiple of the largest error of the regression."""
+"""Ratio of the half width of the next box to the largest error of the regression."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
 """Number of principal components of the statistics in which the observed statistics are checked."""
 _FAR = 1.05
-"""Limit of the distance of the observed statistics, relative to the furthest run; above it, no model fits.
+"""Largest distance of the observed statistics, relative to the furthest run, at which the model fits.
 
 A correct model exceeds the furthest of n runs at most once in n + 1 times; the margin allows for small
 differences between rig and recording.
@@ -197,7 +197,7 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
 
 
 def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
-    """Return which statistics are above the noise of the channels.
+    """Return flags of the statistics that are above the noise of the channels.
 
     Parameters
     ----------
@@ -265,12 +265,12 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range as factors; the gaps are expressed by geometric mean and sqrt(upper / lower)."""
+"""Search range as a factor up and down; gaps are expressed by geometric mean and sqrt(upper / lower)."""
 _CONFIDENCE = 0.95
 _WIDEST = 0.5
 """Width of bounds relative to the search range; with wider bounds a parameter is undetermined."""
 _LIKELY = 2.0
-"""Largest allowed ratio between the rms base acceleration of recording and first draw."""
+"""Largest allowed ratio between the rms base accelerations of the recording and of the first run."""
 _LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0
 _SEED = 29
 
@@ -286,7 +286,7 @@ def statistical_numbers(
 ) -> tuple[tuple[FoundParameter, ...], float]:
     """Return gaps, m1, c1 and contact force with 95 % bounds, or the reason why each is undetermined.
 
-    Rig and specimens are simulated under the recorded voltage and compared with the recording by statistics.
+    Rig and specimens are simulated from the recorded voltage and compared with the recording by statistics.
     The second result is the distance of the statistics relative to the furthest run. Raises AnalysisError
     when rig, contact law or samples are unsuitable, or no specimen has these statistics.
 
@@ -295,7 +295,7 @@ def statistical_numbers(
     recording
         A recording with collisions.
     specimen
-        Start of the search, with fitted linear parameters.
+        Starting point of the search, with fitted linear parameters.
     stretch_s
         Start and end of the stretch.
     drive_hz
@@ -386,7 +386,7 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
 
 
 def _require_likely(made: _Runs, measured: Reals) -> None:
-    """Raise UnusableData if the rms base motion of a first draw differs from the recorded one."""
+    """Raise UnusableData if the rms base acceleration of a first run differs from the recorded one."""
     first = made.draws.draw(made.specimen, made.rng)
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:

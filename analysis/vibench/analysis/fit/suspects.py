@@ -1,4 +1,4 @@
-"""Find wrong assumptions of a model that does not fit, by freeing each assumption in turn."""
+"""Find wrong assumptions of a model that does not fit, by a fit without each assumption in turn."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class Assumption(StrEnum):
 
 @dataclass(frozen=True)
 class Suspect:
-    """An assumption that was freed, and the quality of the resulting fit."""
+    """An assumption of the model, and the quality of the fit without it."""
 
     DOCUMENT: ClassVar = (
         "assumption would_mend_it=sentence reduced_chi_square mends behind_the_likeliest=behind"
@@ -54,7 +54,7 @@ class Suspect:
     """The change that explains the misfit, with its size."""
     reduced_chi_square: float
     mends: bool
-    """Whether the model fits when this assumption is freed."""
+    """Whether the model fits without this assumption."""
     behind: float
     """Twice the log likelihood ratio to the best suspect, plus ln(number of values) per parameter; best 0."""
 
@@ -65,7 +65,7 @@ class Suspect:
 
 
 def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
-    """Free each assumption in turn, and return them ranked by likelihood and number of parameters.
+    """Fit without each assumption in turn; return them ranked by likelihood and number of parameters.
 
     Parameters
     ----------

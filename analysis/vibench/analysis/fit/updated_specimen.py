@@ -1,4 +1,4 @@
-"""Fit the specimen on the shaker to the recordings of one campaign."""
+"""Fit the parameters of the specimen on the shaker to the recordings of one campaign."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ from .suspects import Assumption, Suspect
 _SURELY = 3.3
 """Number of standard deviations that one correct description in a thousand exceeds."""
 _LARGEST_SCATTER = 100.0
-"""Largest variance about a linear response over that in silence; light collisions reach some thousands."""
+"""Largest ratio of variance about a linear response to that in silence; light collisions exceed 1000."""
 _WEAKER = "so masses may collide or rub; measure weaker noise"
 _LEAST_RELATIVE_SD = 2e-3
 """Relative error of the fitted table mass due to coil, filters and held samples."""
@@ -111,7 +111,7 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def fitted(self) -> bool:
-        """Whether any parameter was fitted."""
+        """Whether at least one parameter was fitted."""
         return bool(self.values) or self.collisions is not None
 
     @property
@@ -291,7 +291,7 @@ def update_model(
         Receives the progress.
     """
     of_m0 = tuple(each for each in results.results if each.analysis.facts.mass == "m0")
-    results = replace(results, results=of_m0)  # scan points may be on the other masses
+    results = replace(results, results=of_m0)  # scan points may be on masses other than m0
     if not of_m0:
         raise NotEnoughData(f"{results.name!r} has no result for m0, to which a specimen could be fitted")
     described = described_specimen(results.facts[0].bench)
@@ -330,7 +330,7 @@ def _linear(
         channels = RecordedChannels(recording, response=facts.response)
         scatter = scatter_over_silence(channels, results.noise[0].analysis.excitation, weakest)
     if scatter > _LARGEST_SCATTER:
-        why = f"about any linear response, m0 scatters {np.sqrt(scatter):.2g} times as much as in silence"
+        why = f"m0 scatters {np.sqrt(scatter):.2g} times as much about any linear response as in silence"
         return not_linear(nominal, f"{why}, {_WEAKER}")
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
