@@ -1,4 +1,4 @@
-"""Nonlinear distortion under periodic noise, from the scatter and the undriven lines."""
+"""Nonlinear distortion in periodic noise, from the scatter of realisations and the undriven lines."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -25,7 +25,7 @@ class Distortion(Labelled):
     realisations: int
     drift: Drift | None
     noise_share: float
-    """Relative standard deviation of a realisation by channel noise or chaos, from scatter of periods."""
+    """Relative standard deviation of one realisation due to noise or chaos, from its scatter over periods."""
     distortion_share: float | None
     """Relative scatter of realisations beyond `noise_share`; None for a single realisation."""
     odd_m_per_s: float | None
@@ -39,7 +39,7 @@ class Distortion(Labelled):
 def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
     """Return noise and distortion of a periodic transmission.
 
-    Undriven lines show nonlinearity of amplifier and shaker, too, not only of the specimen.
+    Undriven lines also show the nonlinearity of amplifier and shaker, not only that of the specimen.
     """
     magnitude = periodic.frequency_response.magnitude
     varied = periodic.distortion_variance
@@ -57,7 +57,7 @@ def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
 
 
 _SURELY = 5.0
-"""Standard deviations by which scatter must exceed noise to count as distortion."""
+"""Number of standard deviations by which scatter must exceed noise to count as distortion."""
 
 
 def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:

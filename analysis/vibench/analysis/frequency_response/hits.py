@@ -15,9 +15,9 @@ from .transmissibility import frequency_response_of
 
 _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
-"""Usual length [s] and least number of the pieces of the drive whose energies are compared."""
+"""Usual length [s] and minimum number of the pieces of the drive whose energies are compared."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""Time share of the strongest pieces, and their least energy share for hits; Gaussian noise has 0.06."""
+"""The drive is hits if this time share of strongest pieces has this energy share (Gaussian noise: 0.06)."""
 _TRIGGER = 0.1
 """Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0
@@ -29,7 +29,7 @@ _PARTS = 20
 _NOTHING = 1e-300
 EXPONENTIAL = "exponential"
 _ASSUMED_SD = 0.01
-"""Assumed scatter relative to the line and to the largest line; only weights the lines of a single hit."""
+"""Scatter assumed to weight the lines of a single hit, relative to the line and to the largest line."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class HitSpectra:
     """Spectra of the hits under an exponential window, from which responses are estimated.
 
     The window multiplies all channels by exp(-decay t), which turns H(i w) into H(i w + decay). Its decay is
-    the least that reduces the response to a thousandth at the end of a segment; 0 with ``Window.BOXCAR``.
+    the smallest that reduces the response to a thousandth at the end of a segment; 0 with ``Window.BOXCAR``.
     """
 
     settings: FrequencyResponseSettings
@@ -140,7 +140,7 @@ class HitSpectra:
         )  # fmt: skip
 
     def without_each(self) -> tuple["HitSpectra", ...]:
-        """Return the spectra without each of the hits in turn."""
+        """Return one set of spectra for each hit, in which that hit is left out."""
         return tuple(
             replace(self, spectra=np.delete(self.spectra, each, axis=0)) for each in range(self.count)
         )

@@ -14,7 +14,7 @@ from ..signals.window import Window, cosine_weights, hop_samples, taper
 from .results import FrequencyResponse
 
 SMALLEST_RELATIVE_SD = 1e-6
-"""Least relative standard deviation, so that weights stay finite for noise-free simulations."""
+"""Minimum relative standard deviation, so that weights stay finite for noise-free simulations."""
 LARGEST_DAMPING = 0.5
 RESOLVED_LINES = 4.0
 """Least half-power bandwidth of a resolved mode, in noise bandwidths of a line."""
@@ -105,7 +105,7 @@ class Leakage:
     noise: Reals
     """Correlation of the sensor-noise errors of lines k apart, shape (far lines,)."""
     ringing: Reals
-    """Covariance of the errors of lines k apart by cut-off ringing, per |dH/df|^2 [Hz^2]."""
+    """Covariance of the errors of lines k apart due to cut-off ringing, per |dH/df|^2 [Hz^2]."""
 
     def smeared_pole(self, frequency_hz: Reals, pole: complex, slope_per_hz: Reals | Complexes) -> Complexes:
         """Return the estimate of 1 / (i w - s) including leakage, with s = `pole` [rad/s].
@@ -126,7 +126,7 @@ class Leakage:
         )
 
     def rung(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Return the standard deviation by cut-off ringing of a line's real or imaginary part, along dH/df.
+        """Return the standard deviation of a line's real or imaginary part due to ringing, along dH/df.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
 
 @lru_cache(maxsize=16)
 def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[Reals, Reals]:
-    """Return the correlations of errors k lines apart by sensor noise and by ringing.
+    """Return the correlations of errors k lines apart due to sensor noise and due to ringing.
 
     Both are sums over j of (1 - |j| / K) conj(c_j(k)) d_j(k), for K segments with hop D. c_j transforms
     w(n) w(n + j D). For noise, d_j = c_j; for ringing, d_j has w' instead of w.
@@ -269,7 +269,7 @@ class Lines:
 
     @property
     def narrowest_hz(self) -> float:
-        """Least half-power bandwidth for known damping with a boxcar [Hz]; 0 for other windows."""
+        """Smallest half-power bandwidth whose damping a boxcar window resolves [Hz]; 0 for other windows."""
         leakage = self._leakage
         return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
 

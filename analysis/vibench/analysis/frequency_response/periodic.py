@@ -43,7 +43,7 @@ class Repetition:
     period_samples: float
     """Converter samples per period; may be fractional."""
     sd_samples: float
-    """Standard deviation of the period by noise of the drive channel."""
+    """Standard deviation of the period due to noise of the drive channel."""
     periods: int
     """Whole periods in the record."""
 
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""The same limit relative to the median line; it applies if it is larger than `_SMALL`."""
+"""Limit of this deviation relative to that of the median line; it applies if larger than `_SMALL`."""
 
 
 class Scatter(StrEnum):
@@ -195,7 +195,7 @@ class BestLinearApproximation:
     steady_relative_sd: Reals
     """`relative_sd` smoothed over neighbouring lines."""
     noise_variance: Reals
-    """Complex variance of one realisation by noise."""
+    """Complex variance of one realisation due to noise."""
     distortion_variance: Reals | None
     """Complex variance beyond noise and drift; None for a single realisation."""
     drift: "Drift | None"
@@ -397,7 +397,7 @@ class PeriodicFrequencyResponse(Labelled):
 
     frequency_response: FrequencyResponse
     noise_variance: Reals
-    """Complex variance of one realisation by noise [(unit of the value)^2]."""
+    """Complex variance of one realisation due to noise [(unit of the value)^2]."""
     distortion_variance: Reals | None
     """Complex variance beyond noise and drift; None for a single realisation."""
     drift: Drift | None
@@ -463,9 +463,9 @@ class PeriodicSums:
         Parameters
         ----------
         drive
-            The clean reference: the recorded generator voltage.
+            Reference without noise: the recorded generator voltage.
         base, response
-            Denominator and numerator.
+            Denominator and numerator of the transmission.
         repetition
             Repetition of this drive, if known.
         """

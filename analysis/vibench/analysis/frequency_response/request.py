@@ -51,7 +51,7 @@ class FrequencyResponseView:
 
     @property
     def name(self) -> str:
-        """Name that `quantities_named` reads, such as ``"velocity/acceleration"``."""
+        """Name of the quantities in the form that `quantities_named` reads: ``"velocity/acceleration"``."""
         return "force/acceleration" if self.is_force else f"{self.response.value}/{self.base.value}"
 
     @property
@@ -101,7 +101,7 @@ class FrequencyResponseView:
 
 
 def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
-    """Return the view of a text like ``"velocity/acceleration"``; a single word stands for both.
+    """Return the view for a text like ``"velocity/acceleration"``; one word stands for both quantities.
 
     Raises InvalidRequest for anything else.
 

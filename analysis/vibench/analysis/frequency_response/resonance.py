@@ -24,11 +24,11 @@ from .results import FrequencyResponse
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within this many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
-"""Fewest lines for a fit: 8 complex values determine 2 pole and at most 10 linear parameters."""
+"""Minimum number of lines for a fit: 8 complex values determine 2 pole and up to 10 linear parameters."""
 _LEAST_RISE = 3.0
 """Least height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3
-"""Most modes for one peak."""
+"""Maximum number of modes fitted to one peak."""
 _APART = (0.5, 1.5)
 """Initial spacing of poles side by side, in half widths."""
 _LEAST_GAIN = 25.0

@@ -281,7 +281,7 @@ def transmissibility(
     estimator
         ``"h1"``, ``"h2"``, ``"hv"`` (needs ``noise_ratio``) or ``"drive"`` (needs ``reference``).
     reference
-        A clean record of the common drive, such as the generator voltage.
+        A noise-free record of the signal that drives both channels, such as the generator voltage.
     noise_ratio
         Noise density of y over that of x [(unit of y / unit of x)^2].
     valid
