@@ -37,7 +37,7 @@ _LOST = (
     "searched (m0, m2, k1, kind of contact) may be described wrongly"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
-"""Pairs: length of tracked motion [s], and the factor on the velocity variance until then."""
+"""Pairs: a length of tracked motion [s], and the factor on the velocity variance up to this length."""
 _LEAST_OF_START = 0.05
 """Lower limit of a parameter relative to its start value; only the loss may be negative."""
 _FURTHEST = 8.0
@@ -168,7 +168,7 @@ class _Search:
         return [step_tables(each, rate, coupling) for each in (current, *raised)]
 
     def _block(self, model: MotionModel, at: FilterState, count: int) -> bool:
-        """Filter ``count`` samples; return whether the track held."""
+        """Filter ``count`` samples; return False if the track was lost."""
         size = STATES + len(self._wanted)
         noise = np.zeros((size, size))
         noise[:STATES, :STATES] = model.step_noise
@@ -210,7 +210,7 @@ _FREE_S = 3.0
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Return start values found without a contact model, and their prior or the reason for its absence."""
+    """Return start values found without a contact model, and either their prior or why there is none."""
     rate = motion.sample_rate_hz
     fitted, sds = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)

@@ -1,4 +1,4 @@
-"""Run the filter and the smoother over stretches of a prepared motion."""
+"""Run the Kalman filter and the smoother over parts of a prepared motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -14,9 +14,9 @@ from ._prepared_motion import ChannelNoise, PreparedMotion
 from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_tables
 
 _DIFFUSION_OF_GAP = 7e-6
-"""Model error of each mass: random displacement relative to the gap, per root millisecond."""
+"""Model error: random displacement of each mass relative to the gap, per root millisecond."""
 _DIFFUSION_OF_SPEED = 2e-5
-"""The same for random velocity, relative to the gap times the highest natural frequency [rad/s]."""
+"""Random velocity of each mass relative to gap times highest natural frequency, per root millisecond."""
 _DRIFT_M_PER_S2 = 1e-3
 """Random walk of the accelerometer's slow error per root second."""
 _ACCELERATION_EXCESS = 1.5
@@ -26,7 +26,7 @@ _IMPULSE_SHARE = 0.003
 _SMOOTHING_S = 8e-3
 """Averaging time of squared innovations to detect a loss [s]."""
 LOSS_LIMIT = 8.0
-"""Largest mean squared normalised innovation of a track; about 1 is good."""
+"""Mean squared normalised innovation above which a track is lost; about 1 is good."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
 """Kind of a step without contact."""
@@ -210,7 +210,7 @@ def move_filter(
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A smoothed stretch."""
+    """A part of the motion after smoothing."""
 
     first: int
     states: Reals

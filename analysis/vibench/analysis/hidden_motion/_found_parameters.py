@@ -22,9 +22,9 @@ from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
 
 _STRETCH_S = 1.2
-"""Length of motion in each restart [s]."""
+"""Length of the part of the motion in which each restart searches the parameters [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
-"""Number of restarts; in a short motion their stretches overlap and only their start values differ."""
+"""Number of restarts; in a short motion their parts overlap and only their start values differ."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
@@ -43,7 +43,7 @@ _ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
-"""Relative standard error of a squared frequency by the unknown error of the clock, up to 50 ppm."""
+"""Relative standard error of a squared frequency due to the unknown clock error of up to 50 ppm."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,
@@ -162,7 +162,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
 
 
 def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estimate]:
-    """Return whether a search kept its track for half of a stretch."""
+    """Return whether a search tracked the motion for at least half of its part."""
     enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
     return isinstance(answer, Estimate) and answer.followed_s > enough_s
 
@@ -204,7 +204,7 @@ def _refine(
 def _restarts(
     motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> list[Estimate] | str:
-    """Search several parts of a motion from different starts; return a reason if too few kept their track."""
+    """Search parameters in several parts of a motion; return a reason if too few parts could be tracked."""
     stretches = _stretches(motion)
     good: list[Estimate] = []
     refused = ""
@@ -315,7 +315,7 @@ def without_values(found: FoundSpecimen, why: str) -> FoundSpecimen:
 
 
 def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
-    """Return the stretches of the restarts, spread evenly over the motion."""
+    """Return the first and last sample of each restart's part, spread evenly over the motion."""
     length = min(round(_STRETCH_S * motion.sample_rate_hz), motion.samples)
     number = min(_MOST_RESTARTS, max(_FEWEST_RESTARTS, motion.samples // length))
     firsts = np.linspace(0, motion.samples - length, number).astype(int)

@@ -1,4 +1,4 @@
-"""Hidden motion of one recording, by tracking and by the method without a contact model."""
+"""Motion of m1 against m2 (hidden motion) in one recording, by tracking and without a contact model."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -41,14 +41,14 @@ _MOST_EXCESS = 1.25
 _ALLOWED = 0.02
 """Allowed relative deviation due to mounting, alignment and local modes at the sensor."""
 _MOST_EXPECTED = 0.2
-"""Largest expected deviation for a verdict; for an accelerometer on a colliding mass, impacts are noise."""
+"""Largest expected deviation for a verdict; impacts act as noise in an accelerometer on a colliding mass."""
 _MOST_SCALE = 0.05
 """Largest deviation of the scale from 1: both calibrations may be wrong by some per cent."""
 
 
 @dataclass(frozen=True)
 class MassCheck:
-    """Comparison of a mass's measured velocity with the track."""
+    """Comparison of the measured velocity of m1 or m2 with the tracked velocity."""
 
     channel: str
     scale: float
@@ -285,7 +285,7 @@ def hidden_motion(
     start_s, stop_s
         Stretch of the recording [s]; by default all of it.
     numbers
-        Whether gaps, m1, springs, dampers and contact law are found first.
+        Source of gaps, m1, springs, dampers and contact law: found first, or as described.
     observer
         Receives the progress.
 
@@ -330,7 +330,7 @@ def hidden_motion_in_samples(
     specimen
         Description of the specimen.
     numbers
-        Whether gaps, m1, springs, dampers and contact law are found first.
+        Source of gaps, m1, springs, dampers and contact law: found first, or as described.
 
     Raises
     ------

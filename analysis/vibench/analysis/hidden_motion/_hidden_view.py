@@ -1,4 +1,4 @@
-"""Hidden motion of a short stretch, for a picture."""
+"""Hidden motion of a short part of a recording, for a plot."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,11 @@ from ..tables import Labelled
 from ._parameters import Numbers
 
 LONGEST_VIEW_S = 2.0
-"""Longest duration of a picture [s], computed in about one second."""
+"""Longest part of a recording that is shown [s]; it is computed in about one second."""
 _NUMBERS_SHOWN = 3
 """Number of shown parameters: both gaps and m1."""
 _LEAD_S = 0.15
-"""Margin before and after the picture [s], to start a track and smooth its end."""
+"""Additional motion before and after the shown part [s], to start the track and to smooth its end."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class HiddenViewRequest:
 
 @dataclass(frozen=True, eq=False)
 class HiddenView(Labelled):
-    """Data of the picture."""
+    """Data to plot."""
 
     OWN_UNITS: ClassVar = {"p": "m", "free_p": "m"}
 
@@ -52,7 +52,7 @@ class HiddenView(Labelled):
 
 
 def hidden_view(request: HiddenViewRequest) -> HiddenView:
-    """Return the hidden motion of the requested stretch.
+    """Return the hidden motion of the requested part of a recording.
 
     Raises AnalysisError as `hidden_motion` does.
     """

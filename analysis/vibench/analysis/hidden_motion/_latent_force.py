@@ -25,7 +25,7 @@ _PEAK_OVER_MEDIAN = 6.0
 _LEAST_PEAK = 0.1
 """Smallest peak relative to the first guess of the force."""
 CLOSED_SHARE = 3e-4
-"""Standard deviation of the force between impacts, relative to the first guess."""
+"""Standard deviation of the force between impacts, relative to the first guess of the force."""
 _LEAST_GUESS_N = 1e-3
 _SURPRISE = 25.0
 """Squared normalised innovation that shows an overlooked impact."""
@@ -40,7 +40,7 @@ _START_SD = (1e-4, 0.3, 1.0, 0.5)
 
 @dataclass(frozen=True, eq=False)
 class LatentMotion:
-    """A stretch smoothed without a contact law."""
+    """A part of a motion smoothed without a contact law."""
 
     run: Filtered
     smoothed: Smoothed

@@ -1,8 +1,8 @@
-"""Hidden motion during a measurement, with the filter that is also used afterwards.
+"""Hidden motion during a measurement, by the filter that is also used to analyse recordings.
 
 Correction filters (`_sensor_correction`) delay the motion by a third of a millisecond. A sample is used six
-samples later, when drop-outs are known. The filter also corrects the accelerometer's AC coupling. No
-function waits or sleeps.
+samples later, when drop-outs are known. The filter also corrects the accelerometer's AC coupling. All
+functions return without waiting.
 """
 
 import hashlib
@@ -171,12 +171,12 @@ class LiveMotion(Labelled):
 
 
 HELD_S = 3.0
-"""Length of motion kept for finding parameters [s]."""
+"""Length of the newest motion that is stored for finding parameters [s]."""
 _NOISE_S = 0.5
 _LOOKED_S = 0.25
 """Length of the newest samples searched for drop-outs [s]."""
 _FIND_S = 2.4
-"""Length of motion for finding parameters [s]."""
+"""Length of motion in which parameters are searched [s]."""
 _PATIENCE = 2.0
 """Factor by which the waiting time grows with every search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
@@ -272,7 +272,7 @@ class LiveTwin:
         self._states = np.empty((0, STATES))
         self._at: FilterState | None = None
         self._model: MotionModel | None = None
-        self._state, self._why = LiveState.WAITING, "too few samples to begin so far"
+        self._state, self._why = LiveState.WAITING, "too few samples so far to begin tracking"
         self._looked = self._pause = 0
         self._find_at = sample + round(_FIND_S * self._rate)
         self._wait = round(_FIND_S * self._rate)
@@ -407,7 +407,7 @@ class LiveTwin:
         self._squares.append(_clipped_innovations(run))
 
     def _wait_longer(self) -> None:
-        """Retry at once, then less often, to limit the load."""
+        """Retry at once, then less and less often, to limit the computing load."""
         longest = round(_LONGEST_PAUSE_S * self._rate)
         self._pause = min(2 * self._pause + round(_FIRST_PAUSE_S * self._rate), longest)
 

@@ -17,11 +17,11 @@ _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
 """Bands, relative to the sample rate, in the converter's pass band but above any motion."""
 _SEGMENT = 1024
 _MOST_SEGMENTS = 4096
-"""Most segments for estimating noise, spread over a long motion: 80 s at 51.2 kS/s."""
+"""Maximum number of segments to estimate noise, spread over a long motion: 80 s at 51.2 kS/s."""
 _PIECE = 1 << 19
-"""Samples corrected at once."""
+"""Number of samples that are corrected at once."""
 _LEAST_NOISE = 1e-6
-"""Least noise relative to the signal, because a filter needs a variance."""
+"""Minimum noise relative to the signal, because the Kalman filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
 """Median over mean of a periodogram line of white noise, which is exponentially distributed."""
 _DARK_MARGIN = 8

@@ -1,6 +1,6 @@
 """Track the hidden motion: acquisition without a contact law, then filter and smoother.
 
-Stretches without a track are reported and never shown as motion.
+Parts of the motion without a track are reported and never shown as motion.
 """
 
 from collections.abc import Callable, Iterator
@@ -142,7 +142,7 @@ def follow(
 
 
 def _advance_to(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:
-    """Advance a state to a later sample; return whether the track held."""
+    """Advance a state to a later sample; return False if the track was lost."""
     count = sample - at.sample
     if count <= 0:
         return True
