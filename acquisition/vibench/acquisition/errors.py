@@ -43,7 +43,7 @@ class SettingRefused(InstrumentError):
 
 
 class DriveLate(AcquisitionError):
-    """The generator needs more time for a setting than the plan allows, so the drive lags behind."""
+    """The generator needs more time to change a setting than the plan allows, so the drive falls behind."""
 
 
 class RunStalled(AcquisitionError):
@@ -56,14 +56,14 @@ class DataLost(AcquisitionError):
 
 @dataclass(frozen=True)
 class LimitTrip:
-    """Values of a limit that a running measurement has exceeded."""
+    """A limit that a running measurement has exceeded, and the measured value."""
 
     channel: str
     """Role of the channel: ``"base_acceleration"``."""
     quantity: str
     """Quantity that exceeded its limit: ``"stroke"``."""
     value: float
-    """Largest magnitude in the block, in ``unit``."""
+    """Largest magnitude in the block of samples that exceeded the limit, in ``unit``."""
     limit: float
     unit: str
     sample: int

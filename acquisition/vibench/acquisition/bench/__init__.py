@@ -1,4 +1,4 @@
-"""The open instruments of a rig: opened together or not at all, and left with the generator silent.
+"""Open the instruments of a rig, all or none, and close them with the generator silent.
 
 `open_bench` opens a rig's generator, converter and analogue output, for one program at a time
 (`BenchLock`); `list_instruments` lists the instruments that could be opened. The package also defines the

@@ -1,4 +1,4 @@
-"""Bench: all instruments of a rig, opened together or not at all, and left with the generator silent."""
+"""Bench: all instruments of a rig, opened together or not at all; closing it silences the generator."""
 
 import os
 import re
@@ -66,7 +66,7 @@ _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
 
 
 class BenchLock:
-    """Locks on the instruments of a rig, held by this process; none for a virtual or played-back rig."""
+    """Locks of this process on a rig's instruments; none if the rig is virtual or plays a recording."""
 
     def __init__(self, descriptors: list[int]) -> None:
         self._descriptors = descriptors
@@ -99,7 +99,7 @@ class BenchLock:
         except OSError as error:
             raise InstrumentBusy(
                 f"{rig.name} cannot be marked as in use: the file {path} cannot be locked ({error}). Nothing "
-                "was opened; when nobody measures, have its owner or root delete that file"
+                "was opened; if no measurement runs, have the file's owner or root delete it"
             ) from error
         if not (is_ours and is_there):
             raise InstrumentBusy(
@@ -194,7 +194,7 @@ class RigPower:
             self._virtual.let_pass(duration_s)
 
     def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled: in rig time on a virtual rig at free pace, else in real time."""
+        """Wait without sampling: in simulated time on a virtual rig at free pace, else in real time."""
         if self._virtual is not None and self.rig.virtual is not None and self.rig.virtual.pace == "free":
             self._virtual.let_pass(duration_s)
         else:
@@ -213,7 +213,7 @@ class RigPower:
 
 
 class _AimedDigitizer:
-    """Digitizer whose channel ``m0_velocity`` has the role of the mass at which the beam points."""
+    """Digitizer that renames channel ``m0_velocity`` to the role of the mass at which the beam points."""
 
     def __init__(self, digitizer: Digitizer, role: Role) -> None:
         self._digitizer = digitizer
@@ -228,7 +228,7 @@ class _AimedDigitizer:
         return tuple(self._names.get(each, each) for each in self._digitizer.roles)
 
     def read(self, samples: int) -> Block:
-        """Return the next samples; overloads have the role of that mass."""
+        """Return the next samples; overloads of the renamed channel have its new role."""
         block = self._digitizer.read(samples)
         named = (
             replace(each, channel=self._names.get(each.channel, each.channel)) for each in block.overloads
@@ -268,7 +268,7 @@ class Bench:
         self.controller = controller
         self.confirmations = confirmations
         self.last_check: CheckResult | None = None
-        """Bench check by which this bench was admitted; see `vibench.acquisition.check`."""
+        """Bench check that admitted this bench to measurements; see `vibench.acquisition.check`."""
         self._power = power
         self._closing = closing
 
@@ -291,7 +291,7 @@ class Bench:
 
     @contextmanager
     def aimed(self, role: Role) -> Iterator["Bench"]:
-        """Yield the bench with the beam on the mass of ``role``; a virtual rig then moves it back to m0.
+        """Yield the bench with the beam on the mass of ``role``; later, a virtual rig moves it back to m0.
 
         Raises ConfigurationError when the vibrometer of this rig cannot measure there.
         """
@@ -305,7 +305,7 @@ class Bench:
             self._power.aim(Role.M0_VELOCITY)
 
     def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled [s]; a virtual rig at free pace does this without real time."""
+        """Wait ``duration_s`` without sampling; on a virtual rig at free pace only simulated time passes."""
         self._power.idle(duration_s)
 
     def close(self) -> None:
@@ -336,9 +336,9 @@ def open_bench(
         Function that confirms settings made by hand; see `knobs`. None: ask at the terminal; for a
         virtual rig, confirm without asking.
     calibration
-        Effect of an expired calibration; calibrations of a virtual rig never expire.
+        Whether an expired calibration is refused; calibrations of a virtual rig never expire.
     power
-        `RigPower` that outlasts this bench; None: the rig is released with the bench.
+        `RigPower` that stays on when this bench is closed; None: closing the bench releases the rig.
 
     Raises
     ------
@@ -366,7 +366,7 @@ def open_bench(
 def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.connected
-    # Opening silences the generator: after a killed program it may be on, and the converter still in use.
+    # Open the generator first, which silences it: a killed program may have left it on, the converter busy.
     generator = generator_driver(connected.generator).open(connected.generator)
     with ExitStack() as silencing:
         silencing.callback(generator.close)
@@ -404,7 +404,7 @@ def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
 
 
 def _kind(rig: Rig, digitizer: Digitizer) -> BenchKind:
-    """Return REAL, unless the rig is virtual or plays a recording back: then nothing can be energised."""
+    """Return SIMULATED if the rig is virtual or plays a recording (nothing can be energised), else REAL."""
     is_real = rig.virtual is None and not digitizer.identity.origin
     return BenchKind.REAL if is_real else BenchKind.SIMULATED
 
