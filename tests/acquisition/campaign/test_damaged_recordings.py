@@ -105,7 +105,7 @@ def test_a_damaged_point_is_reported_kept_and_recorded_again(bench, folder, dama
         "three": (PointOutcome.KEPT, "three.h5"),
     }
     (event,) = (each for each in said if each.kind is CampaignEventKind.DAMAGED)
-    assert event.text.startswith("two is made again: ")
+    assert event.text.startswith("two is measured again: ")
     assert "two.h5" in event.text
     assert event.facts["why"] == "damaged"
     assert left is None or (folder / "two.h5").read_bytes() == left

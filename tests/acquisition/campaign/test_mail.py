@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, load_toml
 from vibench.acquisition.campaign import MailMessenger, MailSettings
 
-NOTICE = {"campaign": "c", "event": "ended", "reason": "c is through", "recorded": 3}
+NOTICE = {"campaign": "c", "event": "ended", "reason": "c is finished", "recorded": 3}
 
 
 class Conversation(socketserver.StreamRequestHandler):
@@ -68,7 +68,7 @@ def test_a_notice_is_sent_as_one_mail(server, tmp_path):
     said = MailMessenger(settings(tmp_path, server.server_address[1])).send(NOTICE)
     assert said == "mail sent to me@lab.example"
     assert "Subject: vibench: c: ended" in server.heard
-    assert "reason: c is through" in server.heard
+    assert "reason: c is finished" in server.heard
     assert "recorded: 3" in server.heard
 
 

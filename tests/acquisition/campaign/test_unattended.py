@@ -206,14 +206,14 @@ class TestWatching:
         of_points = ["point_begun", "point_done"]
         assert [line["event"] for line in log(tmp_path)] == ["begun", *of_points, *of_points, "ended"]
         last = (tmp_path / "c.status").read_text().splitlines()[-1]
-        assert "c is through (2 done, about 0:00:00 left)" in last
+        assert "c is finished (2 done, about 0:00:00 left)" in last
 
     def test_control_characters_of_instruments_do_not_reach_the_status(self, bench, tmp_path):
-        lost = failing_once(bench, DataLost("it replied \x1b[2J\udcff\nc is through"))
+        lost = failing_once(bench, DataLost("it replied \x1b[2J\udcff\nc is finished"))
         with pytest.raises(DataLost):
             run_campaign(bench, campaign("one", attempts=1), tmp_path, on_progress=lost)
         text = (tmp_path / "c.status").read_text()
-        assert r"it replied \x1b[2J\udcff\nc is through" in text
+        assert r"it replied \x1b[2J\udcff\nc is finished" in text
         assert "\x1b" not in text
 
     def test_an_incomplete_log_line_does_not_damage_the_next_one(self, bench, tmp_path):

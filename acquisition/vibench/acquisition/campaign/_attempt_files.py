@@ -44,7 +44,7 @@ class KeptRecording:
 
 
 def read_attempt(path: Path, measurement: Measurement, depth: SealDepth) -> KeptRecording:
-    """Return the state of the recording at ``path``, which should be one of ``measurement``."""
+    """Return the state of the recording at ``path``, and whether its plan equals ``measurement``."""
     try:
         with open_recording(path) as recording:
             found = recording.check_seal(depth)

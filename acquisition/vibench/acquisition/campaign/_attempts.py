@@ -196,7 +196,7 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig that runs faster than real time idles in simulated time: use the longer time.
+                # A virtual rig may wait in simulated time, which passes faster: use the longer of both times.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")
@@ -222,7 +222,7 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Return a clause on inputs near full scale in segments with results; empty if none or no file."""
+    """Return a clause that names inputs near full scale in the segments ``labels``; empty if none."""
     if not path.exists():  # the user may have moved a complete recording already
         return ""
     with open_recording(path) as recording:

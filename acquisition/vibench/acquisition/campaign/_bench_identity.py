@@ -36,12 +36,12 @@ class BenchIdentity(FrozenModel):
         return cls(rig=bench.rig, instruments=instruments, knobs=knobs)
 
     def differences(self, now: "BenchIdentity") -> tuple[str, ...]:
-        """Return a clause for each difference from ``now``."""
+        """Return one clause of text for each difference between this bench and the bench ``now``."""
         return differences(self.model_dump(mode="json"), now.model_dump(mode="json"))
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a clause for each difference between two descriptions."""
+    """Return one clause of text for each difference between two nested descriptions."""
     return tuple(_differences("", before, now))
 
 

@@ -169,7 +169,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 5
-"""Version of the catalogue, increased when the fields of an entry change; older ones are rebuilt."""
+"""Version of the catalogue, increased when the fields of an entry change; other versions are rebuilt."""
 WAIT_S = 10.0
 """Longest wait for another program that writes the same catalogue [s]."""
 
@@ -255,7 +255,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
                 f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - only question marks
-                # Read the file again the next time: a disk error may be temporary.
+                # The empty stamp has the file read again next time, because a disk error may be temporary.
                 (*astuple(entry), "" if entry.state == UNREADABLE else stamp),
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))

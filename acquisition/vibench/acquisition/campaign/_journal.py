@@ -132,7 +132,7 @@ class PointResult:
 
 @dataclass(frozen=True, eq=False)
 class CampaignProgress:
-    """State of a campaign after each block."""
+    """Progress of a campaign, reported after each block of samples."""
 
     name: str
     number: int
@@ -155,7 +155,7 @@ class DonePoint:
 
 @dataclass(frozen=True)
 class Finished:
-    """Arguments of the callback after a point: the point, and all points done."""
+    """Argument of the ``after`` callback: the point that was just measured, and all points done."""
 
     point: DonePoint
     done: tuple[DonePoint, ...]
@@ -306,7 +306,7 @@ class JournalPoint:
     """File name of the last attempt, in the journal's folder; empty before the first attempt."""
     attempts: int
     is_followed_up: bool
-    """Whether the measurements that the result of this point requested are in the journal."""
+    """Whether ``after`` was called for this point and the measurements it returned are in the journal."""
     begun_utc: str
     ended_utc: str
     """Time of the end of the last attempt (UTC)."""
@@ -328,7 +328,7 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
 
 
 def _own_name(file: str) -> str:
-    """Return ``file`` if it is a plain file name: files outside the journal's folder must not be touched."""
+    """Return ``file`` if it is a plain file name, else raise ValueError; a path could leave the folder."""
     if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
         raise ValueError(f"{file[:80]!r} is not the file name of a recording")
     return file
@@ -455,7 +455,7 @@ class Journal(ClosedOnLeaving):
             )
 
     def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
-        """Queue a point again whose recording is missing or damaged."""
+        """Queue a point again because its recording is missing or damaged."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
@@ -466,7 +466,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
-        """Insert the measurements that a point's result requested, and note this, in one transaction."""
+        """Insert the measurements requested after a point, and mark the point as followed up, atomically."""
         with self._transaction() as connection:
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))

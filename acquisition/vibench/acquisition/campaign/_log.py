@@ -113,13 +113,13 @@ STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
 """Interval of status lines between events [s]; this gives half a megabyte per night."""
 LEFT_ALONE_S = 1.0
-"""Longest time for writing the last lines [s]."""
+"""Longest wait at closing until the last lines are written [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
     """Appends a status line at every event, and every few seconds while a point runs.
 
-    The lines are written by another thread, because otherwise a folder that hangs would keep the drive on.
+    Another thread writes the lines, so that a network folder that hangs cannot delay a stop of the drive.
     """
 
     def __init__(
@@ -177,7 +177,7 @@ class StatusLine(ClosedOnLeaving):
             file.write(line)
 
     def _left(self) -> timedelta:
-        """Return the remaining time at the speed of this session; in the first second, as planned."""
+        """Return the planned remaining time times this session's ratio of real to planned time."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))

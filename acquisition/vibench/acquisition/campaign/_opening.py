@@ -67,9 +67,9 @@ def found_recordings(
 ) -> dict[str, KeptRecording]:
     """Return the recordings in a folder by point, for a campaign whose journal is lost or never existed.
 
-    After a stop no more samples are read; the next resume reads them, with the journal. Damaged recordings
-    are also returned, and so are those with a seal that no journal of the folder contains, because the
-    campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
+    After a stop request the samples of further recordings are not checked; the next resume does this. Damaged
+    recordings are returned too. So are recordings whose seal is in no journal of the folder: the campaign may
+    have been renamed. Raises RecordingError when a complete recording was made by another plan.
     """
 
     def looked_for(point: Point) -> KeptRecording | None:

@@ -127,7 +127,7 @@ class CampaignRunner:
     def _name_damaged(self) -> None:
         for point in self._coming:
             if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
-                text = f"{point.name} is made again: {point.reason}"
+                text = f"{point.name} is measured again: {point.reason}"
                 facts = {"point": point.name, "file": point.file, "why": point.reason_code.value}
                 self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
@@ -183,7 +183,7 @@ class CampaignRunner:
         if request is not None:
             return f"was stopped: {request.reason}"
         failed = sum(point_result.outcome is PointOutcome.FAILED for point_result in self._results)
-        return f"is through, {failed} points failed" if failed else "is through"
+        return f"is finished, {failed} points failed" if failed else "is finished"
 
     def _ended(self, text: str, reason_code: str) -> None:
         counts = {
@@ -306,11 +306,11 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Simulated time before the bench of a virtual rig is reopened, for reconnecting cables [s]."""
+"""Simulated time before a virtual rig's bench is reopened; its fault script may reconnect cables [s]."""
 
 
 class ReconnectingBench:
-    """Opens the bench of a rig, and reopens it without questions. Use it in a ``with`` statement."""
+    """Opens a bench, and reopens it without asking to confirm knobs again. Use it in a ``with`` statement."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)
