@@ -1,7 +1,7 @@
 """Admission of a bench, which requires a recent passed check of the same configuration.
 
-The last check of each rig is a JSON file in the user's state folder; later changes are reported in
-decibels (gains) and ppm (clock).
+The last check of each rig is a JSON file in the user's state folder. The next check reports changes of gains
+since then in decibels, and of the clock in ppm.
 """
 
 import hashlib
@@ -98,9 +98,9 @@ def _write(result: CheckResult, *, passed: bool) -> None:
 
 
 DRIFT_DB = Bounds(0.5, 3.0)
-"""Drift of a gain between two checks of an unchanged configuration."""
+"""Bounds on the drift of a gain between two checks of an unchanged configuration [dB]."""
 CLOCK_PPM = Bounds(20.0, inf)
-"""Drift of the ratio of two clocks [ppm]; oscillators age by some ppm per year."""
+"""Bounds on the drift of the ratio of two clocks [ppm]; oscillators age by some ppm per year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "the configuration has not changed: look for a changed knob, a bad cable, a loose sensor or a failing "
@@ -199,8 +199,8 @@ def require_fresh(
 ) -> CheckResult | None:
     """Admit a bench by its last check or a new check, and return that check for the recordings.
 
-    A virtual rig without a valid check is checked at once; on a real bench nothing is played without a
-    request. A recording that is played back needs no check.
+    A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
+    rig that plays back a recording needs no check.
 
     Raises CheckFailed when the last check is missing, too old, failed or for another configuration (nothing
     was played then), or when the new check fails. Raises InstrumentError when an instrument fails.

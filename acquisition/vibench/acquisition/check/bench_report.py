@@ -29,17 +29,17 @@ _READ_S = 2.0
 _BYTES_PER_SAMPLE = 4
 _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
-"""RMS of a silent channel relative to its full scale."""
+"""Bounds on the rms of a silent channel relative to its full scale."""
 _MEDIAN_OF_NORMAL = 0.6745
 """Median magnitude of a normal variable, divided by its standard deviation."""
 _IN_MOMENTS = 0.2
-"""Noise is intermittent if the ratio of usual noise to total rms is below this."""
+"""Noise counts as bursts if the rms estimated from its median is below this fraction of its total rms."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
-"""Mean of a silent channel relative to its full scale."""
+"""Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Duration of one verified setting [s], which limits how fast the generator can be stopped."""
+"""Bounds on the time in which the generator changes and verifies one setting [s]; a stop takes as long."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Recording time for which the disk has space [h]; negated, because more is better."""
+"""Bounds on the recording time for which the disk has space [h]; negated, because more is better."""
 
 
 def bench_report(
@@ -79,7 +79,7 @@ def bench_report(
     during = reader.during_sine(drive)
     after = reader.in_silence()
     if drive.drive_source is DriveSource.GENERATOR:
-        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # the relay may be stuck
+        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # output relay may be stuck
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle(bench.output))
@@ -109,7 +109,7 @@ class _BlockReader:
             digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
-        """Play the sine without a ramp, like the check of a run, and return the settled channels."""
+        """Play the sine without a ramp, as the check of a run does; return the settled samples."""
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
         measuring = Phase(RunState.CHECKING, tone, _READ_S)

@@ -25,7 +25,7 @@ class SineFit:
     uncertainty: float
     """Standard uncertainty of the amplitude, from the residual."""
     phase_rad: float
-    """Phase of the sine as a cosine, at the first sample."""
+    """Phase at the first sample, with the sine written as a cosine."""
 
 
 @dataclass(frozen=True)
@@ -74,22 +74,22 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
 
 
 DRIVE_DEVIATION = Bounds(0.02, 0.15)
-"""Relative deviation of the measured drive from the setting."""
+"""Bounds on the relative deviation of the measured drive from the setting."""
 GAIN_DB = Bounds(1.0, 3.0)
-"""Deviation of the amplifier's gain from the rig's model."""
+"""Bounds on the deviation of the amplifier's gain from the rig's model [dB]."""
 BASE_DB = Bounds(1.5, 3.0)
-"""Deviation of the base's acceleration from the rig's model."""
+"""Bounds on the deviation of the base's acceleration from the rig's model [dB]."""
 CLOCK_PPM = Bounds(100.0, 500.0)
-"""Deviation of the clock ratio from 1, for two oscillators of 50 ppm each."""
+"""Bounds on the deviation of the clock ratio from 1, for two oscillators of 50 ppm each [ppm]."""
 DETECTED = 10.0
 """Smallest ratio of amplitude to uncertainty of a detected sine."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
-"""Phase deviation of a channel from the rig's model; above 90 degrees its sign is wrong."""
+"""Bounds on a channel's phase deviation from the rig's model; above 90 degrees its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""Phase deviation of m0; never a FAIL, because the specimen is less well known than the shaker."""
+"""Bounds on m0's phase deviation; never a FAIL, because the specimen is less well known than the shaker."""
 LEFT_OVER = Bounds(0.02, 0.05)
-"""Fraction of the drive that remains with the output off."""
+"""Bounds on the fraction of the drive voltage that remains with the output off."""
 
 AMPLIFIER_GAIN = "amplifier gain"
 DRIVE_CLOCK = "drive's clock"
