@@ -83,7 +83,7 @@ def rig(request: pytest.FixtureRequest) -> Rig:
     name, kind = request.config.getoption("--vibench-instrument"), request.module.KIND
     rigs = request.config.stash[_RIGS]
     if kind not in rigs:
-        pytest.skip(f"{name} is none of {kind.value}")
+        pytest.skip(f"{name} is not a plug-in of the kind {kind.value}")
     found = rigs[kind]
     if found is None:
         raise ConfigurationError(unnamed(name, request.config.getoption("--vibench-bench"), [kind]))
@@ -115,7 +115,7 @@ def measured_v(bench: Bench, duration_s: float) -> Samples:
 
 
 def line_v(volts: Samples, frequency_hz: float, rate_hz: float) -> float:
-    """Return the amplitude of one sine in a signal, by least squares [V]."""
+    """Return the amplitude of the sine at ``frequency_hz`` in a signal, by least squares [V]."""
     angle = 2 * np.pi * frequency_hz * np.arange(len(volts)) / rate_hz
     basis = np.stack((np.cos(angle), np.sin(angle), np.ones_like(angle)), axis=1)
     found, *_ = np.linalg.lstsq(basis, volts)

@@ -77,7 +77,7 @@ def test_frequency_and_amplitude_change_while_it_plays(bench: Bench) -> None:
 
 
 def test_a_waveform_is_played_point_by_point_at_its_repetition(bench: Bench) -> None:
-    # Two sines with a total peak of half the full range, because the setting applies to the full range.
+    # The peak is half of full scale: the amplitude setting must refer to full scale, not to the peak.
     fewest, most = generator_driver(bench.rig.generator).describe(bench.rig.generator).memory_points
     points = max(fewest, min(most, 1024))
     turn = 2 * np.pi * np.arange(points) / points
