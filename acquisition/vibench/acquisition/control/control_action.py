@@ -25,7 +25,7 @@ class ControlAction:
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """Samples of a phase, from its beginning or from its last gap to its end."""
+    """Samples of a phase of the run, from its beginning or from its last gap to its end."""
 
     first_sample: int
     volts: Samples
@@ -55,13 +55,13 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Smallest corrected error, as a fraction of the tolerance; every correction disturbs the motion."""
+"""Dead band as a fraction of the tolerance: smaller errors stay, as every correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which an error is significant."""
 _GAIN = 0.8
 """Fraction of an error in decibels that is corrected at once; below 1, as the specimen responds slowly."""
 _BATCHES = 8
-"""Number of batches for the uncertainty of a mean; single periods of chaos are not independent."""
+"""Number of batches for the uncertainty of a mean; successive periods of chaos are not independent."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class MeasuredLevel:
     uncertainty: float
 
     def held(self, target: float, tolerance: float) -> Held:
-        """Return whether the amplitude is within the tolerance of ``target``."""
+        """Return whether the amplitude deviates from ``target`` by at most the relative ``tolerance``."""
         return Held.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Held.OUTSIDE
 
 

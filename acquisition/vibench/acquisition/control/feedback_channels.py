@@ -127,7 +127,7 @@ class BridgedRows:
         """Number of the next sample to be returned."""
 
     def take(self, first_sample: int, rows: Samples) -> tuple[int, Samples]:
-        """Add samples, shape (3, n), response last; return those released, with the first one's number."""
+        """Add rows of drive, base, response, shape (3, n); return released rows and their first sample."""
         if first_sample != self._first + self._rows.shape[1]:
             self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
         self._rows = np.concatenate([self._rows, rows], axis=1)

@@ -45,7 +45,7 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""Largest number of brackets for one jump; a new one starts if the motion leaves its branch earlier."""
+"""Most brackets (frequency intervals) per jump; a new one starts if the motion leaves its branch early."""
 
 
 class _Return(Enum):
@@ -88,7 +88,7 @@ class _JumpSearch:
 
 
 class JumpLocator:
-    """Search for one jump in a pass."""
+    """Search for one jump in one pass through the frequencies."""
 
     def __init__(
         self, controller: SettlingController, plan: SettledSine, direction: str, number: int
@@ -108,8 +108,8 @@ class JumpLocator:
 
         Return the point reached there, and whether it is on the new branch behind a jump.
 
-        A steep change is not a jump: its difference shrinks with the bracket. If both branches exist at the
-        frequency of ``after``, the search may end on either; the note states which.
+        A steep slope is no jump: across it, the change of the response shrinks with the bracket. If both
+        branches exist at the frequency of ``after``, the search may end on either; the note states which.
         """
         search = _JumpSearch(list(points), after, JumpSide.AFTER)
         found, why = yield from self._bisect(search)
@@ -153,7 +153,7 @@ class JumpLocator:
     def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
-        The way forward is one fast glide. If it leaves the branch, a second attempt in steps finds where.
+        First glide forward fast. If the motion leaves the branch, try again in steps, to find where it does.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
@@ -167,7 +167,7 @@ class JumpLocator:
                 return _Return.BACK
             if self._is_late():
                 return _Return.NOT_FOUND
-        assert left is not None, "both paces were gone"
+        assert left is not None, "both attempts left the branch"
         search.left(*left)
         return _Return.LEFT
 
@@ -220,7 +220,7 @@ class JumpLocator:
         return found.point
 
     def _is_late(self) -> bool:
-        """Return whether too little time is left for one more step and the way to the end."""
+        """Return whether too little time is left for one more step and the move to the end of the bracket."""
         step_s = self._plan.settling.longest_wait_s
         return self._controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 

@@ -1,4 +1,4 @@
-"""Equalised noise at the base: the measured gain of every line corrects the next drive."""
+"""Equalised noise at the base: the measured gain of every spectral line corrects the next drive."""
 
 from dataclasses import dataclass
 from math import log10, sqrt
@@ -25,7 +25,7 @@ _MOST_CHANGE = 4.0
 
 @dataclass(frozen=True)
 class MeasuredDensities:
-    """Power spectral densities at the lines of one realisation, averaged over ``resolution_hz``."""
+    """Power spectral densities of one realisation, per spectral line, averaged over ``resolution_hz``."""
 
     drive: Samples
     """Density of the drive voltage [V2/Hz]."""
@@ -38,7 +38,7 @@ class MeasuredDensities:
 
 
 class Equaliser:
-    """Estimates of the squared gains of every line, from drive to base and from base to m0."""
+    """Estimates of the squared gains of every spectral line, from drive to base and from base to m0."""
 
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
@@ -115,11 +115,11 @@ class Equaliser:
                 )
 
     def off_db(self, densities: MeasuredDensities, level_db: float) -> Samples:
-        """Return the deviation of the base density from the target of this realisation, per line [dB]."""
+        """Return the base density over the target of this realisation, per spectral line [dB]."""
         return np.asarray(10 * np.log10(np.maximum(densities.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
-        """Return the density at the lines, averaged over ``resolution_hz``; whole periods avoid leakage."""
+        """Return the density per line, averaged over ``resolution_hz``; whole periods avoid leakage."""
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
@@ -138,7 +138,7 @@ class Equaliser:
 
 
 def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
-    """Equalise at levels that rise to the full spectrum; then record, and continue to equalise."""
+    """Equalise the noise while its level rises to the full spectrum; then record and go on equalising."""
     equaliser = Equaliser(loop, plan)
     yield from loop.listen_to_silence()
     segments = [step.segment for step in plan.steps()]

@@ -54,17 +54,17 @@ class TrackedPlace:
 class PhaseLaw:
     """Control law of the phase-locked loop (decisions 0064 and 0074).
 
-    A look is one measurement of the loop, of length L. During a look the phase of the motion over the drive
-    changes by ``2 pi L (r - f) - h e``: f is the drive frequency, r the resonance, e the phase error [rad], w
-    the half-width of the mode, and h = 2 pi L w its decay. The loop changes f by g times the r - f that
-    follows, so that each look reduces the error by the fraction g. If the error falls too slowly, g is raised
-    in the term ``g w e``. For harmonic n, L is replaced by n L, and r and w are the mode's values divided by
-    n. For a subharmonic of order n, e is the error of n times its phase, r and w refer to the drive, and a
-    look has n times as many drive periods.
+    A look is one measurement of the loop, of duration L [s]. During a look the phase of the motion relative
+    to the drive changes by ``d = 2 pi L (r - f - w e)``: f is the drive frequency, r the resonance, e the
+    phase error [rad] and w the half-width of the mode. Hence ``r - f = w e + d / (2 pi L)``. The loop changes
+    f by g times this, so that each look reduces the error by the fraction g. If the error falls too slowly, g
+    is raised for the term ``w e`` only. For harmonic n, L is replaced by n L, and r and w are the mode's
+    values divided by n. For a subharmonic of order n, e is the error of n times its phase, r and w refer to
+    the drive, and a look has n times as many drive periods.
 
-    A bent resonance moves while the motion grows to a new level. The level of the motion follows the base
-    at the decay rate of the mode; r changes with the logarithm of that level, at a rate known from earlier
-    levels. The frequency is corrected for this change in advance.
+    A resonance that depends on the amplitude (``bend_hz``) moves while the motion grows to a new level. The
+    motion follows the base at the decay rate of the mode; r changes with the logarithm of the amplitude, at a
+    rate known from earlier levels. The frequency is corrected for this change in advance.
     """
 
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
@@ -82,7 +82,7 @@ class PhaseLaw:
         """Frequency [Hz], phase error [rad] and base level [m/s2] of each look."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look; return its phase error [rad] and the motion's expected remaining relative change."""
+        """Add a look; return its phase error [rad] and the relative change of the motion still to come."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
@@ -105,8 +105,8 @@ class PhaseLaw:
     def learnt(self, found: SettledState, error_rad: float) -> LearntMode:
         """Return the mode with the half-width that best explains the phase drift of all looks, and its bend.
 
-        If no half-width near the earlier one explains the drift, the motion is another one. The half-width
-        is then kept, and the bend set to zero.
+        If no half-width near the earlier one explains the drift, the specimen changed to another motion. The
+        half-width is then kept, and the bend set to zero.
         """
         grown, bend_hz = log(found.base.amplitude / self._last.base_m_per_s2), self._mode.bend_hz
         if abs(grown) > self._plan.level_tolerance:

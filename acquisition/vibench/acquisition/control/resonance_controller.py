@@ -92,7 +92,7 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Allowed remaining change of a locked motion over the phase tolerance; 0.5 for super- and subharmonics."""
+"""Largest change still to come of a locked motion, in phase tolerances; 0.5 for super- and subharmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
@@ -152,7 +152,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level; return the number of looks, and the result or None if off resonance."""
+    """Control phase and level; return the number of looks, and the result (None: resonance lost)."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)

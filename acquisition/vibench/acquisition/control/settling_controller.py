@@ -111,7 +111,7 @@ _PROMPT = 0.7
 
 @dataclass(frozen=True)
 class SettledState:
-    """Result at one frequency when the wait has ended."""
+    """State at one frequency when the wait for a settled motion has ended."""
 
     frequency_hz: float
     """Commanded frequency [Hz]."""
@@ -140,7 +140,7 @@ class SettledState:
 
     @property
     def point(self) -> SettledPoint:
-        """Frequency, response and period, as a search for a jump needs them."""
+        """The values that a search for a jump compares: frequency, response and period."""
         return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
 
     @property
@@ -188,12 +188,12 @@ class SettlingController:
                 return found
 
     def measured(self) -> MeasuredLevel:
-        """Return the level of the base over the newer half of the periods since the last change."""
+        """Return the base level, from the newer half of the periods since the drive last changed."""
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
 
     def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
-        """Return the next setting towards the level at ``frequency_hz`` [Vpp], without regard to scatter."""
+        """Return the next setting towards the level at ``frequency_hz`` [Vpp], ignoring uncertainty."""
         assert self.level is not None
         control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
@@ -262,7 +262,7 @@ class SettlingController:
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Return whether the level is known well, and is either held or out of the drive's reach."""
+        """Return whether the base level is known well, and is within tolerance or limited by ``most_vpp``."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target

@@ -36,10 +36,10 @@ class _Answer:
 
 
 class GainEstimator:
-    """Recent gain from setting to base motion, relative to the linear model of the rig.
+    """Recent gain from generator setting to base motion, relative to the linear model of the rig.
 
     In a chaotic motion the fundamental of a few periods is mostly chance, so recent steps (the track) are
-    averaged. If the gain changes steadily, as near a resonance, a line through the track is extrapolated.
+    averaged. If the gain changes steadily, as near a resonance, a line through these steps is extrapolated.
     """
 
     def __init__(self, memory_s: float) -> None:
@@ -221,7 +221,7 @@ _GLIDE_MEMORY_S = 0.5
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up to the setting that the rig's model needs for ``level``; without it, to the plan's setting."""
+    """Ramp up to the setting that the model predicts for ``level``; if None, to the plan's setting."""
     wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
     yield from _start_at(loop, frequency_hz, wanted_vpp)
 

@@ -1,4 +1,4 @@
-"""Tests whether a motion, sampled once per period, repeats after k periods or has steady statistics."""
+"""Test whether a motion, sampled once per period, repeats after k periods or has steady statistics."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -99,7 +99,7 @@ class Periods:
 
 
 class Stroboscope:
-    """Splits blocks into motion periods of ``drives`` drive periods; the rest waits for the next block."""
+    """Splits blocks into periods of ``drives`` drive periods; an incomplete one waits for the next block."""
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz
@@ -221,13 +221,13 @@ class Judgement:
     period: int
     """Number of drive periods after which the motion repeats; 0 if it does not."""
     scatter: float
-    """Rms distance of points from their means when grouped by the period; by period 1 without one."""
+    """Rms distance of the points from the means of their ``period`` clusters; of one cluster if it is 0."""
     scatter_u: float
     """Standard uncertainty of the scatter."""
     noise: float
     """Part of the scatter due to noise of the channel; a smaller scatter cannot be measured."""
     remaining: float
-    """Expected remaining change of the means, extrapolated; for an aperiodic motion, their last change."""
+    """Extrapolated change of the cluster means still to come; for an aperiodic motion, their last change."""
 
 
 def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
@@ -262,7 +262,7 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
 
 
 def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> Judgement:
-    """Return a judgement with its period in drive periods; each of the ``points`` spans ``drives`` of them.
+    """Convert the period of a judgement to drive periods; each of ``points`` spans ``drives`` drive periods.
 
     The motion repeats after one drive period if the orders between the harmonics of the drive contain only
     noise. Hum that is also present in silence counts as noise.
@@ -298,7 +298,7 @@ def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
 
 
 def _differ(points: Phasors, period: int, allowed: float) -> bool:
-    """Return whether the clusters of a longer period are further apart than the allowed width of one."""
+    """Return whether the clusters of a longer period are further apart than one cluster may be wide."""
     centres = points.reshape(-1, period, points.shape[1]).mean(axis=0)
     away = centres - centres.mean(axis=0)
     size = float(np.mean(np.sum(np.abs(points) ** 2, axis=1)))
@@ -306,7 +306,7 @@ def _differ(points: Phasors, period: int, allowed: float) -> bool:
 
 
 def _remaining(early: float, late: float, by_chance: float) -> float:
-    """Return a mean's remaining change: extrapolated geometrically, or the last one if it may be chance."""
+    """Extrapolate the change of a mean geometrically; return the last change if it may be due to chance."""
     if late <= _SURE * by_chance:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
