@@ -31,7 +31,7 @@ class AFG1022X(ScpiInstrument):
 
     `open` returns it with the output off, set to a 1 kHz sine of the smallest amplitude. Frequency and
     amplitude may change while it plays. Settings beyond its limits or the bench's ``amplitude_limit_vpp`` are
-    refused (`LimitExceeded`). During a change, the amplitude never exceeds both the old and the new setting.
+    refused (`LimitExceeded`). During a change, the amplitude never exceeds the larger of both settings.
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
@@ -56,7 +56,7 @@ class AFG1022X(ScpiInstrument):
     identity: Identity
     """Reply to ``*IDN?``; stored completely, because its last field varies."""
     codes: ArbitraryCodes | None = None
-    """Waveform in the memory that the output plays."""
+    """Waveform in the memory that the output plays; None: the output plays a sine."""
     unconfirmed: tuple[Knob, ...] = ()
     """Settings that could neither be made nor read remotely: the operator must confirm them."""
     _is_known = False
@@ -231,7 +231,7 @@ class AFG1022X(ScpiInstrument):
             self.disconnect()
 
     def measured_latency_s(self) -> float:
-        """Return the duration of one verified change of amplitude [s]; no stop is faster.
+        """Return the duration of one verified change of amplitude [s]; a stop takes at least as long.
 
         The result is the median of nine changes; each sets the present amplitude again.
         """
@@ -317,8 +317,8 @@ class AFG1022X(ScpiInstrument):
         maker, model, serial, firmware = (*fields, "", "", "", "")[:4]
         if self.answers.match(f"{maker},{model}") is None:
             raise InstrumentError(
-                f"{self._config.resource} answers *IDN? with {reply!r}; {self.wanted} is needed. It was sent "
-                "a command to switch its output off; correct generator.resource in the configuration"
+                f"{self._config.resource} answers *IDN? with {reply!r}; {self.wanted} is needed. A command "
+                "to switch its output off was sent; correct generator.resource in the configuration"
             )
         self.identity = Identity(maker, model, serial, firmware, reply)
 

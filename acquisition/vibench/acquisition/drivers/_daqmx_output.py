@@ -45,7 +45,7 @@ class DaqmxOutput:
         self._task: Task | None = None
         self._written = 0
         self._is_zero = True
-        """Whether nothing was reserved since the output went to zero; otherwise `stop` tries again."""
+        """Whether the output is at zero volts and nothing is reserved; if not, `stop` sets it to zero."""
         self._is_open = True
         self.idle = IdleOutput.HELD
         """Voltage of the output when it runs out of samples, as read back: zero if the device can do this."""
@@ -106,7 +106,7 @@ class DaqmxOutput:
     def stop(self) -> None:
         """Stop playing and go to zero volts at once. Legal at any time.
 
-        Raises InstrumentLost when the device or its server is gone: the output then runs empty by itself.
+        Raises InstrumentLost when the device or its server is gone: the samples already written still play.
         """
         if self._is_zero:
             return

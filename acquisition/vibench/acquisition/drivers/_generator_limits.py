@@ -178,7 +178,7 @@ _NOTHING_VPP = 1e-6
 
 @dataclass(frozen=True)
 class NoGenerator:
-    """Placeholder on a bench without generator; it refuses all commands, or accepts those of a recording.
+    """Placeholder on a bench without generator; refuses all commands, or accepts those of a played recording.
 
     The table ``[generator]`` still describes the load of the output: ``connected_ohm``, ``load_ohm``.
     """
@@ -223,7 +223,7 @@ class NoGenerator:
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Refuse: the description of the generator has no internal sweep."""
-        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp: this bench has {self.name} to play it")
+        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp cannot play: this bench has {self.name}")
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Accept the command, or refuse it."""

@@ -7,7 +7,7 @@ from ..instruments import Overload, Samples
 
 # Vibrometers and converters distort before they clip: hardware reference 4.
 OVERLOAD_FRACTION = 0.95
-# After a clip, a delta-sigma converter's filter rings about this long; shorter pauses end no overload.
+# A delta-sigma converter's filter rings about this long after a clip; overloads closer than this are one.
 _RECOVERY_SAMPLES = 64
 
 
