@@ -15,7 +15,7 @@ from ._server import LOOPBACK, address_line, serving
 from ._status import Supervision
 
 PARENT_INTERVAL_S = 0.2
-"""Interval at which an engine without its parent checks whether its work has ended [s]."""
+"""Interval at which an engine whose parent has ended checks whether its own work has ended [s]."""
 FORGOTTEN_S = 60.0
 """An idle unattended engine ends after this time without a request [s]."""
 
@@ -39,7 +39,7 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
     parser.add_argument("--attendance", type=Supervision, default=Supervision.ATTENDED)
-    parser.add_argument("--what", default="engine", help="purpose, shown to other viewers")
+    parser.add_argument("--what", default="engine", help="purpose of this engine, shown to other viewers")
     parser.add_argument("--host", default=LOOPBACK, help="address to listen on; a token is always required")
     parser.add_argument(
         "--forgotten-s",
@@ -71,7 +71,7 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
 
 
 def _follow_parent(handler: RequestHandler) -> None:
-    """Wait until the parent has closed this input and no work remains, then shut the engine down."""
+    """Wait until the parent has closed the standard input and no work remains, then end the engine."""
     # Not through sys.stdin: a buffer on which a thread waits cannot be closed at the end of the process.
     while os.read(sys.stdin.fileno(), 4096):
         pass

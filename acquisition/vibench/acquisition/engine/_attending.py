@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """States of a Linux process that is stopped or dead."""
 LEAST_OWN = 0.25
-"""Fraction of the time without an input byte that always counts, even if other programs were running."""
+"""Smallest fraction of the time without an input byte that counts; the rest may be waits for a processor."""
 
 
 class _Program:

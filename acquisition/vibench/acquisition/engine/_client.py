@@ -59,7 +59,7 @@ class Announcement(Program):
 
 @contextmanager
 def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
-    """Let `announced_engines` find this engine within the context; ``press`` is called for stops from files.
+    """Let `announced_engines` find this engine within the context; files that request a stop call ``press``.
 
     Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """

@@ -120,7 +120,7 @@ class Messages:
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
     def alarm(self, what: str, done: str, next_step: str) -> None:
-        """Report that the engine stopped something that the operator had not stopped."""
+        """Report that the engine stopped the drive on its own, without a request of the operator."""
         self._add(MessageKind.FAULT, what, done, next_step, "")
 
     def fault(self, error: BaseException) -> None:
@@ -208,7 +208,7 @@ class PublishedState:
         self._put(state=state, **forgotten)
 
     def bench(self, bench: BenchFacts | None) -> None:
-        """Set the open bench, and clear the report of the bench check and the rows."""
+        """Set the open bench; clear the report of the bench check and the list of recordings."""
         self._put(bench=bench, check=None, checked_utc="")
         self._put_rows(())
 
@@ -258,12 +258,12 @@ class PublishedState:
         self._put(twin=status)
 
     def note_pause(self, rest_s: float, text: str) -> None:
-        """Set the pause between two recordings."""
+        """Count a pause between two recordings as done time [s], and publish ``text``."""
         self._done_s += rest_s
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Set the result of a recording; a recording kept from before counts with its planned time."""
+        """Publish the result of a recording; one kept from before counts as done for its planned time."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:
@@ -308,7 +308,7 @@ class PublishedState:
         )
 
     def _look_at_disk(self) -> None:
-        """Read the free disk space in another thread: a folder that hangs must not keep the drive on."""
+        """Read the free disk space in another thread: a folder that hangs must not delay a stop."""
         if monotonic() < self._disk_due_s or self._beside.is_busy:
             return
         self._disk_due_s = monotonic() + DISK_INTERVAL_S

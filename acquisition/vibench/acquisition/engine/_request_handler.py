@@ -111,11 +111,11 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
 STALL_S = 0.2
 """A longer interval between two checks of the viewers shows that this process was stalled [s]."""
 LATE_FACTOR = 4.0
-"""The patience grows by this factor times the delay of this process, since viewers share its computer."""
+"""The time allowed without requests grows by this times this process's delay: viewers share the computer."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995
-"""Factor on the largest delay at each check; after seven seconds, half of that delay remains."""
+"""Factor by which the remembered largest delay shrinks at each check; it halves in seven seconds."""
 
 
 class RequestHandler:
@@ -162,11 +162,11 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note that a viewer is present; also called for a check, arming or a start, without a heartbeat."""
+        """Note that a viewer is present; a check, arming and a start count as presence, too."""
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
-        """Note for how long the window has been blocked; the server notes the viewer's presence."""
+        """Note for how long the window has been blocked [s]; the server notes the viewer's presence."""
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
@@ -197,7 +197,7 @@ class RequestHandler:
         self._jobs.put(self._close)
 
     def check(self, folder: Path = Path(), *, new_reference: bool = False) -> None:
-        """Check the bench with a small sine; ``folder`` is for the recordings."""
+        """Check the bench with a small sine, and the free disk space of ``folder``."""
         self.note_presence()
         self._engine.switch = StopSwitch()
         self._attendance, self._patience_s = self._engine.supervision, VIEWER_PATIENCE_S

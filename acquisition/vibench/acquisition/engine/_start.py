@@ -26,7 +26,7 @@ LOOK_S = 0.02
 
 
 class AdoptedEngine(ClosedOnLeaving):
-    """Running engine without its parent, now attended here; it ends with its campaign or on request."""
+    """Engine whose parent program has ended, now attended here; it ends with its campaign or on request."""
 
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement

@@ -190,7 +190,7 @@ class TwinStatus(FrozenModel):
     end_sample: int = 0
     """Number of the sample after the newest one that the twin used."""
     step_s: float = 0.0
-    """Time step of ``p_m`` [s]; its last value is at the newest sample."""
+    """Time step of ``p_m`` [s]; the last value of ``p_m`` is at the newest sample."""
     p_m: tuple[float | None, ...] = ()
     """Relative displacement of m1 [m]; None where the twin had lost the motion."""
     forecast_m: tuple[float, ...] = ()

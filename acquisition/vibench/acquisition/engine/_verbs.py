@@ -200,7 +200,7 @@ class EngineVerbs:
 
     @verb("check", DONE, EngineState.READY)
     def check(self, folder: AbsolutePath = Path(), *, new_reference: bool = False) -> None:
-        """Check the bench with a small sine; ``folder`` is for the recordings.
+        """Check the bench with a small sine, and the free disk space of ``folder``.
 
         ``new_reference``: do not compare with an earlier check, because the bench was changed on purpose.
         """
@@ -220,7 +220,7 @@ class EngineVerbs:
 
     @verb("stop", DONE)
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Pause or end the run, and disarm an armed campaign. Never refused."""
+        """Pause or end the run, and disarm an armed campaign; only a pause may be refused."""
 
     @verb("resume", DONE)
     def resume(self) -> None:
