@@ -1,4 +1,4 @@
-"""Noise with a given acceleration spectrum at the base; the drive is equalised after every average."""
+"""Noise with a given acceleration spectrum at the base; the drive is equalised after every realisation."""
 
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -79,12 +79,12 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def density(self) -> Samples:
-        """Density of the spectrum at each line [(m/s2)2/Hz]."""
+        """Density of the spectrum at each spectral line [(m/s2)2/Hz]."""
         return density_at(self.spectrum, self.lines * self.repetition_hz)
 
     @property
     def rms_m_per_s2(self) -> float:
-        """Rms base acceleration of all lines of the band [m/s2]."""
+        """Rms base acceleration of all spectral lines of the band [m/s2]."""
         return float(np.sqrt(np.sum(self.density) * self.repetition_hz))
 
     @property

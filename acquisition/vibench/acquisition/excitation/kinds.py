@@ -143,9 +143,9 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Return a row for every kind: from ``of_kind`` if present, otherwise from its family (decision 0062).
+    """Return a table entry (row) per kind: from ``of_kind`` if present, else that of its family.
 
-    Raises KeyError when a row is given for an unknown kind.
+    See decision 0062. Raises KeyError when a row is given for an unknown kind.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Multisines in a generator's memory: lines, zero-order hold, phases, crest factor."""
+"""Multisines in a generator's memory: spectral lines, zero-order hold, phases, crest factor."""
 
 from functools import lru_cache
 

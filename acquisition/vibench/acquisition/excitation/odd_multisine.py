@@ -1,5 +1,5 @@
 """A multisine that separates even from odd nonlinearity.
-It excites odd lines only, and leaves some of them out as detection lines.
+It excites only odd spectral lines, and leaves some of them out as detection lines.
 """
 
 from typing import Annotated, Literal, Self
@@ -25,7 +25,7 @@ class OddMultisine(PeriodicNoise):
 
     kind: Literal["odd_multisine"] = "odd_multisine"
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
-    """Number of waveforms; all have the same lines, each with other phases."""
+    """Number of waveforms; all have the same spectral lines, each with other phases."""
     excited_lines: tuple[PositiveInt, ...] = ()
     """Harmonics of ``repetition_hz`` that are excited; if empty, they are chosen at random from the seed."""
     detection_lines: tuple[PositiveInt, ...] = ()

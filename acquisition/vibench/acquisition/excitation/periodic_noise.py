@@ -1,4 +1,4 @@
-"""Periodic noise from the generator's memory: equal lines in a band, new phases for every average."""
+"""Periodic noise from the generator's memory: equal spectral lines in a band, new phases per realisation."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -57,13 +57,13 @@ MOST_REALISATIONS = 1000
 
 
 class PeriodicNoise(BandNoise):
-    """Whole periods of lines of equal amplitude with random phases; one waveform per realisation."""
+    """Whole periods of a multisine with equal amplitudes and random phases; one waveform per realisation."""
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.REALISATION,)
     repetition_hz: PositiveFloat = 1.0
-    """Repetition rate of the waveform, equal to the spacing of its lines [Hz]."""
+    """Repetition rate of the waveform, equal to the spacing of its spectral lines [Hz]."""
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 10
-    """Number of waveforms; all have the same lines, each with other phases."""
+    """Number of waveforms; all have the same spectral lines, each with other phases."""
     periods: PositiveInt = 2
     """Number of periods recorded per realisation; two or more allow an estimate of the sensor noise."""
     points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS

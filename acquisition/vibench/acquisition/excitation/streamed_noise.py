@@ -17,9 +17,9 @@ CREST_FACTOR = 4.5
 exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Number of random values per key. Fewer make a start at any sample cheaper; more are faster to draw."""
+"""Number of random values per seed. Few make it cheap to start at any sample; many are faster to draw."""
 TRANSITION_WIDTH = 0.5
-"""Transition width of the filter, over the band's lower edge; the band's edges are its -6 dB points."""
+"""Transition width of the filter divided by the band's lower edge; the edges are its -6 dB points."""
 HAMMING_WIDTH = 3.3
 """Number of taps times transition width divided by sample rate, for a Hamming-windowed filter (Oppenheim and
 Schafer, Discrete-Time Signal Processing, 3rd ed., table 7.2).

@@ -1,4 +1,4 @@
-"""Band-limited white noise from the generator's memory: a new random-phase multisine for every average."""
+"""Band-limited white noise from the generator's memory: a random-phase multisine for every realisation."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ from .periodic_noise import PeriodicNoise
 
 
 class WhiteNoise(PeriodicNoise):
-    """White noise between two frequencies: whole periods of lines of equal amplitude with random phases.
+    """White noise between two frequencies: periods of a multisine with equal amplitudes and random phases.
 
     A periodic signal needs no window and has no leakage, but averaging over its periods reduces only the
     sensor noise. Every realisation therefore has new phases; averaging over realisations has the effect of

@@ -107,7 +107,7 @@ Time = TypeVar("Time", float, Samples)
 
 
 class Spacing(StrEnum):
-    """Frequency over time."""
+    """Course of a sweep's frequency over time."""
 
     LINEAR = "linear"
     """Constant rate in hertz per second."""
