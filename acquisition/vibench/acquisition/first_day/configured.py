@@ -263,8 +263,8 @@ def configure(
     """Ask all questions, write the configuration, read it back, and return it.
 
     ``questions`` are by default those with a place in the template. Comments of ``template`` mark unchecked
-    values by CONFIRM. ``note``, with name and time, is added to each answer. ``refuse`` receives the error
-    of one answer or of all answers together; if it returns, the questions are asked again.
+    values by CONFIRM. ``note``, such as name and time, is a comment on each answer. ``refuse`` receives the
+    error of one answer or of all answers together; if it returns, the questions are asked again.
 
     Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
     """
@@ -314,7 +314,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Return the template's value as the default answer; of a number with its source, only the number."""
+    """Return the template's value as the default answer; if it has a source, only its number."""
     written = value_in(text, key)
     match tomllib.loads(f"held = {written}")["held"] if written else None:
         case {"value": number}:
@@ -402,7 +402,7 @@ def first_day(
 ) -> DayPage:
     """Confirm wires, measure the noise floor, play a first 5 mVpp, check the bench; return the page.
 
-    The check at its usual level is made and stored only without a FAIL at 5 mVpp; then the bench is silent.
+    The check at its usual level is made and stored only if the check at 5 mVpp has no FAIL.
 
     Raises CheckFailed when a wire is not confirmed; nothing has been played then. Raises InstrumentError when
     an instrument fails.

@@ -1,4 +1,4 @@
-"""Helper threads for work that may hang or must end the process, and objects closed by a ``with``."""
+"""A helper thread for work that may hang, and a base class of objects that a ``with`` closes."""
 
 from abc import ABC, abstractmethod
 from collections import deque
