@@ -182,7 +182,7 @@ def needed_vpp(
     frequency_hz
         Frequency of the sine.
     on_table
-        Load on the table. Feedback uses the bare table, whose response is smooth, and corrects the rest.
+        What stands on the table. Feedback assumes a bare table (smooth response), and corrects the rest.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()

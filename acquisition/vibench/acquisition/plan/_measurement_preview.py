@@ -31,13 +31,13 @@ class MeasurementPreview:
     """Signal as set at the generator's panel, shape (samples,) [V]."""
     sample_rate_hz: float
     spectrum_hz: Samples
-    """Frequency of the highest line in each interval; at most `SPECTRUM_POINTS` intervals [Hz]."""
+    """Frequency of the strongest spectral line in each of at most `SPECTRUM_POINTS` intervals [Hz]."""
     spectrum_v: Samples
     """Peak amplitude of the sine at each of ``spectrum_hz`` [V]."""
     rms_v: float
     peak_v: float
     checks: tuple[LimitCheck, ...]
-    """Limit checks, sorted by use of the limit, the highest first."""
+    """Limit checks, sorted by the used fraction of the limit, the largest first."""
     duration_s: float
     """Duration from the first ramp to the last [s]."""
     size_bytes: int
@@ -91,7 +91,7 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
 
 
 def _highest_lines(preview: SignalPreview) -> tuple[Samples, Samples]:
-    """Return the highest line of each logarithmic frequency interval: frequencies and amplitudes."""
+    """Return the strongest spectral line of each logarithmic frequency interval: frequencies, amplitudes."""
     frequency_hz, amplitude_v = preview.frequency_hz[1:], preview.spectrum_v[1:]
     if len(frequency_hz) <= SPECTRUM_POINTS:
         return frequency_hz, amplitude_v
