@@ -35,7 +35,7 @@ def test_an_abandoned_recording_is_finished_with_all_its_samples(tmp_path, aband
     assert recover(part) == tmp_path / "a.h5"
     with open_recording(tmp_path / "a.h5") as recording:
         assert recording.state is RecordingState.INTERRUPTED
-        assert "before it could say" in recording.reason
+        assert "before it could record how" in recording.reason
         np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
         (segment,) = recording.segments
         assert (segment.start, segment.stop, segment.is_complete) == (0, 500, False)

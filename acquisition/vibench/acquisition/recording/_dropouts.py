@@ -29,9 +29,9 @@ _DETECTED = 6.0
 """Smallest fourth difference in the ringing of the converter's filter, relative to the median."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
-"""Largest spacing of the sharp corners of one run [s]."""
+"""Largest spacing of sharp corners that form one group (run) [s]."""
 _MOST_RUNS = 12
-"""Largest number of neighbouring runs of sharp corners in drop-outs; more runs indicate motion."""
+"""Largest number of neighbouring runs that can be explained by drop-outs; more indicate motion."""
 _FLANK_S = 1e-3
 """Length of the motion on each side with which a drop-out is compared [s]."""
 _LEAST_HELD = 8
@@ -47,7 +47,7 @@ _OUTSTANDING = 8.0
 _JUMP = 4.0
 """Smallest change between samples at the edge of a drop-out, relative to the largest in the flanks."""
 _STEEP = 0.2
-"""The same, relative to the largest distance from the fit; clipped peaks change more slowly."""
+"""Smallest such change relative to the largest distance from the fit; clipped peaks change more slowly."""
 _MOST_PER_S = 400.0
 """Largest number of drop-outs per second; more indicate motion."""
 _ORDER = 48

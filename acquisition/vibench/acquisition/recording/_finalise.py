@@ -72,7 +72,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
         {
             "units": channel["units"],
             "long_name": f"{name} [{channel['units']}]",
-            "comment": f"smallest and largest of every {BIN_SAMPLES} samples, by turns",
+            "comment": f"smallest and largest of every {BIN_SAMPLES} samples, alternating",
         },
     )
     # One dataset of times, linked from each channel's group.
@@ -143,7 +143,7 @@ def _chunk(counts: Counts, length: int) -> bytes:
 
 
 INTERRUPTED_KIND = "interrupted"
-INTERRUPTED_REASON = "the recording program ended before it could say how the run ended"
+INTERRUPTED_REASON = "the recording program ended before it could record how the run ended"
 INT32_SAMPLES = 2**31
 """From this length (11 h at 51.2 kS/s), sample numbers are stored with 64 bits."""
 

@@ -270,7 +270,7 @@ class RecordingHeader:
             "plan_json": self.plan_json,
             "bench_json": self.bench_json,
             "instruments_json": json.dumps(instruments),
-            "confirmations_json": json_text("What the operator confirmed", self.confirmations),
+            "confirmations_json": json_text("The operator's confirmations", self.confirmations),
             "bench_check_json": self.bench_check_json,
             "provenance_json": json.dumps(asdict(self.provenance)),
         }

@@ -15,7 +15,7 @@ from . import _layout as layout
 from ._layout import read_attributes, write_attributes
 
 BIN_SAMPLES = 128
-"""Samples per bin. To plot finer detail, 1000 columns read at most 128 000 samples: 10 ms for 4 channels."""
+"""Samples per bin. For finer detail, a plot of 1000 columns reads at most 128 000 samples (10 ms)."""
 LOW_SUFFIX, HIGH_SUFFIX = "_low", "_high"
 _LARGEST = np.int32(layout.LARGEST_COUNT)
 
@@ -77,7 +77,7 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
         bin_s = BIN_SAMPLES / sample_rate_hz
         write_attributes(
             axis,
-            {"units": "s", "scale_factor": bin_s, "add_offset": 0.0, "long_name": "first moment of the bin"},
+            {"units": "s", "scale_factor": bin_s, "add_offset": 0.0, "long_name": "start time of the bin"},
         )
         axis.make_scale(layout.BIN)
         write_attributes(group, {"samples_per_bin": BIN_SAMPLES})
