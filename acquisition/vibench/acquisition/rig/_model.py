@@ -63,7 +63,7 @@ _COLUMNS = {
 
 
 class OnTable(StrEnum):
-    """Load on the table."""
+    """What stands on the table in the model."""
 
     SPECIMEN = "specimen"
     NOTHING = "nothing"
