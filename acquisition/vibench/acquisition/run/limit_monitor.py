@@ -91,7 +91,7 @@ class SpecimenTracker:
 RMS_S = 1.0
 """Averaging time of the rms current [s]; its limit is thermal."""
 REACTION = 1.1
-"""Allowed force on the table over the coil's limit; above 1 to allow for the reaction of the specimen."""
+"""Allowed force on the table, over the coil's force limit; above 1, because the specimen reacts too."""
 SETTLING_S = 0.5
 """Time after the start in which integrated quantities are not checked [s]. An AC-coupled input drifts after
 its current is switched on, and the drift integrates to metres. The run is then still at the low level of its

@@ -145,9 +145,9 @@ LONGEST_LEAD = 0.25
 TOLD_CYCLES = 0.1
 """Deviation of the drive at the end of a sweep above which an event is logged [cycles]."""
 MOST_MADE_UP = 3.0
-"""Largest frequency correction for lost cycles, over the planned step between two frequencies."""
+"""Largest frequency correction for lost cycles, as a multiple of the planned frequency step."""
 LEAST_LEFT = 0.2
-"""Shortest time for a correction, as a fraction of the step; also the largest relative correction."""
+"""Shortest time for a correction, over the step's duration; also the largest relative correction."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 

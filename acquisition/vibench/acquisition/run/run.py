@@ -341,7 +341,7 @@ class Run(ClosedOnLeaving):
         loop.enter(None)
 
     def _note_known(self, loop: AcquisitionLoop) -> None:
-        """Log the bounds of each finished stretch; the reason of the run's end repeats the last."""
+        """Log the error bounds of each finished result; the reason of the run's end repeats the last."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)

@@ -1,6 +1,6 @@
 """Check of the drive before a run, and measurement of its silence after a stop.
 
-After a stall, samples read after the last command may have been converted before it.
+If reading has stalled, samples that are read after a command may have been converted before it.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
 """Largest signal before anything plays, as a fraction of the expected signal."""
 STILL_SHARE = 0.3
-"""Fraction of the quiet record that is ignored, because filter and table may still ring."""
+"""First part of the quiet record, as a fraction, that is ignored: filter and table may still ring."""
 
 
 class LowLevelCheck(StrEnum):

@@ -251,7 +251,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 
 def note_open_bench(rig: str) -> None:
-    """Note that this process has silenced the generator of a rig: earlier programs left nothing on there."""
+    """Note that this process has silenced a rig's generator, so no earlier program can have left it on."""
     _RIGS.add(rig)
     with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
         for each in unconfirmed_programs():
