@@ -5,17 +5,17 @@ from typing import Literal
 
 
 class Accuracy(StrEnum):
-    """Accuracy level, by the largest error of the state after seconds of periodic impacts.
+    """Accuracy level: largest allowed error of the state after some seconds of periodic impacts.
 
     Errors are in units of 100 um and 0.1 m/s, measured against an independent solution (docs/accuracy.md).
     """
 
     QUICK = "quick"
-    """Error 1e-5. A stricter level does not improve results for chaotic motion."""
+    """Error 1e-5. Enough for chaotic motion, whose results a stricter level does not improve."""
     STANDARD = "standard"
     """Error 1e-6."""
     REFERENCE = "reference"
-    """Error 1e-9: reference for the other two levels."""
+    """Error 1e-9. The other two levels are checked against it."""
 
     @property
     def tolerance(self) -> float:
@@ -24,7 +24,7 @@ class Accuracy(StrEnum):
 
     @property
     def promise(self) -> float:
-        """Largest error of the state of a periodic motion, in the units above."""
+        """Largest error of the state of a periodic motion, in the units of the class docstring."""
         return _PROMISES[self]
 
 

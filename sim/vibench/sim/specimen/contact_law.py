@@ -1,8 +1,8 @@
 """Contact laws between m1 and its stops: union type and table of names. Each law has a separate file.
 
-To add a law of the form F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at indentation d, only its file and this
-table change: native engine, independent solution and harmonic balance use its `stops`. A force of another
-form also needs a type in native/contact.hpp.
+To add a law of the form F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at indentation d, add its file and an entry
+in `CONTACT_LAWS`. The native engine, the independent solution and harmonic balance need no change, because
+they read the law's `stops`. A force of another form also needs a type in native/contact.hpp.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw
     text
         A name in `CONTACT_LAWS`, followed by a colon and the numbers of the law, if any.
     contact_stiffness, gap_m
-        Hertz contact to which some laws are fitted: k_contact [N/m^1.5] and clearance [m].
+        Hertz contact to which laws without explicit numbers are fitted: k_contact [N/m^1.5] and gap [m].
     """
     reference = Reference(contact_stiffness, gap_m)
     name, _, detail = text.strip().partition(":")

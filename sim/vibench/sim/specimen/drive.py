@@ -1,4 +1,4 @@
-"""Drives: the base displacement as a function of time, from time zero. SI units."""
+"""Drives: the base displacement as a function of time, which starts at zero. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from .stops import Strict, require_positive
 FEWEST_SAMPLES = 4
 """Fewest samples: a not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
-"""Allowed amplitudes: squares of smaller ones would underflow; larger ones are typing errors and run long."""
+"""Allowed amplitudes. Squares of smaller ones underflow; larger ones are typing errors and compute slowly."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
-"""Allowed frequencies; powers of higher frequencies, and durations in drive periods, would overflow."""
+"""Allowed frequencies. At higher ones, powers of the frequency and numbers of periods would overflow."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class LinearSweep(_Sweep):
     """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the phase in cycles, start t + (stop - start) t^2 / (2 duration), shape of ``time_s``."""
+        """Return the phase in cycles at each time: start t + (stop - start) t^2 / (2 duration)."""
         return (self.start_hz + 0.5 * (self.stop_hz - self.start_hz) / self.duration_s * time_s) * time_s
 
     def frequency_hz(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -73,7 +73,7 @@ class LogarithmicSweep(_Sweep):
     """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the phase in cycles, start (exp(g t) - 1) / g with g = ln(stop/start) / duration."""
+        """Return the phase in cycles: start (exp(g t) - 1) / g with g = ln(stop/start) / duration."""
         growth = math.log(self.stop_hz / self.start_hz) / self.duration_s
         return self.start_hz * np.expm1(growth * time_s) / growth
 

@@ -25,7 +25,7 @@ def number_of(text: str, *units: str) -> float:
 
 
 class NumberWith:
-    """Field type that accepts a number, or text with a number and a unit; limits apply to both."""
+    """Field type: a number, or text with a number and a unit. The field's limits apply to the SI value."""
 
     def __init__(self, *units: str) -> None:
         self._units = units
@@ -53,7 +53,7 @@ def _time(given: object) -> object:
 
 
 def _with_numbers_only(schema: Any) -> Any:
-    """Return the core schema with checks that numbers are numbers and booleans are booleans."""
+    """Return the core schema with strict types: only numbers for numbers, only booleans for booleans."""
     match schema:
         case {"type": "float" | "int" | "datetime"} | {"type": "literal", "expected": [int(), *_]}:
             # pydantic's strict mode is not used: it refuses 1e3 for an integer, and numpy's numbers.
@@ -73,7 +73,7 @@ def _with_numbers_only(schema: Any) -> Any:
 
 
 class FrozenModel(BaseModel):
-    """Immutable model that refuses unknown keys and does not convert other types to numbers.
+    """Immutable model that refuses unknown keys, and text or booleans where a number is required.
 
     pydantic alone would read ``true`` as 1 and ``"45e-6"`` as a number. In a file both are mistakes: ``true``
     would become a mass of 1 kg. The check applies to every field at any depth.

@@ -11,9 +11,9 @@ from .stops import LawWord, Reference, Stops, Strict, number_in, require_positiv
 class HuntCrossley(Strict):
     """Hertz contact with energy loss: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
 
-    Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. Without other
-    forces the separation speed is below 1/loss at any approach speed, so the force is never negative. If
-    springs pull m1 off the stop faster than 1/loss, the force becomes negative.
+    Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. If no other force
+    acts, the separation speed is below 1/loss at any approach speed, so the force is never negative. If
+    springs pull m1 off the stop faster than 1/loss, the force becomes negative (tensile).
     """
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}
@@ -21,7 +21,7 @@ class HuntCrossley(Strict):
     stiffness: float
     """Contact stiffness [N/m^1.5]."""
     loss: float
-    """Loss factor [s/m]; about 3/2 (1 - restitution) / approach speed if small. Zero gives Hertz."""
+    """Loss factor [s/m], about 3/2 (1 - restitution) / approach speed for small losses. Zero gives Hertz."""
     kind: Literal["hunt_crossley"] = "hunt_crossley"
 
     def __post_init__(self) -> None:

@@ -42,10 +42,10 @@ def angular_frequencies(frequency_hz: ArrayLike) -> Floats:
 
 
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
-    """Return the transmissibility without contact: displacements of the masses and p over the base motion.
+    """Return the transmissibility without contact: x, y, z and p over the base displacement.
 
-    It is (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0), exact for any damping. Raises ValueError when a
-    frequency is negative or not finite.
+    For x, y, z it is (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0), exact for any damping. Raises ValueError
+    when a frequency is negative or not finite.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     (m0, m1, m2), squared = specimen.masses, omega**2
     springs, dampers = specimen.stiffnesses, specimen.dampings
     k0, k1, k2 = (k + 1j * omega * c for k, c in zip(springs, dampers, strict=True))
-    # Eliminate m1 and m2 without differences of nearly equal stiffnesses.
+    # This elimination of m1 and m2 avoids differences of nearly equal stiffnesses, which would lose digits.
     pair = k1 * (k2 - squared * m2) - squared * m1 * (k1 + k2 - squared * m2)
     carried = (m1 + m2) * k1 - squared * m1 * m2
     per_force = k0 / ((k0 - squared * m0) * pair - k2 * squared * carried)
@@ -71,7 +71,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
 
 
 class ModalForm(NamedTuple):
-    """Free motion of d displacements, s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
+    """Free motion s(t) of d displacements and velocities: Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
 
     rates: Complex
     """Eigenvalues: one of each conjugate pair, and all real ones; shape (n,), d <= n <= 2d [1/s]."""
@@ -82,19 +82,19 @@ class ModalForm(NamedTuple):
 
 
 COINCIDENT = 1e7
-"""Condition number of the eigenvectors above which two modes coincide (critical damping to 14 digits)."""
+"""Condition number of the eigenvectors above which two modes count as equal (critical damping)."""
 PROPORTIONAL = 1e-12
-"""Off-diagonal modal damping, over the largest modal damping, below which the modes are uncoupled."""
+"""Largest ratio of off-diagonal to diagonal modal damping for which the modes count as uncoupled."""
 CRITICAL = 1e-12
 """Value of abs(1 - damping ratio^2) below which a mode counts as critically damped."""
 WIDEST = 1e10
-"""Ratio of natural frequencies above which double precision does not resolve the slowest mode."""
+"""Ratio of the highest to the lowest natural frequency above which double precision loses the lowest mode."""
 REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per cent."
 
 
 @lru_cache(maxsize=64)
 def modal_form(specimen: Specimen) -> ModalForm:
-    """Return the modal form without contact, for any damping; do not write to its arrays.
+    """Return the modal form of the specimen without contact, for any damping; treat its arrays as read-only.
 
     Raises ValueError in the same cases as `diagonal_form`.
     """
@@ -104,18 +104,18 @@ def modal_form(specimen: Specimen) -> ModalForm:
 def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     """Return the modal form of M s'' + C s' + K s = 0 with a diagonal M.
 
-    The undamped modes are those of a symmetric problem, so they are orthogonal even if two frequencies nearly
+    The undamped modes solve a symmetric eigenproblem, so they are orthogonal even if two frequencies nearly
     coincide. If the damping is zero or proportional to the stiffness, they are also the damped modes.
 
-    Raises ValueError when two modes coincide (critical damping), because no complete set of modes exists, or
-    when the natural frequencies are too far apart.
+    Raises ValueError when two modes coincide (critical damping), because modes then do not span all states,
+    or when the natural frequencies are too far apart.
     """
     root = np.sqrt(np.diag(mass))
     try:
         factor = np.linalg.cholesky(stiffness / np.outer(root, root))
     except np.linalg.LinAlgError:
         factor = np.zeros_like(stiffness)
-    # Singular values are the frequencies; eigenvalues of K would lose twice as many digits of a low mode.
+    # Use singular values: eigenvalues of K would lose twice as many digits of the lowest mode.
     modes, omega, _ = np.linalg.svd(factor)
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
@@ -139,7 +139,7 @@ def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table)
 
 
 def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
-    """Return the terms of one mode q = row.displacement: one for a conjugate pair, two for real rates."""
+    """Return the terms (rate, shape, row) of one mode: one term if it oscillates, two if it is overdamped."""
     turn = (omega - decay) * (omega + decay)
     if abs(turn) <= CRITICAL * omega**2:
         raise ValueError(REFUSAL)
@@ -163,7 +163,7 @@ def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> 
 
 def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
     """Return the modal form for undamped modes that are coupled by damping."""
-    # With the coordinates q and q' / omega the condition number is small even for fast and slow modes.
+    # In the coordinates q and q' / omega, the condition number stays small if slow and fast modes are mixed.
     values, vectors = np.linalg.eig(
         np.block(
             [
@@ -180,7 +180,7 @@ def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) ->
     size = len(omega)
     moved = np.hstack([vectors.T[:, :size] @ shapes.T, vectors.T[:, size:] @ (shapes * omega).T])
     read = np.hstack([left[:, :size] @ rows, left[:, size:] @ (rows / omega[:, None])])
-    # The motion of a passive structure does not grow: a positive real part is due to rounding.
+    # Free motion of a passive structure cannot grow: a positive real part is a rounding error.
     rates = np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]
     return ModalForm(
         rates=rates.astype(np.complex128),
@@ -190,7 +190,7 @@ def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) ->
 
 
 def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tuple[Complex, complex]:
-    """Return the phasors of the steady motion without contact and of the base force [N].
+    """Return the phasors of the steady motion without contact, and the phasor of the base force [N].
 
     The drive is U = amplitude sin(omega t). The motion S has shape (6,), with s(t) = Re(S exp(i omega t)).
     """
@@ -202,10 +202,10 @@ def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tup
 
 # Closed-form response of a specimen to its base, with p free or imposed by the stops. SI units.
 #
-# The stops exert equal and opposite forces on m1 and m2, so the base U and p determine x: x = stuck U + lever
-# p. Here ``stuck`` is the response while m1 sticks to m2, and ``lever`` is the response to a p imposed by the
-# stops. While collisions limit abs(p) to about the gap, abs(x) is at most abs(stuck U) + abs(lever) gap, if
-# the fundamental dominates the motion.
+# The stops exert equal and opposite forces on m1 and m2. Therefore the base U and p determine x:
+# x = stuck U + lever p. Here ``stuck`` is x / U while m1 sticks to m2, and ``lever`` is x / p with the base
+# at rest. Collisions limit abs(p) to about the gap. If the fundamental dominates, abs(x) is therefore at
+# most abs(stuck U) + abs(lever) gap.
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,18 +236,18 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
     return BaseResponse(free[:, 3], free[:, 0], free[:, 0] - lever * free[:, 3], lever)
 
 
-# Exact solution of the specimen while a rigid stop holds m1 on m2: two bodies. SI units.
+# Exact solution of the specimen while m1 sticks to a rigid stop on m2: a system of two bodies. SI units.
 #
 # While m1 sticks to a stop, m1 and m2 are one rigid body with y = z + side * gap, and the spring and damper
 # between them have no effect. The motion of x and z is linear as long as the stop force is compressive. The
-# native engine follows the motion and finds the time at which the force would become tensile.
+# native engine computes this motion and finds the time at which the force would become tensile.
 
 PLACES = [X, Z, VX, VZ]
-"""Indices in a state of the four unknowns of the bound motion."""
+"""Indices, within the state of six, of the four unknowns while m1 sticks to m2."""
 
 
 class BoundMotion(NamedTuple):
-    """Motion with m1 held on m2: n modes (2 to 4) and the steady part; y excludes the constant gap."""
+    """Motion while m1 sticks to m2: n modes (2 to 4) and the steady part; y is without the constant gap."""
 
     modes: ModalForm
     """Modal form for x, y, z, vx, vy, vz; rows are nonzero only at x, z, vx, vz."""
@@ -259,7 +259,7 @@ class BoundMotion(NamedTuple):
 
 
 def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> BoundMotion:
-    """Return the modes and the steady part of the bound motion under U = amplitude sin(omega t).
+    """Return the modes and the steady motion while m1 sticks to m2, driven by U = amplitude sin(omega t).
 
     Raises ValueError when two bound modes coincide.
     """

@@ -1,4 +1,4 @@
-"""Outcome of a simulation, with advice for the user. It is a value, not an exception."""
+"""Outcome of a simulation with advice for the user; returned as a value, not raised as an exception."""
 
 from enum import IntEnum
 

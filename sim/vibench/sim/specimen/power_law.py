@@ -1,4 +1,4 @@
-"""Power-law forces that act at every p, as a smooth approximation of stops. SI units."""
+"""Power-law forces that act at every p and approximate stops by a smooth function. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from .stops import (
 
 MOST_TERMS = 6
 HIGHEST_EXPONENT = 1001
-"""Highest exponent: a change of p by 0.1 % then changes the force by a factor of e, as at a rigid wall."""
+"""Largest exponent. With it, a 0.1 % change of p changes the force by a factor of e, as a wall would."""
 
 
 @dataclass(frozen=True)

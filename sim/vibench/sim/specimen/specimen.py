@@ -45,10 +45,10 @@ class Specimen(Strict):
     dampings: Triple
     """Damping coefficients c0, c1, c2, zero or positive [N s/m]."""
     gap_m: float
-    """Clearance between m1 and each stop at rest [m]; infinite for no stop at positive p."""
+    """Clearance between m1 and each stop at rest [m]; infinite if there is no stop at positive p."""
     contact: ContactLaw
     lower_gap_m: float | None = None
-    """Clearance of the stop at negative p, if different [m]; infinite for no stop there."""
+    """Clearance at negative p [m], infinite if there is no stop there; None if it equals ``gap_m``."""
 
     def __post_init__(self) -> None:
         _refuse_unless_positive("mass m", "kg", self.masses)
@@ -116,7 +116,7 @@ _ROUNDING = 1e-12
 
 
 def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64]:
-    """Return damping ratios of coupled modes from undamped frequencies [rad/s] and modal damping [1/s]."""
+    """Return damping ratios of modes coupled by damping, from frequencies [rad/s] and modal damping [1/s]."""
     poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
     still = np.sort(np.abs(poles[poles.imag == 0.0]))
     # Overdamped modes: pair the slowest pole with the fastest. Their product is the squared frequency of the
@@ -128,7 +128,7 @@ def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64
 
 
 JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-"""Displacements (x, y, z) for unit x and for unit z (columns), while m1 sticks to m2."""
+"""Matrix, shape (3, 2), from displacements (x, z) to (x, y, z) without the gap while m1 sticks to m2."""
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
@@ -147,7 +147,7 @@ def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
 PAPER_MASSES: Triple = (5.8e-3, 2.1e-3, 2.0e-3)
 """Masses m0, m1, m2 of Gong et al. 2025, section 2 [kg]."""
 PAPER_FREQUENCIES_HZ: Triple = (322.0, 100.0, 390.6)
-"""Frequencies f0, f1, f2 of each mass on its spring, k_i = m_i (2 pi f_i)^2; section 2 of the paper."""
+"""Frequency f_i of mass m_i on spring k_i alone, k_i = m_i (2 pi f_i)^2; section 2 of the paper."""
 STEEL = Elasticity(206e9, 0.27)
 """Material of the sphere m1; section 2 of the paper."""
 ALUMINIUM = Elasticity(67e9, 0.3)
@@ -168,8 +168,8 @@ def gong2025(
     Parameters
     ----------
     damping_time_s
-        Damping over stiffness, c_i = damping_time_s * k_i [s]. The paper does not state this value. The
-        default is the only value found that reproduces both statements of the paper on chaos.
+        Damping over stiffness, c_i = damping_time_s * k_i [s]. The paper does not state this value. Of the
+        values tried, only the default reproduces both statements of the paper on chaos.
     gap_m
         Clearance at each stop [m], or (lower, upper); a power law is fitted at the smaller clearance.
     contact
@@ -205,7 +205,7 @@ def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
 
 
 def _chain_matrix(links: Triple) -> Matrix:
-    """Return the matrix in (x, y, z) of springs or dampers base-m0 (0), m2-m1 (1), m0-m2 (2)."""
+    """Return the matrix in (x, y, z) from links i = 0 (base to m0), 1 (m2 to m1) and 2 (m0 to m2)."""
     c0, c1, c2 = links
     return np.array([[c0 + c2, 0.0, -c2], [0.0, c1, -c1], [-c2, -c1, c1 + c2]])
 
@@ -217,13 +217,13 @@ def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]
 
 
 def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
-    """Return the scales of a state, shape (6,): gap for displacements, gap times 2 pi f for velocities."""
+    """Return the scales of a state, shape (6,): the smaller gap [m], and this gap times 2 pi f [m/s]."""
     speed = 2.0 * np.pi * drive.frequency_hz
     return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
 
 
 def energy_metric(specimen: Specimen) -> Floats:
-    """Return the matrix E, shape (6, 6); s' E s is twice the energy of state s without stops."""
+    """Return the matrix E, shape (6, 6); s' E s is twice the energy of a state s without contact."""
     metric = np.zeros((6, 6))
     metric[:3, :3], metric[3:, 3:] = specimen.stiffness_matrix, specimen.mass_matrix
     return metric

@@ -1,7 +1,7 @@
-"""Description of a specimen: its parameters and their sources, in a file or in a table of another file.
+"""Description of a specimen: its parameters and their sources, as a file or as a table in another file.
 
-A description is complete: parameters have no default values. It may start from another description
-(``model``, a name or path) and state only the differences, as the tables of rigs, studies and imports do.
+In a description no parameter has a default value. Instead a description may name another one (``model``, a
+name or path) and state only the differences, as the specimen tables of rigs, studies and imports do.
 """
 
 import math
@@ -38,16 +38,16 @@ from .specimen import Gaps, Specimen, Triple
 from .toml_table import fault_in_words, toml_table
 
 BASE = "model"
-"""Key for the name or path of the specimen from which a table starts."""
+"""Key for the name or path of the specimen whose values a table takes over."""
 FOLDER = "folder"
-"""Key in pydantic's validation context for the folder of relative paths in ``model``. Without a folder only
-specimens of vibench can be named, so that a recording cannot open other files."""
+"""Key, in pydantic's validation context, for the folder to which paths in ``model`` are relative. Without a
+folder only names of vibench's specimens are allowed, so that a recording cannot open other files."""
 SOURCES = "sources"
 SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
 """Key for the format version of a file, and the supported version."""
 DEEPEST = 5
-"""Longest chain of files of which each starts from the next."""
+"""Largest number of descriptions in a row of which each names the next in ``model``."""
 USUAL_SPECIMEN = "gong2025"
 """Default specimen of rigs, studies and commands."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
@@ -59,11 +59,11 @@ NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 
 
 class UnknownSpecimenError(ValueError):
-    """A specimen name that is not known, or a file that does not describe a specimen."""
+    """Error: a specimen name is unknown, or a file does not describe a specimen."""
 
 
 class SpecimenWarning(UserWarning):
-    """Warning of stiffnesses or dampings that change because other parameters were replaced."""
+    """Warning: stiffnesses or dampings changed although only other parameters were replaced."""
 
 
 class _Described(FrozenModel):
@@ -80,7 +80,7 @@ class Material(_Described):
 
     @property
     def elasticity(self) -> Elasticity:
-        """Return the elastic constants as `Elasticity`."""
+        """Elastic constants as `Elasticity`."""
         return Elasticity(self.youngs_modulus_pa, self.poissons_ratio)
 
 
@@ -158,7 +158,7 @@ class SpecimenDescription(_Described):
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, value: object, info: ValidationInfo) -> object:
-        """Return a table completed from the specimen that it names; text is the name of a specimen."""
+        """Complete a table with the values of the specimen that it names; text alone is such a name."""
         folder: Path | None = (info.context or {}).get(FOLDER)
         match value:
             case str():
@@ -179,7 +179,7 @@ class SpecimenDescription(_Described):
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
     def _number_or_bodies(cls, value: object, handler: ValidatorFunctionWrapHandler) -> object:
-        """Report a fault in the bodies first; pydantic would report first that they are not a number."""
+        """Report a fault in the description of the two bodies instead of pydantic's "not a number"."""
         try:
             return handler(value)
         except ValidationError as error:
@@ -222,7 +222,7 @@ class SpecimenDescription(_Described):
         damping_time_s: float | None = None,
         gap_m: float | Gaps | None = None,
     ) -> Specimen:
-        """Return the specimen, optionally with another contact law, damping or gap.
+        """Return the specimen; an argument replaces the value of this description.
 
         Raises ValueError when a number or the law is not allowed.
 
@@ -280,7 +280,7 @@ class SpecimenDescription(_Described):
 
 
 class SpecimenTable(SpecimenDescription):
-    """Specimen table of a rig, study or import: differences from a named specimen (default: the paper's)."""
+    """Specimen table of a rig, study or import: the differences from ``model`` (default: the paper's)."""
 
     _meant = MappingProxyType({BASE: USUAL_SPECIMEN})
 
@@ -307,7 +307,7 @@ def shipped_specimens() -> Mapping[str, SpecimenDescription]:
 
 
 def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dict[str, Any]:
-    """Return a table completed from the specimen that it starts from, recursively."""
+    """Return a table completed with the values of the specimens named in ``model``, recursively."""
     if BASE not in table:
         return table
     if depth > DEEPEST:
@@ -333,7 +333,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
-    """Return the table of a file without its format version, which is checked if given."""
+    """Return the table of a file without its format version; refuse another version than this one."""
     table = toml_table(path)
     written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
@@ -355,7 +355,7 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table with replaced values, without `about` and the sources and alternatives of given keys."""
+    """Return ``base`` with the values of ``table``, without `about` and sources of the replaced values."""
     replaced = {key for pair in ALTERNATIVES if table.keys() & pair for key in pair} | table.keys()
     replaced |= {"about"} if table else set()
     kept = {key: value for key, value in base.items() if key not in replaced}
@@ -367,7 +367,7 @@ def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], table: Mapping[str, Any]) -> None:
-    """Warn of stiffnesses and dampings that change because they are computed from replaced values."""
+    """Warn if stiffnesses or dampings changed only because they are computed from replaced values."""
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
         before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))

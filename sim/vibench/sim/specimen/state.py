@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 X, Y, Z, VX, VY, VZ = range(6)
-"""Indices of the absolute displacements and velocities, the same with and without contact."""
+"""Indices of displacements and velocities in a state; the same with and without contact."""
 
 
 Vector = NDArray[np.float64]

@@ -22,7 +22,7 @@ class Strict:
 
 
 class Stops(NamedTuple):
-    """Parameters of F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at indentation d."""
+    """Parameters of F = (linear d + contact d^(3/2)) (1 + loss dd/dt) for m1 at indentation d in a stop."""
 
     linear_stiffness: float = 0.0
     """Coefficient of d [N/m]."""
@@ -48,7 +48,7 @@ class Stops(NamedTuple):
 
 @dataclass(frozen=True)
 class Reference:
-    """Hertz contact and clearance to which other laws are fitted."""
+    """Hertz contact and clearance to which a law without explicit numbers is fitted."""
 
     stiffness: float
     """Contact stiffness k_contact [N/m^1.5]."""
@@ -77,7 +77,7 @@ class UnreadableLawError(ValueError):
 
 
 def number_in(detail: str) -> float:
-    """Return the only number of a law; raise `UnreadableLawError` for other text."""
+    """Return the text after a law's name as one number; raise `UnreadableLawError` for other text."""
     try:
         return float(detail)
     except ValueError:
@@ -100,7 +100,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def chosen(kind: type[Choice], word: str) -> Choice:
-    """Return the member of an enum for its word, or the member itself.
+    """Return the enum member whose value is ``word``; a member is returned unchanged.
 
     Raises ValueError when the enum has no such word.
     """

@@ -58,7 +58,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "union_tag_not_found": "{discriminator} is missing: it selects the kind of this table",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
-"""Replacements, by type of error, for messages of pydantic in terms of Python."""
+"""Messages in TOML's terms that replace pydantic's messages in Python's terms, by pydantic's error type."""
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:
