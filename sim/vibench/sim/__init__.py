@@ -2,9 +2,9 @@
 
 The specimen is a chain of three masses on a moving base, with m1 between two stops on m2 (Gong et al. 2025).
 x, y, z are absolute displacements [m]; m1 touches a stop where abs(y - z) reaches the gap. Motion without
-contact is exact, contact is integrated (docs/decisions/0004-contact-integration.md). SI units. No other
-package of vibench is imported. Use `vibench.sim.study` for many scenes, `vibench.sim.chain` for coupled
-specimens. docs/accuracy.md states the cost of each level of `Accuracy`.
+contact is exact, contact is integrated (docs/decisions/0004-contact-integration.md). SI units. This package
+imports no other package of vibench. Use `vibench.sim.study` for many scenes and `vibench.sim.chain` for
+coupled specimens. docs/accuracy.md states the computing time of each level of `Accuracy`.
 
 >>> from vibench.sim import Harmonic, base_transmissibility, gong2025, steady_response
 >>> specimen = gong2025(damping_time_s=2e-5, gap_m=45e-6, contact="hertz")

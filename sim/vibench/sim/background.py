@@ -24,11 +24,11 @@ from .operating_system.this import bound_memory, lower_priority
 
 NICE = 10
 MOST_BYTES = 6 << 30
-"""Memory limit of a process [bytes], where the system supports one."""
+"""Memory limit of a worker process [bytes], where the operating system supports one."""
 MOST_WAITING = 200
-"""Most unread messages of a process; it then waits until `Pool.poll` reads messages."""
+"""Largest number of unread messages of a worker, which then waits until `Pool.poll` reads them."""
 GRACE_S = 2.0
-"""Time after which the process of a dropped job is killed unless the job has stopped [s]."""
+"""Time that a cancelled job has to end before its process is killed [s]."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Progress:
 Observer = Callable[[Progress], None]
 """Function that receives progress reports; called in the thread that does the work."""
 Cancelled = Callable[[], bool]
-"""Function that returns whether to end early; called several times per second in the working thread."""
+"""Function that returns True if the work should end early; polled several times per second by the work."""
 
 
 def ignore_progress(progress: Progress) -> None:
@@ -54,7 +54,7 @@ def ignore_progress(progress: Progress) -> None:
 
 
 def stage(observer: Observer, note: str) -> Callable[[int, int], None]:
-    """Report the start of a stage; return a function that reports its progress."""
+    """Report that a stage begins; return a function that reports its progress from (done, of)."""
     observer(Progress(0, 0, note=note))
     return lambda done, of: observer(Progress(done, of, note=note))
 
@@ -71,7 +71,7 @@ def _ignore(*_: object) -> None:
 
 @dataclass(eq=False)
 class Job:
-    """Job for another process, with callbacks that `Pool.poll` calls."""
+    """Call of a function in another process, with the callbacks for its messages."""
 
     work: Callable[..., Any]
     on_part: Callable[[Any], None]
@@ -82,7 +82,7 @@ class Job:
     is_answered: bool = False
     """Whether the result or the error has been delivered."""
     end_s: float = math.inf
-    """Time at which the process is killed if it still works, as a value of `monotonic` [s]."""
+    """Time of `monotonic` at which the process is killed if the job still runs [s]."""
     cancel: Callable[[], None] = _ignore
 
     @property
@@ -91,7 +91,7 @@ class Job:
         return self.is_answered or not self.is_wanted
 
     def drop(self) -> None:
-        """Ignore further messages and cancel the job."""
+        """Cancel the job and ignore its further messages."""
         if not self.is_over:
             self.is_wanted, self.end_s = False, monotonic() + GRACE_S
             self.cancel()
@@ -100,7 +100,7 @@ class Job:
 class Pool:
     """Pool of worker processes; its owner must call `poll` regularly.
 
-    Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the process
+    Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the worker
     ended, TimeoutError or MemoryError if a limit was exceeded, otherwise the exception of the function.
     """
 
@@ -141,11 +141,11 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; `poll` calls ``on_part`` per part."""
+        """Call ``function(question, tell, cancelled)`` in a worker; ``tell(part)`` triggers ``on_part``."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:
-        """Start a job when a process is free, unless the pool is closed."""
+        """Queue a job, which starts when a worker is free; a closed pool drops it."""
         self._waiting.append(job)
         if self._is_closed:
             job.drop()
@@ -153,7 +153,7 @@ class Pool:
         return job
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Deliver messages, after a wait of at most ``wait_s``; end jobs that exceed their time limit."""
+        """Wait at most ``wait_s`` for messages, deliver them, and end jobs that exceed their time limit."""
         self._arrived.wait(wait_s)
         self._arrived.clear()
         for worker in tuple(self.workers):
@@ -164,7 +164,7 @@ class Pool:
         self._hand_out()
 
     def close(self) -> None:
-        """Kill all processes; unfinished jobs are dropped."""
+        """Drop all unfinished jobs and kill all worker processes."""
         self._is_closed = True
         for job in (*self._waiting, *(worker.job for worker in self.workers)):
             if job is not None:
@@ -199,7 +199,7 @@ class Pool:
                     _call_back(job, kind, value)
 
     def _lose(self, worker: "Worker", error: BaseException) -> None:
-        if worker in self.workers:  # the pool was not closed by a callback
+        if worker in self.workers:  # false if a callback has closed the pool
             self.workers.remove(worker)
             worker.end()
             if worker.job is not None:
@@ -226,7 +226,7 @@ def _call_back(job: Job, kind: str, value: Any) -> None:
 
 
 class Worker:
-    """Process with its job, and a thread that receives its messages."""
+    """Worker process with its current job, and a thread in this process that receives its messages."""
 
     def __init__(self, arrived: Event) -> None:
         context = get_context("spawn")
@@ -260,7 +260,7 @@ class Worker:
         self._connection.close()
 
     def _send(self, order: Callable[..., Any] | None) -> None:
-        with suppress(OSError):  # the process has ended, which the thread detects
+        with suppress(OSError):  # the process has ended; the receiving thread reports that
             self._connection.send(order)
 
     def _receive(self) -> None:

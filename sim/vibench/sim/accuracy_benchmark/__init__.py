@@ -1,6 +1,6 @@
-"""Error over computing time for one scene, by every suitable method, measured on this machine.
+"""Error against computing time for one scene and every suitable method, measured on this machine.
 
-`vibench.sim.accuracy_benchmark.curve` computes the curve of error over time.
+`vibench.sim.accuracy_benchmark.curve` computes these points.
 
 >>> from vibench.sim import Harmonic, Scene, Target, gong2025
 >>> from vibench.sim.accuracy_benchmark.curve import scene_curve

@@ -1,4 +1,4 @@
-"""Error over computing time of every method that can solve a scene, measured on this machine."""
+"""Error against computing time for every method that can solve a scene, measured on this machine."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -21,37 +21,37 @@ from ..specimen.state import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)
-"""Tolerances of the harmonic balance with many harmonics."""
+"""Relative tolerances of the harmonic balance with many harmonics, one curve point each."""
 
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One result of a method."""
+    """Error and computing time of one method for a scene."""
 
     method: str
     time_s: float
     """Processor time [s]."""
     error: float
-    """Largest relative error of the four responses."""
+    """Largest relative error of the responses I and II of x and p."""
     response_i: float
     response_ii: float
     is_stated: bool
-    """Whether the method estimates its error; otherwise ``error`` is the difference from the best result."""
+    """Whether the method estimates its error; else ``error`` is the deviation from the refined result."""
     is_chosen: bool = False
-    """Whether this is the result for the requested error and time."""
+    """Whether `refine_scene` returns this result for the scene's requested error and time."""
 
 
 Answer = tuple[Floats, float | None]
-"""The four responses, and their largest relative error; None if the method gives no estimate."""
+"""Responses I and II of x, then of p; and their largest relative error, None if it is not estimated."""
 
 
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
-    """Yield the results of all suitable methods for a scene with a target.
+    """Yield error and computing time of all suitable methods for a scene with a target.
 
-    The first results are those of `refine_scene` up to the target. Raises ValueError when the scene has no
-    target, or cannot be simulated.
+    The first points are the successive results of `refine_scene`, until the target is met. Raises ValueError
+    when the scene has no target, or cannot be simulated.
     """
-    next(refine_scene(scene))  # not timed, because it includes one-time work of the process
+    next(refine_scene(scene))  # not timed: includes work done only once per process
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
     for found in refine_scene(scene):
         refined.append(found)

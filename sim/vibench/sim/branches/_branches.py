@@ -1,4 +1,4 @@
-"""Branches of exact motions and of harmonic balances, found by a search and at bifurcations."""
+"""Branches of exact motions and of harmonic balances, found by a search or at bifurcations."""
 
 import math
 import time
@@ -31,12 +31,12 @@ from ..specimen.state import Floats, Vector
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 INTERPOLATED = 0.06
-"""Largest distance of a branch from the chord between two of its points, over the length of the chord; set by
-the largest rotation of the tangent."""
+"""Largest distance of a branch from the chord between two neighbouring points, over the chord's length;
+follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
-"""Additional allowed distance, over the scale of a state."""
+"""Distance, in scaled states, that `lies_on` allows in addition for rounding."""
 LENGTHS = 10.0
-"""Length of the parameter range, in the scaled units in which branches are followed."""
+"""Length of the parameter range in the scaled units of branch following."""
 
 
 class BranchOrigin(StrEnum):
@@ -70,7 +70,7 @@ class FoundBranch:
 
 
 def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats) -> bool:
-    """Return whether any of the states at one drive, shape (n, 6), is on a branch."""
+    """Return whether a branch contains any of the states, shape (n, 6), at one drive."""
     branch, value = found.branch, parameter_value(path, drive)
     scales = state_scales(specimen, drive)
     along = branch.parameters
@@ -87,18 +87,18 @@ def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harm
 
 
 M = TypeVar("M")
-"""Type of a motion, which depends on the method by which it is found."""
+"""Type of a motion: `PeriodicOrbit` from shooting, or `Balance` from harmonic balance."""
 
 
 @dataclass(frozen=True, eq=False)
 class BranchStart(Generic[M]):
-    """A motion at which a branch may be started."""
+    """Motion from which a branch is followed if no known branch contains it."""
 
     motion: M
     origin: BranchOrigin
     drive: Harmonic
     states: Floats
-    """States once per drive period of the motion and, if known, of its mirror image, shape (n, 6)."""
+    """States once per drive period, of the motion and (if known) of its mirror image, shape (n, 6)."""
 
 
 def branches_from(
@@ -111,7 +111,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches from starts that are on no known branch and from bifurcations, until a time limit."""
+    """Yield branches from starts on no known branch, and branches leaving these, until a time limit."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -132,11 +132,11 @@ def branches_from(
 
 SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Distances of the state from a bifurcation in the search for a new branch, over the gap."""
+"""Distances of the first guess from the state at a bifurcation, over the gap, when switching branches."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Distances of the parameter from a bifurcation in this search, over the range."""
+"""Distances of the parameter from the bifurcation at which branches are switched, over the range."""
 LEFT = 1e-4
-"""Distance from a simpler motion, over the gap, above which a motion is a different motion."""
+"""Distance from the branch being left, over the gap, above which a motion lies on the new branch."""
 SWITCHED = {
     BifurcationKind.SYMMETRY_BREAKING: BranchOrigin.SYMMETRY_BREAKING,
     BifurcationKind.PERIOD_DOUBLING: BranchOrigin.PERIOD_DOUBLING,
@@ -164,11 +164,11 @@ def shot_branches(
     search
         Settings of the search. It may miss branches; more starts find more branches.
     steps
-        Step lengths and tolerances; the range is ten units long, and a displacement of one gap is one unit.
+        Step lengths and tolerances. In their units the range is 10 long, and one gap of displacement is 1.
 
     Yields
     ------
-    Branches with stability, events and error of each point; chaotic and quasi-periodic motions are not
+    Branches with stability, events and error of each point. Chaotic and quasi-periodic motions are not
     included.
     """
     steps = replace(steps, until_s=time.monotonic() + search.time_s)
@@ -206,7 +206,7 @@ def _branch_switches(
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
-        # If two branches meet at a bifurcation, switch only from the branch of simpler motions.
+        # Two branches meet at a bifurcation. Switch only from the branch with the simpler motion.
         is_own = (event.kind is BifurcationKind.SYMMETRY_BREAKING) == (found.shape is OrbitShape.MIRRORED)
         if not leaves or not is_own:
             continue
@@ -241,27 +241,27 @@ def _has_left(orbit: PeriodicOrbit) -> bool:
 
 
 def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
-    """Return the scaled eigenvector of the multiplier nearest to -1, shape (6,); its largest entry is 1."""
+    """Return the scaled eigenvector of the Floquet multiplier nearest to -1, shape (6,); largest entry 1."""
     values, vectors = np.linalg.eig(mapping.derivative(state, drive))
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(direction / np.abs(direction).max())
 
 
 UPDATES_TO_HOLD = 10.0
-"""Shortest growth time (by a factor of e) of a motion that a control loop can stabilise, in loop updates."""
+"""Smallest number of loop updates, per growth by a factor of e, with which a loop stabilises a motion."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
-    """Return the time in which a small perturbation of a motion grows by e [s]; infinite if stable.
+    """Return the time in which a small perturbation of a periodic motion grows by e [s]; infinite if stable.
 
-    It is T / ln|mu| with the period T of the motion, for a prescribed motion of the base.
+    It is T / ln|mu| with the period T of the motion and its largest multiplier mu, for a given base motion.
 
     Parameters
     ----------
     frequency_hz
-        Drive frequency.
+        Drive frequency [Hz], of any shape.
     multiplier
-        Magnitude of the largest Floquet multiplier over the whole period of the motion, of the same shape.
+        Magnitude of the largest Floquet multiplier over one period of the motion, same shape.
     periods
         Period of the motion in drive periods.
     """
@@ -272,14 +272,14 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
 
 
 def least_growth_time_s(loop_time_s: float) -> float:
-    """Return the shortest growth time of a motion that a control loop can stabilise [s].
+    """Return the shortest growth time of an unstable motion that a control loop can stabilise [s].
 
     Raises ValueError when ``loop_time_s`` is not positive and finite.
 
     Parameters
     ----------
     loop_time_s
-        Latency from motion to drive [s].
+        Delay of the loop, from the motion to the corrected drive [s].
     """
     if not 0.0 < loop_time_s < math.inf:
         raise ValueError(f"A loop time of {loop_time_s} s is not allowed: give a positive, finite time.")

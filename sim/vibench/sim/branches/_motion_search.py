@@ -19,16 +19,16 @@ from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats, Vector
 
 SETTLED = 1e-3
-"""Relative change per period below which Newton's iteration is started."""
+"""Relative change of the state per period below which Newton's iteration is started."""
 SAME_MOTION = 1e-5
-"""Relative distance at the same drive phase below which two motions are equal."""
+"""Relative distance of states at the same drive phase below which two motions are the same."""
 SIMPLER = 1e-6
-"""Relative distance below which a motion is a motion of half the period, or mirrored."""
+"""Relative distance below which a motion counts as one of half the period, or as its own mirror image."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
-"""Range of p in random starts, over each gap."""
+"""Largest abs(p) of random starts, over each gap."""
 RANDOM_REACH = 3.0
-"""Range of the other coordinates, over the gap or, if larger, the motion without stops."""
+"""Largest x and z of random starts, over the gap or over the motion without stops, whichever is larger."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,14 @@ class MotionSearch:
     places: int = 8
     """Number of evenly spaced values of the parameter at which to search, including the ends."""
     starts: int = 12
-    """Number of random starts at each value, in addition to rest."""
+    """Number of random starts at each value, in addition to rest and the motion between the stops."""
     settling_periods: int = 300
     most_periods: int = 4
     """Longest period of a motion, in drive periods."""
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Time limit for search and branches [s]; at the limit, the current branch ends at its last point."""
+    """Time limit for the whole search and all branches [s]; the branch in progress is then cut off."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -63,10 +63,10 @@ class MotionSearch:
 def periodic_motions(
     specimen: Specimen, drive: Harmonic, search: MotionSearch, until_s: float = math.inf
 ) -> Iterator[PeriodicOrbit]:
-    """Yield periodic motions at one drive, which are mainly stable.
+    """Yield periodic motions at one drive, most of them stable.
 
     Each start is integrated for ``search.settling_periods``. If the motion then nearly repeats, Newton's
-    iteration finds the exact motion. Of a motion and its mirror image, only one is returned.
+    iteration finds the exact periodic motion. A motion and its mirror image are yielded as one.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def periodic_motions(
     search
         Settings of the search, such as the number of starts.
     until_s
-        Time limit as a value of `time.monotonic`; then no further start is tried [s].
+        Time limit as a value of `time.monotonic` [s]; after it no further start is tried.
     """
     scales = state_scales(specimen, drive)
     met: list[Floats] = []
@@ -123,7 +123,7 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
 def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
     """Return a random state with m1 between the stops, drawn by ``rng``, shape (6,) [m, m/s].
 
-    Displacements of m0 and m2 are within three times the gap or, if larger, three times the motion without
+    x and z are within three times the gap or, if larger, three times the amplitude of the motion without
     stops. Velocities are within this range times 2 pi f.
     """
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
@@ -162,7 +162,7 @@ def _orbit_from(
 
 
 def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
-    """Return the simplest motion of ``periods`` drive periods that shooting finds from a state, or None."""
+    """Return the simplest motion of ``periods`` drive periods found by shooting from a state, or None."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
     if lower == upper and periods % 2 == 1:
@@ -177,7 +177,7 @@ def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: i
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Return a motion as a fixed point of the shortest possible map."""
+    """Return a motion as a fixed point of the map over the shortest possible time."""
     mapping = orbit.period_map.simpler
     while mapping is not None:
         off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(
