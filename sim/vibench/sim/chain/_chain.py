@@ -16,7 +16,7 @@ from ..specimen.stops import Strict
 MASSES_PER_CELL = 3
 """Number of masses of a cell: m0, m1, m2 with displacements x, y, z."""
 MOST_CELLS = 1000
-"""Largest number of cells; the modes of more do not fit into ordinary memory."""
+"""Largest number of cells; the modal matrices of a longer chain do not fit into ordinary memory."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Chain(Strict):
 
     @property
     def size(self) -> int:
-        """Return the number of cells."""
+        """Number of cells."""
         return len(self.cells)
 
     @property
@@ -82,7 +82,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
 
 
 def _assemble(links: list[Triple]) -> Matrix:
-    """Return the matrix of all springs or dampers from links 0, 1, 2 of every cell."""
+    """Return the matrix of all springs or dampers from links i = 0, 1, 2 (k_i or c_i) of every cell."""
     size = MASSES_PER_CELL * len(links)
     matrix = np.zeros((size, size))
     for cell, (outer, inner, middle) in enumerate(links):

@@ -21,11 +21,11 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Relative width below which a gap is due to rounding; such gaps occur for units of several equal cells."""
+"""Relative width below which a band gap is a rounding error, as between equal cells within one unit."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Return the ratio of the motions of successive units, for the outgoing or decaying wave.
+    """Return the ratio of the motion of a unit to that of the unit before, for the outgoing or decaying wave.
 
     Raises ValueError when a frequency is not positive.
 
@@ -100,7 +100,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
         raise ValueError("A wave number that is not finite is not allowed: give radians per unit.")
     root = np.sqrt(unit.masses)
     first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
-    # The first cell is coupled to the last cell of the previous unit, whose phase lags.
+    # The first cell is coupled to the last cell of the previous unit, which lags by the phase.
     stiffness = np.tile(unit.stiffness_matrix.astype(np.complex128), (len(phase), 1, 1))
     stiffness[:, last, last] += link
     stiffness[:, first, last] -= link * np.exp(-1j * phase)
@@ -110,7 +110,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
 
 
 class BandGap(NamedTuple):
-    """Frequency range in which no wave propagates [Hz]; the last gap has no upper end."""
+    """Frequency range in which no wave propagates [Hz]; the upper end of the last gap is infinite."""
 
     lower_hz: float
     upper_hz: float
@@ -119,7 +119,7 @@ class BandGap(NamedTuple):
 def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
     """Return the band gaps of the infinite chain without damping and contact.
 
-    Cells are coupled in one displacement only, so each band is monotone and ends at mu = 0 and mu = pi.
+    Units are coupled in one displacement only. Each band is therefore monotone in mu, from mu = 0 to mu = pi.
     """
     ends = band_frequencies_hz(unit, [0.0, np.pi])
     lowest, highest = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
@@ -148,7 +148,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     """
     omega = angular_frequencies(frequency_hz)
     cells = [reduce_to_m0(cell, omega) for cell in chain.cells]
-    # Begin at the free end: reduce each cell and all cells behind it to a stiffness at its m0.
+    # Start at the free end. Reduce each cell, with all cells behind it, to a dynamic stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
         seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))

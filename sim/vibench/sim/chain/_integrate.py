@@ -20,7 +20,7 @@ from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces
 STATES_PER_CELL = 6
 """Number of state variables of a cell: x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
-"""Largest number of windows of a run; `check_work` rejects far shorter runs already."""
+"""Largest number of windows of a run; `check_work` usually refuses much shorter runs first."""
 
 
 class ChainRun:
@@ -78,17 +78,17 @@ class ChainRun:
         native_engine().call("start_chain", self._motion)
 
     def drive_by(self, pieces: Pieces) -> None:
-        """Use piecewise polynomials instead of the harmonic drive from now on."""
+        """Replace the harmonic drive by piecewise polynomials from now on."""
         native_engine().fill(
             self._motion, pieces=pieces.terms, piece_start=pieces.start_s, piece_length=pieces.length_s
         )
 
     def watch(self, what: Watch) -> None:
-        """Set what is observed from now on."""
+        """Set the quantities to observe from now on."""
         self._motion["watch"] = what
 
     def advance(self, until_s: float) -> Outcome:
-        """Advance to a time [s] and return the outcome; a time in the past changes nothing."""
+        """Advance to a time [s] and return the outcome; do nothing if the time has already passed."""
         self._motion["until"] = until_s
         return Outcome(native_engine().call("follow_chain", self._motion))
 
@@ -115,12 +115,12 @@ class ChainRun:
 
     @property
     def impact_times_s(self) -> Floats:
-        """Start times of contacts, in ascending order except within a window, shape (count,) [s]."""
+        """Start times of the contacts, shape (count,) [s]; not sorted within a window."""
         return self._times[: self.impacts]
 
     @property
     def impact_cells(self) -> NDArray[np.int64]:
-        """Cells of the contacts, in the order of `impact_times_s`, shape (count,)."""
+        """Index of the cell of each contact, in the order of `impact_times_s`, shape (count,)."""
         return self._places[: self.impacts].astype(np.int64)
 
     def samples(self, outcome: Outcome) -> Floats:
@@ -128,13 +128,13 @@ class ChainRun:
         kept = int(self._motion["samples_kept"])
         if outcome is not Outcome.REACHED_END:
             return self._samples[:kept]
-        # Rounding may place the last sample just after the end.
+        # Rounding may place the last sample time just after the end of the run.
         self._samples[kept:] = self.motion
         return self._samples
 
 
 MOST_CELL_WINDOWS = 10**10
-"""Largest number of windows times cells of a run; a longer run would take hours."""
+"""Largest product of windows and cells of a run; larger runs would take hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,10 +184,10 @@ def integrate_chain(
 ) -> ChainTrajectory:
     """Integrate a chain of cells under a drive.
 
-    Motion without contact is exact: a harmonic drive in closed form, other drives as piecewise polynomials.
-    Bounds ensure that no contact is missed. Contacts, in any number of cells at once, are integrated with the
-    tolerance of ``accuracy``. Sampling changes no step. A single cell uses `vibench.sim.motion`. Raises
-    ValueError when an argument is not allowed, the run would take hours, or the drive ends before the run.
+    Motion without contact is exact for a harmonic drive; other drives are piecewise polynomials. Bounds on p
+    ensure that no contact is missed. Contacts, in any number of cells at once, are integrated with the
+    tolerance of ``accuracy``. Sampling does not change the time steps. A single cell is integrated by
+    `vibench.sim.motion`. Raises ValueError when an argument is not allowed, the run would take hours, or the
 
     Parameters
     ----------
@@ -237,12 +237,12 @@ def integrate_chain(
 
 
 def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
-    """Raise ValueError for a run that would take hours with windows of ``window_s``."""
+    """Raise ValueError if a run with windows of ``window_s`` [s] would take hours."""
     work = duration_s / window_s * chain.size
     if work > MOST_CELL_WINDOWS:
         raise ValueError(
-            f"{duration_s:g} s of {chain.size} cells are not allowed: they need {work:.2g} windows of "
-            f"{window_s:.2g} s, counted for each cell; at most {MOST_CELL_WINDOWS:.0e} are allowed. "
+            f"{duration_s:g} s of {chain.size} cells are not allowed: they need {work:.2g} cell windows of "
+            f"{window_s:.2g} s (windows times cells); at most {MOST_CELL_WINDOWS:.0e} are allowed. "
             "Shorten the run, or lower the highest frequency of drive and cells."
         )
 
@@ -276,7 +276,7 @@ def _of_one(run: Trajectory) -> ChainTrajectory:
 
 
 def most_chain_impacts(chain: Chain, rate_hz: float, duration_s: float) -> int:
-    """Return the largest number of impacts in a run, from the largest mean impact rate per cell.
+    """Return the number of impacts at which a run ends, from the allowed mean impact rate per cell [1/s].
 
     Raises ValueError when the rate is not allowed.
     """

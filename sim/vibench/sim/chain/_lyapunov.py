@@ -2,8 +2,8 @@
 
 Two motions a small distance apart are integrated. After every interval their distance in the energy norm is
 recorded, and the second motion is moved back to the small distance along the line between them (Benettin,
-Galgani and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The distance
-must be far above the error of a contact and far below the size of the motion: use REFERENCE accuracy.
+Galgani and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The small
+distance must be far above the integration error and far below the motion's size: use REFERENCE accuracy.
 """
 
 import math
@@ -24,11 +24,11 @@ from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impact
 from ._tables import chain_tables, longest_window_s
 
 NEARNESS = 1e-6
-"""Distance between the two motions, over the size of the first."""
+"""Small distance between the two motions, over the size of the first motion."""
 SHORTEST_INTERVAL_S = 5e-3
-"""Shortest interval [s]; with an exponent of 100 per second, the distance grows by a factor below 2."""
+"""Shortest interval [s]; in it, the distance grows by less than 2 even for an exponent of 100 per second."""
 FEWEST_INTERVALS = 32
-"""Fewest intervals in the duration, for the estimate of the error of the mean."""
+"""Smallest number of intervals from which the error of the mean is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +41,13 @@ class ChainExponent:
     """Mean growth rate of the distance [1/s]; negative if neighbouring motions converge."""
     standard_error_per_s: float
     blocks: BlockedMean | None
-    """Mean and error estimated from blocks [1/s]."""
+    """Mean growth rate and its error from blocks of intervals [1/s]; None if the run did not finish."""
     interval_s: float
     """Length of an interval, in whole drive periods [s]."""
     local_exponents_per_s: Floats
     """Growth rate in each interval after settling, shape (n,) [1/s]."""
     impacts: int
-    """Number of impacts of all cells in these intervals."""
+    """Number of impacts of all cells in the intervals after settling."""
     final_state: Floats
     """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6)."""
     outcome: Outcome
@@ -74,7 +74,7 @@ def chain_lyapunov_exponent(
     chain, drive, accuracy, initial_state, max_impact_rate_hz
         As in `vibench.sim.chain.integrate_chain`.
     duration_s, settle_s
-        Averaging time of the exponent, and time before it for reaching the attractor [s].
+        Averaging time of the exponent [s], and preceding time in which the motion settles [s].
     seed
         Seed of the initial direction from the first to the second motion.
     """
@@ -87,7 +87,7 @@ def chain_lyapunov_exponent(
             f"it must be finite and contain {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
     tables = chain_tables(chain, drive, accuracy)
-    # The limit applies to both motions together.
+    # The work limit applies to the sum of both motions.
     check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
@@ -144,7 +144,7 @@ def chain_lyapunov_exponent(
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
     """Return the second motion moved to the small distance from the first, on the line between them."""
     apart = second - first
-    # The size is at least that of displacing all masses by the drive amplitude, because of starts at rest.
+    # Compare at least with a displacement of all masses by the drive amplitude: at rest the size is zero.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))

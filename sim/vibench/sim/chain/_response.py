@@ -31,13 +31,13 @@ class ChainResponse:
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """Length of the window at the end of the run, over which largest values are taken [s]."""
+    """Length of the window at the end of the run from which `largest_m` is taken [s]."""
     line_periods: int
-    """Number of whole drive periods at the end of the window, over which lines are taken."""
+    """Number of whole drive periods, at the end of the window, from which `lines_m` is computed."""
     largest_m: Floats
     """Largest abs(x) and abs(p), p = y - z, of every cell in the window, shape (cells, 2)."""
     lines_m: Complex
-    """Components of x, y, z and p at the drive frequency, q = Re(line exp(i (omega t + phase))),
+    """Spectral lines of x, y, z and p at the drive frequency, q = Re(line exp(i (omega t + phase))),
     shape (cells, 4).
     """
     impacts: NDArray[np.int64]
@@ -45,7 +45,7 @@ class ChainResponse:
     impacts_before: NDArray[np.int64]
     """Number of contacts that began before the window, for every cell, shape (cells,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz of every cell at the end, as the start of another run, shape (cells, 6)."""
+    """x, y, z, vx, vy, vz of every cell at the end; initial state for a continued run, shape (cells, 6)."""
     outcome: Outcome
 
     @property
@@ -78,9 +78,9 @@ def chain_response(
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
-        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the observed part at the end.
+        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the evaluated part at the end.
     initial_state
-        Initial state of every cell, shape (cells, 6); None for rest.
+        Initial state of every cell, shape (cells, 6) [m, m/s]; None for rest.
     """
     accuracy = chosen(Accuracy, accuracy)
     if chain.size == 1:
@@ -106,7 +106,7 @@ def chain_response(
             run.watch(watch)
             outcome = run.advance(until)
     end = cmath.exp(-1j * (2.0 * math.pi * drive.frequency_hz * duration_s + drive.phase_rad))
-    # Over whole periods exp(-i omega t) returns to its start.
+    # exp(-i omega t) is the same at the start and the end, because the time is a whole number of periods.
     change = np.asarray((run.motion - line_start) * end, dtype=np.complex128)
     lines = _lines(chain, drive, run.forces, change, line_s)
     void = 1.0 if outcome is Outcome.REACHED_END else math.nan
@@ -135,7 +135,7 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
     (m0, _, _), (k0, _, k2), (c0, _, c2) = cell.masses, cell.stiffnesses, cell.dampings
     end = cmath.exp(-1j * (omega * one.duration_s + drive.phase_rad))
-    # Over whole periods exp(-i omega t) returns to its start.
+    # exp(-i omega t) is the same at the start and the end, because the time is a whole number of periods.
     change = (one.final_state - one.line_start_state) * end * 2.0 / line_s
     x, p, base = one.line_x_m, one.line_p_m, -1j * drive.amplitude_m
     moved = change[0] + 1j * omega * x
@@ -158,7 +158,7 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
 
 
 def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:
-    """Return the components of x, y, z and p at the drive frequency from the forces, shape (cells, 4).
+    """Return the spectral lines of x, y, z and p at the drive frequency from the forces, shape (cells, 4).
 
     M q'' + C q' + K q = f - F is multiplied by exp(-i omega t) and integrated by parts over whole periods.
     The result is (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of
@@ -171,9 +171,9 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     forces
         Integral of the contact force of each cell times exp(-i omega t), shape (cells,) [N s].
     change
-        Change of the state over the time of integration, times exp(-i omega t), shape (cells, 6).
+        Change of the state over the ``line_s``, times exp(-i omega t), shape (cells, 6).
     line_s
-        Time of integration [s].
+        Time of integration, a whole number of drive periods [s].
     """
     omega = 2.0 * math.pi * drive.frequency_hz
     first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix
@@ -192,8 +192,8 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> Floats:
     """Return the energy of every cell, shape (..., cells) [J].
 
-    It includes masses, springs with the link to the previous cell, and stops; a Hunt-Crossley contact stores
-    the energy of its Hertz spring. Without damping and with the base at rest, the sum over cells is constant.
+    It is the energy of masses, springs (with the link to the previous cell) and stops. A Hunt-Crossley
+    contact stores the energy of its Hertz spring. Without damping and base motion, the sum is constant.
 
     Parameters
     ----------
@@ -217,11 +217,11 @@ def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> 
 
 
 class MeanEnergies(NamedTuple):
-    """Mean energy of every cell over a run, shape (cells,) each."""
+    """Time average of the energy of every cell, shape (cells,) each."""
 
     mean_j: Floats
     standard_error_j: Floats
-    """Standard error of the mean, from independent blocks."""
+    """Standard error of the mean, from uncorrelated blocks."""
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:

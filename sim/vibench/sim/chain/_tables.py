@@ -18,27 +18,27 @@ from ..specimen.state import Table, Vector
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2
-"""Longest window times the fastest rate of chain and drive [rad]; the tenth integral of a force is then
-1.4e-12 of the first."""
+"""Largest product of window length and fastest rate of chain and drive [rad]. The tenth integral of a force
+is then 1.4e-12 of the first."""
 COLLISION_TURN = 0.4
-"""The same for windows with whole collisions; the tenth integral is then 7e-10 of the first."""
+"""`WINDOW_TURN` for windows that contain whole collisions; the tenth integral is then 7e-10 of the first."""
 WHOLE_COLLISIONS = 1e-7
-"""Smallest tolerance at which collisions are evaluated as a whole, as in native/collision.hpp."""
+"""Smallest tolerance at which a collision is computed in one piece, as in native/collision.hpp."""
 MARKOV_TERMS = 11
-"""Number of Taylor coefficients of the chain's response to a unit impulse in a cell."""
+"""Number of Taylor coefficients of the chain's response to a unit impulse in one cell."""
 REACH = MARKOV_TERMS
-"""Number of cells on each side that are reached by this response within these terms."""
+"""Number of cells on each side of the impulse that this truncated response reaches."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Largest neglected effect of a force in one cell on the velocity of another cell within a window, over the
-tolerance."""
+"""Largest allowed effect of a contact force on the velocity of another cell in the same window, over the
+tolerance; smaller effects are neglected."""
 MOST_HALVINGS = 20
 KEPT = 2
 """Number of window lengths tried before the shortest length."""
 
 
 class ChainTables(NamedTuple):
-    """Engine structures of the cells, and window lengths of a chain."""
+    """Engine structures of the cells, and window lengths for a chain and a drive."""
 
     kinds: Structure
     """One `CellKind` of native/structures.hpp for each kind of cell."""
@@ -49,7 +49,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """Largest distance of two cells that may not both be in contact in such a window, shape (windows,)."""
+    """Cells this many places apart, or closer, may not both be in contact in the window, shape (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
@@ -71,8 +71,8 @@ def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
 def _fastest(chain: Chain, drive: Drive) -> float:
     """Return an upper bound on the rates of all modes and of a harmonic drive [1/s].
 
-    The rate of an oscillating mode is that of its undamped shape; the rate of an overdamped mode is at most
-    that of its damping alone.
+    The rate of an oscillating mode is at most the highest undamped angular frequency; the rate of an
+    overdamped mode is at most that of the dampers alone.
     """
     root = np.sqrt(chain.masses)
     creeping = float(np.linalg.eigvalsh(chain.damping_matrix / np.outer(root, root))[-1])
@@ -81,9 +81,9 @@ def _fastest(chain: Chain, drive: Drive) -> float:
 
 
 def markov_between(chain: Chain) -> Table:
-    """Return Taylor coefficients of p of every cell after a unit impulse in a nearby cell.
+    """Return Taylor coefficients in time of p of every cell after a unit impulse in a nearby cell.
 
-    Shape (MARKOV_TERMS, 2 REACH + 1, cells). The second axis is the offset from the cell with the impulse.
+    Shape (MARKOV_TERMS, 2 REACH + 1, cells). The second axis is the distance from the cell with the impulse.
     """
     path, places = _answers(chain, np.ones((chain.size, COLUMNS))), np.arange(chain.size)
     answers = np.zeros((MARKOV_TERMS, COLUMNS, chain.size))
@@ -94,9 +94,9 @@ def markov_between(chain: Chain) -> Table:
 
 
 def _answers(chain: Chain, moves: Table) -> Table:
-    """Return Taylor coefficients of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
+    """Return Taylor coefficients in time of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
 
-    Impulses that cannot affect the same cell share a column. ``moves`` is 0 for fixed cells, otherwise 1.
+    Impulses too far apart to affect the same cell share a column. ``moves`` is 0 for fixed cells, else 1.
     """
     places, masses = np.arange(chain.size), chain.masses.reshape(chain.size, MASSES_PER_CELL)
     rates = np.zeros((MASSES_PER_CELL, chain.size, COLUMNS))
@@ -131,9 +131,9 @@ def _stretches(motion: Table) -> tuple[Table, Table, Table]:
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Return a bound on dp/dt of other cells in a window after an impulse, over dp/dt of the own cell.
+    """Return bounds on dp/dt of other cells after an impulse, within a window, over dp/dt of the cell itself.
 
-    Shape (REACH + 1,): entry d is the largest value for cells at distance d; entry 0 is not used.
+    Shape (REACH + 1,): entry d is the bound for cells at distance d; entry 0 is not used.
     """
     own = between[1, REACH]
     relative = np.max(_answer_within(between, window) / own, axis=1)
@@ -141,7 +141,7 @@ def cross_answers(between: Table, window: float) -> Vector:
 
 
 def _answer_within(coefficients: Table, window: float) -> Table:
-    """Return a bound on the rate of a series in a window; its Taylor coefficients are on the first axis."""
+    """Return a bound on d/dt of Taylor series (coefficients on the first axis) within a window [s]."""
     orders = range(1, MARKOV_TERMS)
     return np.asarray(
         sum(np.abs(coefficients[k]) * window ** (k - 1) / math.factorial(k - 1) for k in orders)
@@ -149,7 +149,7 @@ def _answer_within(coefficients: Table, window: float) -> Table:
 
 
 def _back_action(chain: Chain, between: Table, window: float) -> float:
-    """Return a bound on the relative effect of an impulse on its own cell that returns via its neighbours."""
+    """Return a bound on the part of a cell's velocity that returns from its neighbours in a window."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
     alone = _answers(chain, only_itself * 1.0)[:, places, places % COLUMNS]
@@ -160,8 +160,8 @@ def _back_action(chain: Chain, between: Table, window: float) -> float:
 def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Vector, Vector]:
     """Return the window lengths, and for each the distance within which only one cell may be in contact.
 
-    In the shortest window even neighbours may be in contact. Each cell is integrated as if its neighbours did
-    not react, which must cause a negligible error in every window.
+    In the shortest window even neighbours may both be in contact. In every window a cell in contact is
+    integrated as if its neighbours did not react; windows are shortened until this error is negligible.
     """
     between = markov_between(chain)
     shortened = 1.0
@@ -184,13 +184,13 @@ def _clash(answers: Vector, allowed: float) -> int:
     return max((d for d in range(1, len(answers)) if answers[d] > allowed), default=0)
 
 
-# Force of the base on the first m0, k0 U + c0 dU/dt, as polynomials on pieces of equal length. SI units.
+# Force of the base on the first m0, k0 U + c0 dU/dt, as polynomials on equal intervals (pieces). SI units.
 #
 # The engine treats harmonic drives exactly. Other drives act as an additional known force
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
-"""Terms of a polynomial: eight Chebyshev points describe a sine on `WINDOW_TURN` with an error of 1e-14."""
+"""Number of polynomial terms; eight Chebyshev points fit a sine over `WINDOW_TURN` radians to 1e-14."""
 ALMOST = 1e-9
 """Tolerance for rounding, over the length of a piece."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
@@ -229,13 +229,13 @@ def pieces_between(
 
 
 def longest_window_s(tables: ChainTables, drive: Drive) -> float:
-    """Return the length of the longest window, at most one piece of the drive [s]."""
+    """Return the length of the longest window [s], which is at most one piece of the drive."""
     window = float(tables.windows[0])
     return window if isinstance(drive, Harmonic) else min(window, _grid(tables, drive)[0])
 
 
 def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:
-    """Return the length [s] and the number of the drive's pieces."""
+    """Return the length [s] and the number of the pieces into which the drive is divided."""
     match drive:
         case Sampled():
             return 1.0 / drive.sample_rate_hz, len(drive.displacement_m) - 1

@@ -1,4 +1,4 @@
-"""Responses of a chain to a requested error or within a requested time. SI units."""
+"""Responses of a chain to a requested relative error or within a requested computing time. SI units."""
 
 import math
 import time
@@ -17,31 +17,31 @@ from ._integrate import integrate_chain
 from ._response import ChainResponse, chain_response
 
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
-"""Approximate length [s] and smallest number of the windows."""
+"""Approximate length of a window [s], and smallest number of windows."""
 FEWEST_PAIRS, STUDENT = 8, 2.365
-"""Fewest pairs of windows for an error estimate, and Student's quantile of a 95 % interval for them."""
+"""Fewest pairs of windows for an error estimate, and Student's t of a 95 % interval for that number."""
 TOLERANCE_PART = 0.1
-"""Share of the requested error that integration may use."""
+"""Largest part of the requested error that may come from the integration."""
 TRIED_S, TRIED_PART = 1e-4, 0.1
-"""Simulated time of the first trial for a slow drive [s], and share of the time limit for trials."""
+"""Simulated time of the first speed trial [s], and largest part of the time limit spent on trials."""
 LONGEST_S = 60.0
-"""Default time limit of refinement [s]."""
+"""Default limit of the computing time [s]."""
 
 
 class TargetedResponse(NamedTuple):
-    """Mean response over the second half of the windows, with errors."""
+    """Mean response over the second half of the run, with errors."""
 
     response: ChainResponse
     errors: Floats
     """Relative errors (95 %) of the transmissibility of every cell, shape (cells,)."""
     followed_s: float
-    """Total length of all windows [s]."""
+    """Simulated time of all windows [s]."""
 
 
 def chain_response_to(
     chain: Chain, drive: Harmonic, error: float | None, time_s: float | None
 ) -> TargetedResponse:
-    """Observe windows until their second half gives the lines to the requested error; return the result.
+    """Extend the run until the second half of its windows gives the requested error; return the response.
 
     Raises ValueError when the computation of one drive period takes longer than ``time_s``.
 
@@ -50,9 +50,9 @@ def chain_response_to(
     chain, drive
         As in `chain_response`; the chain starts from rest.
     error
-        Requested relative error of the transmissibility of every cell; None for as small as possible.
+        Requested relative error of the transmissibility of every cell; None for as small as time allows.
     time_s
-        Time from the call to the result [s]; None for one minute.
+        Limit of the computing time [s]; None for one minute.
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
@@ -62,7 +62,7 @@ def chain_response_to(
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Observe more periods; return whether the run reached its end and time is left for as many again."""
+        """Continue by ``periods``; return whether that succeeded and time is left to repeat it."""
         before_s, length_s = time.monotonic(), periods / drive.frequency_hz
         state = seen[-1].final_state if seen else None
         seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
@@ -72,7 +72,7 @@ def chain_response_to(
 
     if most == 1:
         _require_one_period(chain, drive, accuracy, limit_s)
-    # A whole window may take longer than the time limit: begin with one period.
+    # A whole window may take longer than the time limit, so start with one drive period.
     periods, goes_on = 1, follows(1)
     while goes_on and periods < most:
         periods = min(2 * periods, most)
@@ -96,7 +96,7 @@ def chain_response_to(
 
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Raise ValueError if the time is too short for one drive period, from trials of increasing length."""
+    """Raise ValueError if one drive period takes longer than the limit, judged by trials of rising length."""
     integrate_chain(chain, drive, TRIED_S, accuracy)  # first call, which prepares the engine
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
@@ -115,9 +115,9 @@ def _errors(windows: Sequence[ChainResponse]) -> Floats:
 
 
 def error_of_lines(lines: Complex) -> Floats:
-    """Return the relative error of the amplitude of the mean of lines of shape (windows, cells).
+    """Return the relative error of the mean amplitude of spectral lines of shape (windows, cells).
 
-    It is the larger of Student's interval over pairs of windows and, for settling, the change between halves.
+    It is the larger of Student's interval over pairs of windows and the difference of the two half means.
     """
     count = len(lines) // 2
     if count < FEWEST_PAIRS:
