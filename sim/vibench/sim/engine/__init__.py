@@ -1,7 +1,7 @@
 """The native engine, compiled from the C++ in native/: motions, chains, filters, the virtual rig.
 
-`NativeRun` integrates a motion of a specimen under a harmonic drive. The library is chosen for the processor,
-loaded once, and checked with a known scene (docs/decisions/0077-native-engine.md). Python prepares modal
+`NativeRun` integrates a motion of a specimen under a harmonic drive. The library that suits the processor is
+loaded once and checked with a known scene (docs/decisions/0077-native-engine.md). Python prepares modal
 forms and the tables for collisions and time steps. `CubicRun` integrates a motion under sweeps and
 recordings: base motions given by cubic polynomials on equal intervals.
 

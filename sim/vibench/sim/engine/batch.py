@@ -1,6 +1,6 @@
 """SIMD batches: integrate eight motions of one specimen at the same time.
 
-native/batch.hpp supports Hertz contacts at the accuracies *quick* and *standard*, and returns the states once
+native/batch.hpp supports Hertz contacts at the accuracies *quick* and *standard*. It returns the state once
 per drive period (docs/decisions/0061-lanes.md). SI units.
 """
 
@@ -38,35 +38,35 @@ from .shapes import (
 
 # Fit of the polynomials with which a batch computes Hertz collisions (native/collision_fit.hpp). SI units.
 #
-# In units of the depth and the time u of a free collision at the same speed, a collision depends only on u
-# and on the acceleration due to all other springs. The variables of the fit are this acceleration and its
-# first four derivatives in the middle of the collision, and u. The polynomials give the duration and the
-# moments of the force about the middle. They are fitted to collisions solved at sixteen Gauss points.
+# Scale a collision by the depth and the time u that it would have at the same speed without other forces. It
+# then depends only on u and on the acceleration due to all other springs. The variables of the fit are u, and
+# this acceleration with its first four derivatives in the middle of the collision. The polynomials give the
+# duration and the moments of the force about the middle. They are fitted to collisions solved exactly.
 
 MIDDLE = 1.47
-"""Time of the middle of a collision after its start, in u."""
+"""Time from the start to the middle of a collision, in u."""
 DERIVATIVES = 5
-"""Number of variables for the acceleration: the acceleration and four derivatives."""
+"""Number of variables for the acceleration: its value and its first four derivatives."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Range of fitted speeds, over the gap times the fastest modal rate."""
+"""Range of approach speeds covered by the fit, over the gap times the fastest modal rate."""
 HARDEST_PRESS = 0.24
-"""Largest fitted acceleration in both directions, over speed / u."""
+"""Largest magnitude of the acceleration due to other springs covered by the fit, over speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest first derivative over speed / u^2, and ratio of later derivatives to the one before (paper)."""
+"""Largest first derivative over speed / u^2; largest ratio of successive derivatives (paper's specimen)."""
 PAPER_TURN = 0.053
 """Fastest modal rate times u [rad], for the paper's specimen in the middle of the range of speeds."""
 SLOWEST_TURN = 0.15
-"""Largest product of the fastest modal rate and u [rad]; a collision lasts about three times u."""
+"""Largest fastest modal rate times u [rad] for which a fit is made; a collision lasts about three u."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1
 NEWTON_STEPS = 8
 FIT_ERROR = 2e-7
-"""Largest allowed error of the speed after a collision, over the speed before."""
+"""Largest allowed error of the speed after a collision, over the speed before it."""
 GUESS_POINTS = 64
 
 
@@ -74,9 +74,9 @@ _ONE_THREAD = Lock()
 
 
 def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the `CollisionFit` of native/structures.hpp, which takes about one second per specimen.
+    """Return the `CollisionFit` of native/structures.hpp for a specimen; it takes about one second.
 
-    None if the stops are too soft or the fit is not accurate enough.
+    Return None if the stops are too soft or the fit is not accurate enough.
     """
     with _ONE_THREAD:
         return _collision_fit(engine, specimen)
@@ -84,14 +84,14 @@ def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
 
 @lru_cache(maxsize=8)
 def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the fit to random collisions in a box of the variables; None as in `collision_fit`."""
+    """Return a fit to random collisions within the ranges of the variables, or None as `collision_fit`."""
     middle, half = _box(specimen)
     if not np.all(half > 0.0) or _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
         return None
     rng = np.random.default_rng(SEED)
     count = COLLISIONS + CHECKED
     places = rng.uniform(-1.0, 1.0, (count, VARIABLES))
-    # Concentrate the points near the ends, as Chebyshev points are.
+    # Place more collisions near the ends of the ranges, like Chebyshev points.
     places[:COLLISIONS] = np.sin(0.5 * math.pi * places[:COLLISIONS])
     variables = middle + half * places
     solved = _solve(variables[:, :DERIVATIVES], variables[:, -1], _coupling(specimen))
@@ -127,7 +127,7 @@ def _time_over_fifth_root(specimen: Specimen) -> float:
 
 
 def _box(specimen: Specimen) -> tuple[Vector, Vector]:
-    """Return the middle and the half width of the range of each variable of the fit."""
+    """Return the centre and the half width of the range of each variable of the fit, shape (6,) each."""
     unit = min(specimen.gaps_m) * _fastest(specimen)
     shortest, longest = (
         _time_over_fifth_root(specimen) * (part * unit) ** -0.2 for part in (FASTEST, SLOWEST)
@@ -139,7 +139,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effect of each integral of a force on p, relative to the effect of the second integral."""
+    """Return the effect of each repeated time integral of the force on p, over that of the second one."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -147,7 +147,7 @@ def _coupling(specimen: Specimen) -> Vector:
 
 
 def _free(accelerations: Table) -> Table:
-    """Return the depth without force as powers of time from the middle, shape (n, DERIVATIVES + 2)."""
+    """Return the depth without contact force in powers of the time from the middle, shape (n, 7)."""
     powers = np.arange(2, DERIVATIVES + 2)
     bent = accelerations / [math.factorial(k) for k in powers]
     speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
@@ -156,7 +156,7 @@ def _free(accelerations: Table) -> Table:
 
 
 def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
-    """Return duration and moments about the middle of collisions, by Newton, shape (n, POLYNOMIALS)."""
+    """Return duration and moments about the middle of n collisions by Newton's method, shape (n, 6)."""
     shapes, durations = collision_shapes()
     press = np.clip(accelerations[:, 0] - MIDDLE * accelerations[:, 1], SOFTEST, HARDEST)
     place = np.rint((press - SOFTEST) / SPACING).astype(int)
@@ -173,7 +173,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
         misfit = (powers * free[:, None, :]).sum(axis=2) - np.einsum("nm,nmi->ni", weights, pushed)
         misfit[:, :POINTS] -= depths
         slopes = np.empty((len(depths), POINTS + 1, POINTS + 1))
-        # Later integrals are small: the derivative neglects them, the misfit includes them.
+        # Later integrals are small: the Jacobian neglects them, the residual includes them.
         slopes[:, :, :POINTS] = -np.einsum("nm,mki->nik", weights[:, 1:4], SHARES[1:4])
         slopes[:, :, :POINTS] *= (1.5 * HALF_FORCE * root)[:, None, :]
         slopes[:, range(POINTS), range(POINTS)] -= 1.0
@@ -198,14 +198,14 @@ def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
 
 
 LEAST_TOLERANCE = 1e-7
-"""Smallest tolerance, limited by the accuracy of the polynomials; as in native/collision.hpp."""
+"""Smallest tolerance for batches, limited by the error of the polynomials; as in native/collision.hpp."""
 FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
 """Families of processors with wide registers and fused multiply-add."""
 MODES = 3
 MOST_DAMPED = 0.05
-"""Largest damping ratio of a mode; for larger ratios the series would need more terms."""
+"""Largest damping ratio of a mode; a larger one would need more terms of the series."""
 LEAST_PART = 1e-9
-"""Smallest contribution of a mode to p, over the largest; batches integrate p and derive all modes from p."""
+"""Smallest contribution of a mode to p, over the largest; a batch derives all modes from p."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,8 +213,8 @@ class BatchedMotion:
     """Result of one motion of a batch."""
 
     states: Floats
-    """States once per drive period, shape (periods, 6). States within a short collision, except the last, are
-    extrapolated from the motion after the collision."""
+    """States once per drive period, shape (periods, 6). If a period, except the last, ends during a short
+    collision, its state is extrapolated back from the motion after the collision."""
     impacts: int
 
 
@@ -235,7 +235,7 @@ def is_batchable(specimen: Specimen, tolerance: float) -> bool:
 
 @lru_cache(maxsize=8)
 def _turns_in_p(specimen: Specimen) -> bool:
-    """Return whether stops are Hertz contacts and all three modes oscillate and contribute to p."""
+    """Return whether the stops are Hertz contacts and all three modes oscillate and contribute to p."""
     if not isinstance(specimen.contact, Hertz) or not math.isfinite(sum(specimen.gaps_m)):
         return False
     modes = modal_form(specimen)
@@ -250,13 +250,13 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     Parameters
     ----------
     runs
-        Motions without contact at the end of a drive period, with the same tolerance, without tangent
-    vectors. periods
+        Motions with the same tolerance, out of contact at the end of a drive period, no tangent vectors.
+    periods
         Number of drive periods for each motion.
 
     Returns
     -------
-    Result of each motion; None for a motion that failed, whose state is not changed.
+    Result of each motion; None for a motion that failed and keeps its state.
 
     Raises ValueError when batches do not support the specimen, or a motion is in contact.
     """
@@ -267,7 +267,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
         raise ValueError(
             "This specimen cannot be simulated in a batch: use Hertz contacts and three oscillating modes."
         )
-    # Sort the longest first, so that motions computed in parallel end at about the same time.
+    # Sort by length, the longest first, so that motions computed in parallel end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
     states = [np.empty((count, DIRECTIONS)) for count in periods]
     motions = engine.rows("BatchMotion", len(runs))

@@ -27,13 +27,13 @@ _NUMBERS: dict[str, DTypeLike] = {"double": np.float64, "int64_t": np.int64, "Ph
 def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
     """Return the numpy type of every structure, by name.
 
-    Raises ValueError when a declaration has another form.
+    Raises ValueError when a declaration does not have this form.
 
     Parameters
     ----------
     texts
         C++ declarations as in native/structures.hpp, such as ``State { double motion[6]; double side; }``. A
-        structure may contain earlier structures.
+        structure may contain structures that are declared before it.
     """
     known: dict[str, StructureType] = {}
     for text in texts:
@@ -65,12 +65,12 @@ def _fields(
 
 
 FOLDER = Path(__file__).parent / "libraries"
-"""Folder of the built libraries ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
+"""Folder of the compiled libraries ``engine-FAMILY-DIGEST.EXT``; DIGEST is that of the native sources."""
 CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
-"""Build script, which exists in a checkout, but not in an installed wheel."""
+"""Build script; exists in a checkout, but not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
-"""File ending of libraries for this system; a checkout may also contain libraries for other systems."""
+"""File ending of libraries for this operating system; a checkout may contain libraries for others."""
 REBUILD = "python native/build.py"
 FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),
@@ -80,16 +80,16 @@ FUNCTIONS = (
 )
 """Functions of the library that have a single structure as argument."""
 Tables = NDArray[np.float64]
-"""Prepared data of a scene, in the layout of the engine."""
+"""Tables of a scene that the engine prepares, in the memory layout of the engine."""
 _Pointer = ctypes.c_void_p
 
 
 class EngineError(RuntimeError):
-    """Error: the native engine cannot be used; the message states what to do."""
+    """Error: the native engine cannot be used. The message says what to do."""
 
 
 class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
-    """Structure that keeps references to the arrays to which it points."""
+    """Structure that keeps alive the arrays to which it points."""
 
     lent: dict[str, object]
 
@@ -144,9 +144,9 @@ class Engine:
         return self.path.name.split("-")[1]
 
     def new(self, name: str, **fields: object) -> Structure:
-        """Return a structure of native/structures.hpp, with zero for fields that are not given.
+        """Return a structure of native/structures.hpp; fields that are not given are zero.
 
-        Arrays are referenced and not copied; they exist as long as the structure.
+        Arrays are referenced, not copied. The structure keeps them alive.
         """
         structure = np.zeros((), self._types[name]).view(_Lending)
         structure.lent = {}
@@ -154,7 +154,7 @@ class Engine:
         return structure
 
     def rows(self, name: str, count: int) -> Structure:
-        """Return an array of structures with all fields zero."""
+        """Return ``count`` structures in an array, with all fields zero."""
         return np.zeros(count, self._types[name])
 
     def fill(self, structure: Structure, **fields: object) -> None:
@@ -177,11 +177,11 @@ class Engine:
         return code
 
     def chain_memory(self, cells: int, kinds: int) -> int:
-        """Return the number of floats of memory for a chain with ``kinds`` kinds of cells."""
+        """Return the work memory of a chain, in floats, for ``kinds`` different kinds of cells."""
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
-        """Return the tables of a scene, which refer to its collision and step shapes: do not free these.
+        """Return the tables of a scene. They point to its collision and step shapes: keep those alive.
 
         Raises ValueError when the engine rejects a number of the scene.
         """
@@ -201,7 +201,7 @@ class Engine:
         return tables
 
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
-        """Set whether the motion of ``state`` starts in contact; return 0, or -1 if rejected."""
+        """Decide whether ``state`` starts in contact and store it; return 0, or -1 if it is refused."""
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
 
     def run(
@@ -213,9 +213,9 @@ class Engine:
         record: Structure,
         tangent: Structure | None = None,
     ) -> int:
-        """Advance ``state`` with its ``tangent`` vectors, and fill ``record``.
+        """Advance ``state`` and its ``tangent`` vectors to a time [s], and fill ``record``.
 
-        Return the number of an `Outcome`, or -1 if rejected.
+        Return the number of an `Outcome`, or -1 if the input is refused.
         """
         run = (tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data)
         if tangent is None:
@@ -239,7 +239,7 @@ class Engine:
         readings: Structure,
         last: int,
     ) -> int:
-        """Advance to the end of interval ``last``, and fill ``readings``; return the same as `run`."""
+        """Advance to the end of interval ``last`` and fill ``readings``; return the same as `run`."""
         filled = (each.ctypes.data for each in (record, tangent, readings))
         return int(
             self._library.vibench_take_readings(
@@ -248,12 +248,12 @@ class Engine:
         )
 
     def reach(self, tables: Tables, state: Structure) -> float:
-        """Return a bound on abs(p) at all later times without contact [m]; infinite in contact."""
+        """Return a bound on abs(p) for all later times if no contact follows [m]; infinite in contact."""
         return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
 def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
-    """Return address and size of an array, or a structure unchanged."""
+    """Return (address, size) of an array of numbers; return a structure unchanged."""
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -266,7 +266,7 @@ def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
 def library_path() -> Path:
     """Return the path of the fastest library for this processor; in a checkout, build it if it is missing.
 
-    Raises EngineError when there is no library, or when it is older than its sources and cannot be rebuilt.
+    Raises EngineError when there is no library, or the library is out of date and cannot be rebuilt.
     """
     families = usable_families()
     current = sources_digest()
@@ -285,7 +285,7 @@ def library_path() -> Path:
 
 
 def native_digest() -> str:
-    """Return the digest of the native sources, also for an installed wheel; empty if unknown."""
+    """Return the digest of the native sources, in a wheel from the library's name; empty if unknown."""
     digest = sources_digest()
     if digest is not None:
         return digest
@@ -318,7 +318,7 @@ SIM = Path(__file__).parents[1]
 
 @cache
 def physics_digest() -> str:
-    """Return the digest of all code of the simulation; equal for a checkout and an installed wheel."""
+    """Return a digest of all simulation code; the same for a checkout and an installed wheel."""
     digest = hashlib.sha256(native_digest().encode())
     for path in sorted(each for kind in ("*.py", "*.pyi") for each in SIM.rglob(kind)):
         digest.update(path.relative_to(SIM).as_posix().encode())

@@ -1,4 +1,4 @@
-"""Families of processors for which the native engine is compiled, and the families of this processor.
+"""Families of processors for which the native engine is compiled, and those this processor supports.
 
 The build hook also imports this file, so this file may import only the standard library.
 """
@@ -30,11 +30,11 @@ def usable_families() -> tuple[str, ...]:
 
 
 def _level() -> int:
-    """Return 3 for AVX-512, 2 for AVX2, otherwise 1; unknown features count as absent."""
+    """Return 3 for AVX-512, 2 for AVX2, otherwise 1, also if the features are unknown."""
     if sys.platform == "win32":
         has = ctypes.windll.kernel32.IsProcessorFeaturePresent
         return 1 + bool(has(_WINDOWS_AVX2)) * (1 + bool(has(_WINDOWS_AVX512)))
-    else:  # noqa: RET505 - a type checker for Windows must see that the rest is another system's
+    else:  # noqa: RET505 - a type checker for Windows must see that this part is for other systems
         described = Path("/proc/cpuinfo")
         if not described.is_file():
             return 1

@@ -23,15 +23,15 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most steps without contact in a run: seconds of computing, two days of motion of the paper's specimen."""
+"""Most steps between contacts in one run: seconds of computing, or two days of the paper's specimen."""
 MOST_IMPACTS = 1 << 26
-"""Most impacts in one run; their times need 0.5 GB, which is allocated as impacts occur."""
+"""Most impacts in one run. Their times need 0.5 GB, which is used only as impacts occur."""
 SPARE_IMPACTS = 100
-"""Impacts allowed in addition to the rate, for short runs."""
+"""Impacts allowed in addition to those of the mean rate, so that short runs may have some."""
 DIRECTIONS = 6
-"""Dimension of a state, and largest number of tangent vectors."""
+"""Dimension of a state, which is also the largest number of tangent vectors."""
 INSIDE = 1e-9
-"""Relative tolerance within which a start beyond a rigid stop counts as a start on the stop."""
+"""Relative distance beyond a rigid stop up to which a start counts as lying on the stop (rounding)."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -41,13 +41,13 @@ KNOWN_MOTION = (
     2.63303389e-02,
     -1.20895040e-02,
 )
-"""Known final state of the paper's specimen with a loss of 0.5 s/m, driven by 20 um at 130 Hz from rest."""
+"""Known state at this time of the paper's specimen, loss 0.5 s/m, driven from rest by 20 um at 130 Hz."""
 KNOWN_TO = 1e-6
-"""Tolerance of the known state, over 100 um and 0.1 m/s."""
+"""Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
 
 
 class Watch(IntEnum):
-    """Quantities to observe."""
+    """Quantities that a run observes."""
 
     NOTHING = 0
     PEAKS = 1
@@ -57,7 +57,7 @@ class Watch(IntEnum):
 
 
 class RunRecord:
-    """Record of a run: impacts, samples and observations, which do not affect the steps."""
+    """Record of a run: impacts, samples and observations. Recording does not affect the time steps."""
 
     def __init__(
         self,
@@ -74,14 +74,14 @@ class RunRecord:
         self._samples = np.empty((samples, DIRECTIONS))
         self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
-        """Structure that the engine fills."""
+        """The `Record` of native/structures.hpp that the engine fills."""
         record["start"], record["sample_rate"] = start_s, sample_rate_hz
         record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
         record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
         record["steps_left"] = MOST_STEPS if steps is None else steps
 
     def watch(self, what: Watch) -> None:
-        """Set what is observed from now on."""
+        """Set the quantities to observe from now on."""
         self.structure["watch"] = what
 
     @property
@@ -100,7 +100,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); samples after the end, due to rounding, are ``last``."""
+        """Return all samples, shape (samples, 6); ``last`` replaces those that rounding put after the end."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
@@ -121,12 +121,12 @@ class RunRecord:
 
     @property
     def area_x(self) -> complex:
-        """Integral of x exp(-i (omega t + phase)) over the time with observed lines [m s]."""
+        """Integral of x exp(-i (omega t + phase)) over the time in which lines were observed [m s]."""
         return complex(self.structure["line_x"])
 
     @property
     def area_p(self) -> complex:
-        """Integral of p exp(-i (omega t + phase)) over the time with observed lines [m s]."""
+        """Integral of p exp(-i (omega t + phase)) over the time in which lines were observed [m s]."""
         return complex(self.structure["line_p"])
 
 
@@ -145,7 +145,7 @@ class _Run:
 
 
 class NativeRun(_Run):
-    """Motion under a harmonic drive, with its state and tangent vectors."""
+    """Motion under a harmonic drive; holds the current state and tangent vectors."""
 
     def __init__(
         self,
@@ -179,7 +179,7 @@ class NativeRun(_Run):
         start_at(self.engine, self._tables, self.specimen, self._state, motion, self.tolerance)
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Return a copy; a copy with another tolerance has no tangent vectors."""
+        """Return an independent copy; with another tolerance the copy has no tangent vectors."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
@@ -188,7 +188,7 @@ class NativeRun(_Run):
         return twin
 
     def carry(self, changes: Floats) -> None:
-        """Propagate tangent vectors from now on, shape (n, 6); none if n = 0."""
+        """Propagate tangent vectors of shape (n, 6) from now on; n = 0 ends this."""
         self._tangent["changes"] = len(changes)
         self._tangent["rows"][: len(changes)] = changes
         self._tangent["growth"] = 0.0
@@ -204,7 +204,7 @@ class NativeRun(_Run):
         return np.array(self._tangent["growth"][: int(self._tangent["changes"])])
 
     def advance(self, until_s: float, record: RunRecord) -> Outcome:
-        """Advance to a time [s] and return the outcome; a time in the past changes nothing.
+        """Advance to a time [s] and return the outcome; do nothing if the time has already passed.
 
         Raises ValueError when the engine rejects the time.
         """
@@ -217,7 +217,7 @@ class NativeRun(_Run):
         return Outcome(code)
 
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
-        """Advance to the end of interval ``last``, recording the growth of tangent vectors."""
+        """Advance to the end of interval ``last``; add the growth of tangent vectors to ``readings``."""
         return Outcome(
             self.engine.take_readings(
                 *(self._tables, self._state, self.tolerance, record.structure),
@@ -231,19 +231,19 @@ class NativeRun(_Run):
         return self._tables.ctypes.data, self._state.ctypes.data
 
     def pass_over(self, length_s: float) -> None:
-        """Advance the time without changing the state, by a period after which the motion repeats [s]."""
+        """Add to the time a period after which the motion repeats [s]; the state does not change."""
         clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
         self._state["clock_high"] = high = math.fsum(clock)
         self._state["clock_low"] = math.fsum((*clock, -high))
 
     @property
     def is_in_flight(self) -> bool:
-        """Whether no stop is in contact."""
+        """Whether m1 touches no stop."""
         return bool(self._state["side"] == 0.0)
 
     @property
     def reach_m(self) -> float:
-        """Bound on abs(p) at all later times without contact [m]; infinite in contact."""
+        """Bound on abs(p) for all later times if no contact follows [m]; infinite in contact."""
         return self.engine.reach(self._tables, self._state)
 
 
@@ -297,7 +297,7 @@ def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
 
 
 def most_impacts(rate_hz: float, duration_s: float) -> int:
-    """Return the largest number of impacts in a run, from the largest mean impact rate."""
+    """Return the number of impacts at which a run ends, from the allowed mean impact rate [1/s]."""
     return min(math.ceil(rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)
 
 
@@ -325,7 +325,7 @@ def check_known_answer(engine: Engine) -> None:
 
 
 def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Tables:
-    """Return the tables for runs over intervals of one length; threads may share them.
+    """Return the tables for runs over intervals of ``interval_s`` [s]; threads may share them.
 
     Raises ValueError when the engine rejects the interval or the specimen.
     """
@@ -341,7 +341,7 @@ def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Table
 def start_at(
     engine: Engine, tables: Tables, specimen: Specimen, state: Structure, motion: ArrayLike, tolerance: float
 ) -> None:
-    """Set a `State` to x, y, z, vx, vy, vz, shape (6,), and determine whether m1 is in contact.
+    """Set ``state`` to x, y, z, vx, vy, vz, shape (6,), and decide whether m1 is in contact.
 
     Raises ValueError when the motion is inside a rigid stop, or the tolerance is not allowed.
     """
@@ -393,7 +393,7 @@ class CubicRun(_Run):
         return self._run(drive, record)
 
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
-        """Advance over whole intervals, as far as possible.
+        """Advance over whole intervals until all are done or the run fails.
 
         Return states at the ends of the completed intervals, shape (passed, 6), and their impact counts.
         """
@@ -412,7 +412,7 @@ class CubicRun(_Run):
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0
-"""Default limit of the impact rate, several times the largest known rate of the paper's specimen: at 50 um,
+"""Default limit of the mean impact rate, several times the largest one of the paper's specimen: at 50 um,
 4300 per second with Hertz contacts, and 23000 in chatter on rigid stops with restitution 0.8."""
 
 

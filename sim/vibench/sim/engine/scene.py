@@ -44,7 +44,7 @@ Phasors = NDArray[np.complex128]
 
 
 def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
-    """Return the `Scene` of native/structures.hpp for a specimen and a drive.
+    """Return the `Scene` of native/structures.hpp for a specimen driven harmonically.
 
     Raises ValueError when two modes coincide.
     """
@@ -72,11 +72,11 @@ def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
 
 
 def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_damping: float) -> None:
-    """Fill a `CellKind` with a cell of a chain and the link to the next cell [N/m], [N s/m]."""
+    """Fill a `CellKind` with a cell of a chain and the k0, c0 of the next cell [N/m], [N s/m]."""
     fill_specimen(target["specimen"], cell)
     match cell.contact:
         case LinearGap():
-            # In a chain, contacts with linear stops are integrated in time steps.
+            # In a chain, contacts with linear stops are integrated in time steps, not solved exactly.
             target["specimen"]["law"] = YIELDING
         case PowerLaw() as law:
             _fill_power(target["power"], law)
@@ -84,7 +84,7 @@ def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_dam
 
 
 def fill_drive(target: Structure, drive: Harmonic, first: Specimen) -> None:
-    """Fill a `Drive` with its frequency, its phase and its force on the m0 coupled to the base."""
+    """Fill a `Drive` with frequency, phase and the force on the m0 that is coupled to the base."""
     _, force = harmonic_motion(first, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
     target["frequency"] = drive.frequency_hz
     target["start"] = cmath.exp(1j * drive.phase_rad)
@@ -103,8 +103,8 @@ def collision_structure(engine: Engine) -> Structure:
         return _collision_structure(engine)
 
 
-# The tables of a run contain pointers to these structures, which must therefore never be freed. Without the
-# lock, two threads could both create a structure at the first call, and the cache would free one of them.
+# The tables of a run point to these structures, so they must never be freed. Without the lock, two threads
+# could both create one at the first call, and the cache would keep one of the two and free the other.
 _ONE_THREAD = Lock()
 
 
@@ -171,7 +171,7 @@ def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m:
 
 
 def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
-    """Fill the motion with m1 held on a rigid stop, whose force can only be compressive."""
+    """Fill the motion while m1 sticks to a rigid stop, whose force on m1 can only be compressive."""
     bound = bound_motion(specimen, omega, amplitude_m)
     _fill_motion(target["motion"], bound.modes, bound.steady)
     m1, m2 = specimen.masses[1:]
@@ -182,14 +182,14 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """Fill the motion with m1 on a linear stop, a spring parallel to k1 with another equilibrium."""
+    """Fill the motion while m1 is in a linear stop: a spring beside k1 with another equilibrium."""
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]
     try:
         _fill_free(held["motion"], pressed, omega, amplitude_m)
     except ValueError:
-        # Two modes of this motion coincide: integrate contacts in time steps.
+        # Two modes of the motion in contact coincide, so integrate contacts in time steps.
         scene["specimen"]["law"] = YIELDING
         return
     steady = held["motion"]["steady"]

@@ -1,9 +1,9 @@
 """Tables that are the same for every specimen: Hertz collisions, and time steps under power laws.
 
-With t = T (1 - cos phi) / 2, where T is the duration, depth and force are smooth in phi, even at both ends,
-where they are square roots in t. Sixteen Gauss points in phi therefore describe a whole collision. In units
-of the depth and time of a free collision at the same speed, collisions differ only by the acceleration due to
-the other springs, called press. The shapes of collisions and their derivatives are tabulated over the press
+Let t = T (1 - cos phi) / 2 during a collision of duration T. Near both ends the depth is a function of square
+roots of t, but smooth in phi. Sixteen Gauss points in phi therefore describe a whole collision. In units of
+the depth and the time of a free collision at the same speed, collisions differ only by the acceleration due
+to the other springs, called press. Collisions and their derivatives are tabulated over the press
 (docs/decisions/0008-speed-of-contacts.md).
 """
 
@@ -17,26 +17,26 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""Number of Gauss points in phi; the duration is accurate to 1e-8 and the speed to rounding."""
+"""Number of Gauss points in phi: error 1e-8 of the duration, and rounding error of the speed."""
 TERMS = 8
 """Number of terms of the series for forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
-"""First and last tabulated press, and number of values. The press is the acceleration due to all other
-springs, over speed^2 / depth."""
+"""First and last tabulated press, and number of tabulated values. The press is the acceleration due to all
+other springs, over speed^2 / depth."""
 SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
 QUADRATURE = 60
 NEWTON_STEPS = 60
 HALF_FORCE = 1.25
-"""Ratio k / m in units of depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5."""
+"""Ratio k / m in units of free depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5."""
 TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
-"""Rows of a shape, after sixteen rows of derivatives by the residuals of depth: derivatives by the residual
-at the end; derivatives of the duration by the residuals; depths at the points; derivatives of the depths by
-the press, by its rate, and by the force through dampers (two integrals) and springs (three integrals)."""
+"""Rows of a tabulated collision after the first sixteen, which are derivatives by the depth residuals. In
+order: derivatives by the residual at the end; derivatives of the duration by the residuals; depths at the
+points; derivatives of the depths by press, its rate, and forces through dampers and through springs."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
-"""Columns of the scalars of a shape. DEEPER is the ratio of the largest depth to that of the polynomial
-through the points, whose error is 1e-5 in the middle and 1e-8 at the end. From LASTS_BY on, columns are
-derivatives of the duration, in the order of the derivatives of depths."""
+"""Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to that of the
+polynomial through the points, whose error is 1e-5 in the middle and 1e-8 at the end. Columns from LASTS_BY on
+are derivatives of the duration, in the order of the derivatives of the depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 
@@ -50,7 +50,7 @@ def _cardinal(at: Table, points: Vector) -> Table:
 
 
 def _about_middle() -> Table:
-    """Return the matrix that maps depths at the points to Taylor terms about the middle of phi."""
+    """Return the matrix from depths at the points to Taylor coefficients in phi about its middle."""
     cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
     return np.ascontiguousarray(cardinal[:TERMS].T)
 
@@ -58,8 +58,8 @@ def _about_middle() -> Table:
 ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
-"""Largest distance from the middle of phi [rad]; eight terms are accurate to 1e-7 there, and to rounding at a
-tenth of it."""
+"""Largest distance of the maximum from the middle of phi [rad], at which eight terms have an error of 1e-7;
+at a tenth of it they have rounding error."""
 
 
 def _top_of(terms: Vector) -> float:
@@ -87,7 +87,7 @@ SHARES: Table = _shares()
 
 
 def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Table]:
-    """Return the residual of the equations of a collision at unit speed and depth, and its derivative."""
+    """Return residual and Jacobian of the collision equations, in units of free depth and speed."""
     times = np.append(HEIGHTS, 1.0)
     root = np.sqrt(np.maximum(depths, 0.0))
     pushed = HALF_FORCE * (depths * root) @ SHARES[1]
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Return the tabulated collisions and their scalars; each is solved from the one before."""
+    """Return collisions tabulated over the press, and their scalars; each starts the solution of the next."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without press, a collision lasts 2.943 and its depth is nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
@@ -131,7 +131,7 @@ def collision_shapes() -> tuple[Table, Table]:
 
 
 def _deepest(press: float) -> float:
-    """Return the largest depth d, from the energy balance d^(5/2) = 1 + 2 press d in unit speed and depth."""
+    """Return the largest depth d from the energy balance d^(5/2) = 1 + 2 press d, over the free depth."""
     depth = 1.0
     for _ in range(NEWTON_STEPS):
         depth -= (depth**2.5 - 1.0 - 2.0 * press * depth) / (2.5 * depth**1.5 - 2.0 * press)
@@ -139,7 +139,7 @@ def _deepest(press: float) -> float:
 
 
 def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
-    """Return depths, duration and derivative of a collision, solved by Newton's method to rounding."""
+    """Return depths, duration and Jacobian of a collision, solved by Newton's method to rounding error."""
     for _ in range(NEWTON_STEPS):
         found, slopes = _misfits(depths, duration, press)
         step = np.linalg.solve(slopes, found)
@@ -149,20 +149,20 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
     return depths, duration, _misfits(depths, duration, press)[1]
 
 
-# Weights for time steps under power laws, the same for every law and step length. In a step from 0 to 1 the
-# force F is a polynomial through its values at eight Gauss points; all results are linear in these values
-# (docs/decisions/0026-power-laws.md).
+# Weights for time steps under power laws, the same for every law and step length. The step is scaled to 0..1.
+# In it the force F is the polynomial through its values at eight Gauss points, and all results are linear in
+# these values (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
-"""Number of Gauss points in a step; ten points would cost 50 % more, for steps that are 10 % longer."""
+"""Number of Gauss points in a step. Ten would cost 50 % more and allow only 10 % longer steps."""
 ORDER = 32
-"""Number of terms of the series; the next term is 1e-20 of the largest in the longest step."""
+"""Number of terms of the series; in the longest step, the next term is 1e-20 of the largest."""
 POWER_QUADRATURE = 24
-"""Number of quadrature points for the series; exact for all terms."""
+"""Number of quadrature points, which integrate all terms of the series exactly."""
 COURSE_DEGREE = 5
-"""Degree of the polynomial that predicts F in a step, fitted to the step before."""
+"""Degree of the polynomial that predicts F in a step; it is fitted to F in the preceding step."""
 END_WEIGHT = 3.0
-"""Weight in this fit of the value at the end of the step before."""
+"""Weight of F at the end of the preceding step in that fit."""
 POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
 """Gauss points c_i on [0, 1]."""
 GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
@@ -170,13 +170,13 @@ GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
 
 AT_START: Vector = _cardinal(np.array(0.0), POINTS_AT)
 AT_END: Vector = _cardinal(np.array(1.0), POINTS_AT)
-"""Weights of the values at the Gauss points, for the polynomial at the start and the end of a step."""
+"""Weights of the values at the Gauss points that give the polynomial at the start and the end of a step."""
 
 
 def _course() -> Table:
-    """Return the matrix from F at the points and the end of a step to coefficients in powers of (s - 1).
+    """Return the matrix that extrapolates F: from its values in a step to coefficients in powers of (s - 1).
 
-    Shape (GAUSS_POINTS + 1, GAUSS_POINTS); entries beyond the degree are zero.
+    Values are those at the points and the end. Shape (points + 1, points), zero beyond the degree.
     """
     weights = np.append(np.ones(GAUSS_POINTS), END_WEIGHT)
     known = np.vander(np.append(POINTS_AT, 1.0) - 1.0, COURSE_DEGREE + 1, increasing=True)
@@ -188,7 +188,7 @@ COURSE: Table = _course()
 
 
 def _power_shares() -> Table:
-    """Return integrals of (c_i - s)^m times Lagrange polynomials, shape (ORDER, points, points + 1)."""
+    """Return the integrals of (c_i - s)^m times Lagrange polynomials, shape (ORDER, points, points + 1)."""
     places, weights = np.polynomial.legendre.leggauss(POWER_QUADRATURE)
     places, weights = 0.5 * (places + 1.0), 0.5 * weights
     ends = np.append(POINTS_AT, 1.0)
@@ -212,4 +212,4 @@ POINT_WEIGHTS: Vector = 1.0 / np.prod(_between(POINTS_AT), axis=1)
 INSTANT_WEIGHTS: Vector = 1.0 / np.prod(_between(INSTANTS), axis=1)
 """Barycentric weights (Berrut and Trefethen, SIAM Rev. 46 (2004) 501)."""
 INSTANT_SLOPES: Vector = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
-"""Slope, at each observed time, of the Lagrange polynomial of that time."""
+"""Derivative of each Lagrange polynomial at its own time, shape of ``INSTANTS``."""

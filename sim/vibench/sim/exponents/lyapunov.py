@@ -1,9 +1,9 @@
 """Largest Lyapunov exponent of a specimen under a harmonic drive, with its error. SI units.
 
 A tangent vector is propagated exactly with and without contact; its mean growth rate is the exponent. The
-method depends on the final motion: eigenvalues of the modes if no impact will follow, Floquet multipliers if
-the motion has become periodic, otherwise a mean with a standard error that allows for correlation between
-successive intervals. Transient chaos is reported separately.
+final motion decides the method: decay of the modes if no impact will follow, Floquet multipliers if the
+motion has become periodic, otherwise the mean growth, with a standard error that allows for correlation of
+successive intervals. Chaos that ends during the run is reported separately.
 """
 
 import math
@@ -38,11 +38,11 @@ from .tangent_run import (
 )
 
 FEWEST_INTERVALS = 32
-"""Fewest intervals in the duration, for the estimate of the error of the mean."""
+"""Smallest number of intervals from which the error of the mean is estimated."""
 
 
 class ExponentVerdict(StrEnum):
-    """Meaning of the exponent within its error."""
+    """Statement about the sign of an exponent, given its standard error."""
 
     CHAOTIC = "chaotic: neighbouring motions part"
     REGULAR = "regular: neighbouring motions come together"
@@ -51,7 +51,7 @@ class ExponentVerdict(StrEnum):
 
 
 class Source(StrEnum):
-    """Method by which an exponent was determined."""
+    """Method that determined an exponent."""
 
     AVERAGE = "mean growth over the run"
     MULTIPLIERS = "multipliers of the periodic motion at the end"
@@ -60,7 +60,7 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class ChaoticTransient:
-    """Chaos before the final motion."""
+    """Chaos that ended before the final motion of a run."""
 
     exponent_per_s: float
     """Largest exponent during the transient [1/s]."""
@@ -71,12 +71,12 @@ class ChaoticTransient:
 
 @dataclass(frozen=True)
 class Precision:
-    """Required precision of an exponent; the larger of the two limits applies."""
+    """Required precision of an exponent; the less strict of the two limits applies."""
 
     absolute_per_s: float
-    """Largest standard error [1/s]."""
+    """Largest allowed standard error [1/s]."""
     relative: float = 0.0
-    """Largest standard error over the exponent."""
+    """Largest allowed standard error, over the exponent."""
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
@@ -99,24 +99,24 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error: from blocks (mean), half the difference of two cycles (multipliers), zero (modes)."""
+    """Standard error [1/s]; for multipliers half the difference of two cycles, for modes zero."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
     """Final motion of the run."""
     since_s: float
-    """Start of the average, or of the final motion [s]."""
+    """Time from which growth is averaged, or at which the final motion begins [s]."""
     blocks: BlockedMean | None
-    """Mean and error from blocks [1/s]; None unless the source is the average."""
+    """Mean and error from blocks of intervals [1/s]; None unless the source is the average."""
     interval_s: float
     """Length of an interval [s]."""
     local_time_s: Floats
     """End times of the intervals, shape (n,) [s]."""
     local_exponents_per_s: Floats
-    """Growth rate in each interval from time zero, shape (n,) [1/s]."""
+    """Growth rate in each interval, with the first one at time zero, shape (n,) [1/s]."""
     transient: ChaoticTransient | None
     impacts: int
-    """Number of impacts since time zero."""
+    """Number of impacts in the whole run."""
     impact_rate_hz: float
     """Mean impact rate in the final motion [1/s]."""
     final_state: Floats
@@ -139,16 +139,16 @@ def lyapunov_exponent(
 ) -> LyapunovEstimate:
     """Return the largest Lyapunov exponent, the rate at which neighbouring motions separate.
 
-    During ``settle_s`` the motion approaches its attractor. The exponent is that of the following
-    ``duration_s``, or of the final motion if it changes. The defaults add up to the paper's 30 s from rest.
-    Raises ValueError when an argument is not allowed, or the duration contains fewer than 32 intervals.
+    During ``settle_s`` the motion approaches its attractor. Growth is averaged over the following
+    ``duration_s``, or over the final kind of motion if it changes. The defaults add up to the paper's 30 s
+    from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
 
     Parameters
     ----------
     specimen, drive
         Specimen with any contact law, and its drive.
     accuracy
-        Accuracy of the motion. In chaos the exponent is the same at every level, within its error.
+        Accuracy of the motion. The exponent of a chaotic motion agrees at all levels within its error.
     duration_s, settle_s
         Averaging time, and time before it for settling [s].
     initial_state
@@ -156,8 +156,8 @@ def lyapunov_exponent(
     interval_s
         Approximate length of an interval [s]; None for two cycles of the slowest mode.
     precision
-        Required precision, at which the run ends. None uses the whole duration, which also detects
-        chaos that ends late.
+        Required precision; the run ends when it is reached. None uses the whole duration, which also
+        detects chaos that ends late.
     max_impact_rate_hz
         As in `vibench.sim.motion.integrate`.
     """
@@ -204,13 +204,13 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
 
 @dataclass(frozen=True)
 class _Exponent:
-    """Exponent with its error and source [1/s]."""
+    """Exponent and its error [1/s], with the method."""
 
     mean: float
     error: float
     source: Source
     since: int
-    """Index of the first averaged interval."""
+    """Index of the first interval of the average."""
     blocks: BlockedMean | None = None
 
 
@@ -235,7 +235,7 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Return the mean largest exponent of a periodic motion in two cycles, and half the difference [1/s]."""
+    """Return the largest exponent of a periodic motion: mean of two cycles, half their difference [1/s]."""
     from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []
@@ -289,7 +289,7 @@ def _verdict(taken: _Exponent) -> ExponentVerdict:
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:
-    """Return the chaotic transient before the final motion; None without one."""
+    """Return the chaos before the final motion; None if there was none."""
     before = run.rates[ALIGNING : end.since, 0]
     if len(before) < FEWEST_INTERVALS:
         return None

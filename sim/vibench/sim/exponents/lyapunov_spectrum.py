@@ -2,8 +2,8 @@
 
 Six tangent vectors span all directions of the state. They are propagated together and orthogonalised
 repeatedly; their growth rates are the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9).
-The sum of the exponents is the mean rate of change of the logarithm of a volume, -tr(M^-1 C) for every
-elastic law and any motion, which is used as a test.
+The sum of the exponents is the mean rate of change of the logarithm of a volume in state space. For every
+elastic law and any motion it must be -tr(M^-1 C), which the tests check.
 """
 
 import math
@@ -41,7 +41,7 @@ class LyapunovSpectrum:
     drive: Harmonic
     accuracy: Accuracy
     exponents_per_s: Floats
-    """Exponents in descending order, shape (6,); -inf for a direction that is lost while a stop holds m1."""
+    """Exponents in descending order, shape (6,); -inf for directions that vanish when m1 sticks to a stop."""
     standard_errors_per_s: Floats
     """Standard errors, shape (6,) [1/s]; zero if the exponents are those of the modes."""
     blocks: NDArray[np.int64]
@@ -56,7 +56,7 @@ class LyapunovSpectrum:
     impact_rate_hz: float
     """Mean impact rate in the final motion [1/s]."""
     dimension_standard_error: float
-    """Standard error of `dimension` from the correlated errors of the exponents; 0 for a whole number."""
+    """Standard error of `dimension`, from the correlated errors of the exponents; 0 if it is an integer."""
     final_state: Floats
     end_time_s: float
     outcome: Outcome
@@ -68,16 +68,16 @@ class LyapunovSpectrum:
 
     @property
     def dimension(self) -> float:
-        """Kaplan-Yorke dimension of the stroboscopic section; the attractor of the flow has one more."""
+        """Kaplan-Yorke dimension of the attractor in the stroboscopic section; 1 less than in the flow."""
         return kaplan_yorke(self.exponents_per_s)
 
     def intervals_per_s(self, confidence: float = 0.95) -> Floats:
-        """Return Student's confidence limits of the exponents, for blocks - 1 freedoms, shape (6, 2)."""
+        """Return Student's confidence limits of the exponents (freedoms: blocks - 1), shape (6, 2)."""
         reach = self._reach(confidence) * self.standard_errors_per_s
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return confidence limits of the dimension within 0 to 6, for the fewest blocks of any exponent."""
+        """Return confidence limits of the dimension, within 0 to 6, from the smallest number of blocks."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 
@@ -147,7 +147,7 @@ UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
 class _Taken(NamedTuple):
-    """Exponents of a run; the default values are for a lost run."""
+    """Exponents of a run; the default values describe a run that did not reach its end."""
 
     exponents: Floats = UNKNOWN
     errors: Floats = UNKNOWN
@@ -168,7 +168,7 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
         return _Taken(
             decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
         )
-    # If the motion settles late, little is left to average: use at least half of the requested time.
+    # If the motion settles late, too little is left. Average at least the second half of the requested time.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     rates = run.rates[since:]
     means = [_mean(each) for each in rates.T]
@@ -188,14 +188,14 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
 
 
 def _mean(rates: Floats) -> BlockedMean:
-    """Return the mean of local exponents with its error; minus infinity for a lost direction."""
+    """Return the mean of local exponents with its error; -inf for a direction that vanished in contact."""
     if not bool(np.all(np.isfinite(rates))):
         return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
     return block_mean(rates)
 
 
 def _dimension_error(rates: Floats, exponents: Floats) -> float:
-    """Return the standard error of the dimension, linearised with respect to the local exponents.
+    """Return the standard error of the dimension, to first order in the errors of the local exponents.
 
     D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0, hence dD = -dS / l + S dl / l^2.
     """

@@ -2,8 +2,8 @@
 
 Within an interval the tangent vectors are propagated exactly. At its end they are orthonormalised in the
 energy norm s' diag(K, M) s, and the logarithms of the divisors are recorded (Benettin, Galgani, Giorgilli and
-Strelcyn, Meccanica 15 (1980) 9 and 21). In this norm, the energy without stops, free motion only decays: any
-growth is due to impacts.
+Strelcyn, Meccanica 15 (1980) 9 and 21). This norm is the energy without stops, which decays in free motion:
+any growth is due to impacts.
 """
 
 import math
@@ -28,13 +28,13 @@ from ..specimen.stops import require_positive
 
 # Standard error of the mean of a correlated series, from sufficiently long blocks.
 #
-# Neighbouring values are repeatedly averaged in pairs. The estimated error of the mean increases until blocks
-# are longer than the correlation length of the series, then is constant (Flyvbjerg and Petersen, J. Chem.
-# Phys. 91 (1989) 461). The test for this plateau uses the correlation of neighbouring blocks, at one block
-# length and all longer lengths together (Jonsson, Phys. Rev. E 98 (2018) 043304).
+# Neighbouring values are averaged in pairs, repeatedly, which gives blocks of doubling length. The estimated
+# error of the mean grows with the block length up to the correlation length and then stays constant
+# (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). The shortest length on this plateau is found by a
+# test of the correlation of blocks at this and all longer lengths (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 FEWEST_BLOCKS = 16
-"""Fewest independent blocks; with fewer, the standard error itself is uncertain by more than 20 per cent."""
+"""Fewest uncorrelated blocks; with fewer, the standard error itself is uncertain by more than 20 per cent."""
 CONFIDENCE = 0.99
 """Confidence level of the test for correlation between blocks."""
 
@@ -47,13 +47,13 @@ class BlockedMean:
     standard_error: float
     """Standard error of the mean; zero if all values are equal, NaN for a single value."""
     block_length: int
-    """Values in a block: the smallest power of two for which neighbouring blocks are independent."""
+    """Number of values in a block: the smallest power of two for which neighbours are uncorrelated."""
     blocks: int
     correlation_length: float
-    """Number of values that count as one independent value: variance of the mean over its variance for
-    independent values."""
+    """Number of successive values that carry as much information as one independent value: the squared
+    standard error over the one that independent values would have."""
     is_long_enough: bool
-    """Whether there are at least `FEWEST_BLOCKS` independent blocks; otherwise the error is a lower bound."""
+    """Whether there are at least `FEWEST_BLOCKS` blocks; otherwise the standard error is a lower bound."""
 
 
 def block_mean(values: ArrayLike) -> BlockedMean:
@@ -71,9 +71,9 @@ def block_mean(values: ArrayLike) -> BlockedMean:
     if len(counts) == 0 or variances[0] == 0.0:
         error = 0.0 if len(series) > 1 else math.nan
         return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
-    # Choose the shortest blocks from which on neighbouring blocks are not correlated.
+    # Choose the smallest block length at which, and above which, neighbouring blocks are not correlated.
     ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
-    # For independent values the lagged correlation has the mean -1/n and the variance 1/n.
+    # For n independent values the correlation of neighbours has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
     passes = np.flatnonzero(evidence < _largest_by_chance(len(counts)))
     level = int(passes[0]) if len(passes) else len(counts) - 1
@@ -89,7 +89,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
 
 
 def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return variance, covariance of neighbours and number of blocks, for each length with two blocks."""
+    """Return, for each block length, variance, covariance of neighbours and number of blocks (2 or more)."""
     variances, correlations, counts = [], [], []
     while len(centred) > 1:
         variances.append(float(np.mean(centred**2)))
@@ -102,28 +102,28 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Return the limits of the correlation test for each block length and all longer lengths."""
+    """Return the limits of the correlation test at each block length, with all longer lengths."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
 
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
-"""Longest time between orthogonalisations, in radians and in decay times of the fastest mode; in this time
-the tangent vectors remain independent to several digits."""
+"""Longest time between orthogonalisations: radians of the fastest mode, and its decay times. After this time
+the tangent vectors are still independent to several digits."""
 CHECKS = 32
-"""Most checks per run for an early end."""
+"""Largest number of tests per run whether it may end early."""
 ALMOST = 1e-9
-"""Relative tolerance within which a duration contains a whole number of intervals."""
+"""Relative tolerance within which a duration is a whole number of intervals."""
 Enough = Callable[[Floats], bool]
-"""Function that returns whether a run may end, from the growth in each interval so far, shape (n, m)."""
+"""Test whether a run may end early, given the growth in each interval so far, shape (n, m)."""
 CYCLES = 2.0
 """Default length of an interval in cycles of the slowest mode."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Interval in which growth is measured."""
+    """Time interval in which the growth of tangent vectors is measured."""
 
     length_s: float
     periods: int
@@ -135,9 +135,9 @@ class Interval:
 
 
 def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = None) -> Interval:
-    """Return an interval of whole drive periods of about ``about_s`` [s]; None for two slowest cycles.
+    """Return an interval of about ``about_s`` [s], by default two cycles of the slowest mode.
 
-    If a drive period is longer than twice ``about_s``, the interval is ``about_s``.
+    It contains whole drive periods, unless one drive period is longer than twice ``about_s``.
     """
     about = CYCLES / float(specimen.natural_frequencies_hz[0]) if about_s is None else about_s
     require_positive("Interval", about, "s")
@@ -183,9 +183,9 @@ def run_with_tangent(
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
     enough: Enough | None = None,
 ) -> TangentRun:
-    """Integrate a motion from the drive's time zero, with ``changes`` (1 to 6) tangent vectors.
+    """Integrate a motion from time zero of the drive, with ``changes`` (1 to 6) tangent vectors.
 
-    The run ends with the last whole interval of the duration, or when ``enough`` returns True.
+    The run ends after the last whole interval in the duration, or earlier if ``enough`` returns True.
     """
     check_impact_rate(max_impact_rate_hz)
     count = interval.count_in(duration_s)
@@ -207,7 +207,7 @@ def run_with_tangent(
         impacts=readings.impacts,
         section=readings.motions,
         impact_times_s=record.impact_times_s.copy(),
-        # Without impacts the amplitudes of all modes decay, so that the bound remains valid.
+        # Without impacts all modes decay, so the bound on abs(p) holds from now on.
         is_quiet=run.reach_m < min(specimen.gaps_m),
         final_state=run.motion,
         end_time_s=run.time_s,
@@ -216,14 +216,14 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """Return the number of parts of an interval that keep the tangent vectors numerically independent."""
+    """Return the number of parts in which an interval keeps the tangent vectors numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
 
 
 def starting_changes(metric: Table, changes: int) -> Table:
-    """Return initial tangent vectors, orthonormal in the metric and the same in every run."""
+    """Return initial tangent vectors, shape (changes, 6): orthonormal in the metric, equal in every run."""
     size = len(metric)
     general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
     root = np.linalg.cholesky(metric)
@@ -237,18 +237,18 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change per cycle below which a section repeats, and above which it does not repeat yet."""
+"""Relative change per cycle below which a motion repeats, and above which it does not repeat yet."""
 LONGEST_CYCLE = 16
 """Longest cycle that is detected, in intervals."""
 SURE = 3.0
-"""Number of standard errors from zero above which the sign of a mean is significant."""
+"""Distance of a mean from zero, in standard errors, above which its sign is significant."""
 CHANGED = 5.0
-"""Smallest difference between the means before and after a change, in standard errors; larger than SURE,
-because the best of many times is chosen."""
+"""Smallest significant difference of the means before and after a change, in standard errors. It is larger
+than SURE, because the time of the change is chosen to make the difference largest."""
 FEWEST_INTERVALS = 32
 """Fewest intervals before and after a change of the exponent's sign."""
 ALIGNING = 8
-"""Number of first intervals in which a tangent vector turns to its direction of fastest growth."""
+"""Number of first intervals, in which a tangent vector still turns to the direction of fastest growth."""
 
 
 class FinalMotion(StrEnum):
@@ -272,7 +272,7 @@ class Settling:
 
 
 def settling(run: TangentRun, scales: Floats) -> Settling:
-    """Return the final motion of a run and its beginning; ``scales`` are from `state_scales`, shape (6,)."""
+    """Return the final motion of a run and its first interval; ``scales`` as from `state_scales`."""
     if run.is_quiet:
         struck = np.flatnonzero(run.impacts)
         return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)
@@ -291,14 +291,14 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Return the interval at which the mean growth stops being significantly positive; None if none."""
+    """Return the first interval after which mean growth is not significantly positive; None if no change."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None
     places = np.arange(FEWEST_INTERVALS, count - FEWEST_INTERVALS + 1)
     sums = np.cumsum(growth)
     before, after = sums[places - 1] / places, (sums[-1] - sums[places - 1]) / (count - places)
-    # Split the series where the scatter about the two means is smallest.
+    # Split the series where the squared deviations from the two means are smallest.
     place = int(places[np.argmax((before - after) * np.sqrt(places * (count - places)))])
     head, tail = block_mean(growth[:place]), block_mean(growth[place:])
     is_falling = head.mean > SURE * head.standard_error and tail.mean <= SURE * tail.standard_error

@@ -1,8 +1,8 @@
 """Open HDF5 files that may be damaged or malicious.
 
 HDF5 files can include data of other files (external storage, external links, virtual datasets), and the HDF5
-library does not check the sizes stated in a file. `open_hdf5` rejects external data unless
-`allow_external_data` is active, and compares the stated sizes with the length of the file before reading.
+library does not check the sizes stated in a file. `open_hdf5` refuses external data, except inside the
+context `allow_external_data`, and compares the stated sizes with the length of the file before reading.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
@@ -16,5 +16,5 @@ library does not check the sizes stated in a file. `open_hdf5` rejects external 
 ...         open_hdf5(path)
 ...     except UnsafeHdf5 as error:
 ...         print(error)
-/copied points into another file (/etc/hosts.h5); read it with --allow-external if you trust this file
+/copied refers to another file (/etc/hosts.h5); read it with --allow-external if you trust this file
 """

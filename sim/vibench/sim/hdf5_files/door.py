@@ -1,4 +1,4 @@
-"""Checks of an HDF5 file before reading: no external data, and no impossible sizes."""
+"""Check an HDF5 file before reading: no external data, and no sizes that the file cannot contain."""
 
 import errno
 import math
@@ -19,9 +19,9 @@ LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
 """Largest chunk; chunks of recordings have 200 kB."""
 LARGEST_RATIO = 1100
-"""Largest ratio of declared to stored bytes; Deflate reaches at most 1030 (zlib's documentation)."""
+"""Largest ratio of declared to stored bytes; Deflate compresses by at most 1030 (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
-"""Largest size that a dataset may declare without stored data."""
+"""Largest size that a dataset may declare beyond its stored data; HDF5 fills it with a constant."""
 OWN_FILTERS = frozenset(
     {
         h5py.h5z.FILTER_DEFLATE,
@@ -33,16 +33,16 @@ OWN_FILTERS = frozenset(
         h5py.h5z.FILTER_LZF,
     }
 )
-"""Allowed filters; other filters are plug-in libraries, which HDF5 would load and execute."""
+"""Allowed filters. Other filters are plug-in libraries, which HDF5 would load and execute."""
 
 UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
 """Errors that h5py raises for unreadable headers or number types."""
 
 _SYSTEM_ERROR = re.compile(r"errno = (?!22,)\d+, error message = '([^']*)'")
-"""Pattern of a system error in a message of HDF5; not 22, an impossible address in a damaged file."""
+"""Pattern of an operating-system error in a message of HDF5; excludes error 22, a bad address in the file."""
 
 _allowances: list[None] = []
-"""One entry for each active `allow_external_data`, valid in all threads of the process."""
+"""One entry for each active `allow_external_data`, which applies to all threads of the process."""
 
 
 class UnsafeHdf5(ValueError):
@@ -50,7 +50,7 @@ class UnsafeHdf5(ValueError):
 
 
 def system_error(error: BaseException) -> str:
-    """Return the system's message for a read error ("Input/output error"); empty if there is none."""
+    """Return the operating system's message in a read error ("Input/output error"); empty if none."""
     if found := _SYSTEM_ERROR.search(str(error)):
         return found[1]
     return error.strerror or "" if isinstance(error, OSError) and error.errno else ""
@@ -67,7 +67,7 @@ def allow_external_data() -> Iterator[None]:
 
 
 def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
-    """Return a file opened for reading, after a check of all its content except the data.
+    """Open a file for reading after checking its structure; the numbers in datasets are not checked.
 
     Raises OSError when HDF5 cannot open the file; UnsafeHdf5 for external data or impossible sizes.
 
@@ -96,7 +96,7 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
 
 
 def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
-    """Yield path and object of a group and of all objects below it, each once, ordered by name.
+    """Yield path and object of a group and of all objects below it; each object once, ordered by name.
 
     Raises UnsafeHdf5 at a link to another file, unless that is allowed. Soft links are not followed.
     """
@@ -110,7 +110,7 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             continue
         if depth == DEEPEST:
             raise UnsafeHdf5(f"its groups are nested more than {DEEPEST} levels deep")
-        links += len(item)  # counted first, because many links may lead to one object
+        links += len(item)  # checked before the loop, because many links may lead to the same object
         if links > MOST_OBJECTS:
             raise UnsafeHdf5(f"it contains more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):

@@ -1,8 +1,8 @@
-"""Write HDF5 files with reliable errors on a failing disk, without crashes or silent gaps.
+"""Write HDF5 files so that a failing disk raises an error, without a crash or missing data.
 
 HDF5 2.0 crashes if a write fails while a file is being closed, and h5py only prints errors that occur while
-an object is being closed. HDF5 therefore writes to a file object that reports every write as successful and
-stores the first error. This error is raised after HDF5 has closed the file. A Ctrl-C is also delayed.
+an object is being closed. Therefore HDF5 writes to a file object that accepts every write and stores the
+first error, which is raised after HDF5 has closed the file. A Ctrl-C during a write is delayed likewise.
 """
 
 import signal
@@ -54,7 +54,7 @@ def open_hdf5_to_write(
 
 @contextmanager
 def _interrupts(disk: _Disk) -> Iterator[None]:
-    """Delay a KeyboardInterrupt that occurs during a write until the file is closed."""
+    """Delay a KeyboardInterrupt that occurs inside this module until the file is closed."""
     is_reached = threading.current_thread() is threading.main_thread()
     found = {each: signal.getsignal(each) for each in (signal.valid_signals() if is_reached else ())}
     handlers: dict[int, Any] = {number: handler for number, handler in found.items() if callable(handler)}
