@@ -1,4 +1,4 @@
-"""Analysis of basins of attraction: uncertainty exponent of their boundaries, and stability under kicks."""
+"""Analysis of basins of attraction: fractal dimension of their boundaries, and stability under kicks."""
 
 import math
 from collections.abc import Sequence
@@ -21,45 +21,45 @@ from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults
 
 BLOCKS = 4
-"""Number of parts along each axis in the jackknife estimate of the exponent's error."""
+"""Number of parts along each axis of the map, for the jackknife estimate of the exponent's error."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Fewest uncertain cells at a distance that is used."""
+"""Fewest uncertain initial states at a distance for which this distance is used."""
 MOST_UNCERTAIN = 0.5
-"""Largest share of uncertain cells at a distance that is used; above it, cells differ by chance."""
+"""Largest share of uncertain initial states for which a distance is used; above it, chance prevails."""
 SPREAD = 4.0
-"""Smallest ratio of the largest to the smallest distance; over a smaller range the slope is unreliable."""
+"""Smallest ratio of the largest to the smallest used distance; a narrower range gives no reliable slope."""
 
 
 @dataclass(frozen=True)
 class UncertaintyExponent:
-    """Uncertainty exponent: the share of uncertain starts is proportional to (uncertainty)^exponent.
+    """Exponent of basin boundaries: share of uncertain initial states is proportional to distance^exponent.
 
-    The exponent is 1 for a smooth boundary, and 0 if a more accurate start does not help. The dimension of
-    the boundary is 2 minus the exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
+    The exponent is 1 for a smooth boundary, and 0 if a more accurate initial state does not help. The
+    dimension of the boundary is 2 - exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
     """
 
     exponent: float
     low: float
-    """Lower end of the 95 % confidence interval, at the resolution of the grid."""
+    """Lower end of the 95 % confidence interval for the boundary as resolved by the grid."""
     high: float
     steps: tuple[int, ...]
-    """Compared distances in steps of the grid."""
+    """Distances used for the fit, in steps of the grid."""
     shares: tuple[float, ...]
-    """Share of uncertain starts at each distance."""
+    """Share of uncertain initial states at each distance."""
 
 
 def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | None:
-    """Return the uncertainty exponent of the basin boundaries in a map over two coordinates of the start.
+    """Return the uncertainty exponent of the basin boundaries in a map over two initial coordinates.
 
-    A start is uncertain at a distance if a start at this distance along an axis reaches another motion. The
-    confidence interval is a jackknife estimate over parts of the map. None unless at least three distances
-    have at least 100 uncertain starts, and at most half of all starts.
+    An initial state is uncertain at a distance if a step of this size along an axis leads to another motion.
+    The confidence interval is a jackknife estimate over parts of the map. Returns None unless at least three
+    distances each have 100 or more uncertain initial states, and these are at most half of all.
 
     Parameters
     ----------
     numbers
-        Index of the motion that each start reached, `MapResults.motion_numbers[:, 0]`, shape (rows, columns).
+        Index of the motion from each initial state, `MapResults.motion_numbers[:, 0]`, (rows, columns).
     """
     steps = [2**k for k in range(int(math.log2(max(min(numbers.shape) // 8, 1))) + 1)]
     uncertain = {step: _uncertain(numbers, step, steps[-1]) for step in steps}
@@ -82,7 +82,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
 
 
 def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
-    """Return whether a start ``step`` away along an axis reaches another motion; edge cells are omitted."""
+    """Return whether a step of this length along an axis leads to another motion, without edge cells."""
     inner = numbers[
         edge - step : numbers.shape[0] - edge + step, edge - step : numbers.shape[1] - edge + step
     ]
@@ -93,7 +93,7 @@ def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.b
 
 
 def _share_without(uncertain: NDArray[np.bool_], part: int) -> float:
-    """Return the share of uncertain starts, with one part of the map left out."""
+    """Return the share of uncertain initial states, with one part of the map left out."""
     rows, columns = (np.arange(length) * BLOCKS // length for length in uncertain.shape)
     is_in = (rows[:, None] * BLOCKS + columns) != part
     return max(float(uncertain[is_in].mean()), 1.0 / uncertain.size)
@@ -131,12 +131,12 @@ def kick_stability(
     results
         Complete map in which only the start varies.
     sizes
-        Sizes of the kicks, which are normally distributed (in Menck, Heitzig, Marwan and Kurths, Nature
-        Physics 9 (2013) 89, they are uniformly distributed in a box).
+        Standard deviations of the kicks, which are normally distributed (in Menck, Heitzig, Marwan and
+        Kurths, Nature Physics 9 (2013) 89, they are uniformly distributed in a box).
     kicks
         Number of kicks of each size, all at the same drive phase.
     seed, workers
-        Seed of the kicks, and number of threads.
+        Seed of the random kicks, and number of threads.
     """
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks were requested; give 1 or more.")

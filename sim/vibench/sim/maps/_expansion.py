@@ -1,4 +1,4 @@
-"""Points of a map as scenes: their starts, their stored results, and the selection of computed points."""
+"""Points of a map as scenes: their initial states, their stored results, and which points to compute."""
 
 import math
 import os
@@ -29,19 +29,19 @@ from ._map import OF_SPECIMEN, START, Map, contact_energy_j, labels_of, section_
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1
-"""Relative difference between neighbouring responses above which a map is refined."""
+"""Relative difference between neighbouring responses above which points between them are computed."""
 BASIN_JUMP = 2e-3
-"""The same if only the start varies; responses of one motion then differ only by remaining transients."""
+"""`JUMP` if only the initial state varies; the same motion then differs only by remaining transients."""
 NOTHING = -1
 BUNDLE_S = 0.3
-"""Worker time of a bundle of scenes [s], long enough for full SIMD batches."""
+"""Computing time of the scenes that a worker receives at once [s]; long enough to fill SIMD batches."""
 
 
 def map_solver(plan: Map) -> Solver:
-    """Return the solver of a map: in SIMD batches, or point by point.
+    """Return the solver of a map: in SIMD batches or one by one.
 
-    Batches require independent motions of one specimen and a processor with wide registers. Stops other than
-    Hertz contacts, the accuracy *reference* and points with a target are solved one by one.
+    Batches need points that do not continue one another, a single specimen, and wide processor registers.
+    Stops other than Hertz contacts, the accuracy *reference* and points with a target are solved one by one.
     """
     if plan.target is not None:
         return solve_scene
@@ -70,7 +70,7 @@ class MapPoints(Points):
 
     @property
     def wanted_first(self) -> NDArray[np.int64]:
-        """Numbers of the points of the first lattice, from all starts."""
+        """Numbers of the points of the first lattice, for all initial states of each cell."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
@@ -82,18 +82,18 @@ class MapPoints(Points):
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
 
     def unchained(self, number: int) -> Scene:
-        """Return the scene of a point that does not continue another."""
+        """Return the scene of a point that starts from the plan's initial state."""
         return self.plan.scene(self.grid.place(number))
 
     def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point that continues the point ``before``."""
+        """Return the scene of a point that starts from the final state of the point ``before``."""
         place = self.grid.place(number)
         state = state_of(arrays["final_state"][before].astype(np.float64))
         start = Given(state, self.plan.start_labels[place[-2]])
         return self.plan.scene(place, start, self.plan.phase_after(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the values to store for a prediction."""
+        """Return the values to store for the solution of a point."""
         found = solved.prediction
         numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
         cells: dict[str, Cell] = {
@@ -119,7 +119,7 @@ class MapPoints(Points):
 
 
 def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
-    """Return the cells of an adaptive map to compute next, or the filled-in cells if there are none."""
+    """Return the cells of an adaptive map to compute next or, if there are none, the cells to fill in."""
     shape = plan.grid.shape
     state = np.asarray(arrays["state"]).reshape(shape)
     is_known = np.all((state != PointState.MISSING) & (state != PointState.FILLED), axis=1)
@@ -138,15 +138,15 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a number for each cell, equal for equal motions of the first start and equal sets of motions.
-
-    ``label`` has the shape (rows, starts, columns), the result (rows, columns).
+    """Return a number for each cell, shape (rows, columns), equal in cells that reach the same motions.
+    The motion of the first initial state and the set of all motions must agree. ``label`` is the number of
+    the motion of each point, shape (rows, initial states, columns).
     """
     rows, starts, columns = label.shape
     if starts == 1:
         return label[:, 0]
     found = np.sort(label, axis=1)
-    # Count a motion once, even if several starts reach it.
+    # Count a motion once, even if several initial states reach it.
     found[:, 1:][found[:, 1:] == found[:, :-1]] = NOTHING
     cells = np.concatenate([label[:, :1], np.sort(found, axis=1)], axis=1)
     flat = cells.transpose(0, 2, 1).reshape(rows * columns, starts + 1)
@@ -160,7 +160,7 @@ def cells_shape(grid: Grid) -> tuple[int, int]:
 
 
 def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:
-    """Return the numbers of the points in some cells of a map over two quantities, for all starts."""
+    """Return the numbers of all points (one per initial state) in some cells of a map."""
     _, starts, columns = grid.shape
     row, column = np.divmod(cells, columns)
     return np.asarray(((row[:, None] * starts + np.arange(starts)) * columns + column[:, None]).reshape(-1))
@@ -172,23 +172,23 @@ POINT_S = 2e-4
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """Estimated time of a map. For an adaptive map: bounds, from the first lattice only to all points."""
+    """Estimated computing time of a map; for an adaptive map, bounds: first lattice only, and all points."""
 
     points: int
     coarse_points: int
     """Number of points of the first lattice, which are computed in any case."""
     work_s: float
-    """Time of all points on one core [s], from recent run times on this machine."""
+    """Computing time of all points on one core [s], from recent run times on this machine."""
     longest_work_s: float
-    """Time of all points on one core [s] if no motion repeats and all runs have their full length."""
+    """Computing time of all points on one core [s] if no motion repeats, so that all runs are full length."""
     coarse_work_s: float
-    """Time of the first lattice on one core [s]."""
+    """Computing time of the first lattice on one core [s]."""
     workers: int
     file_bytes: int
     followed: str
     """Description of the solver chosen by `map_solver`."""
     known_from: str
-    """Description of the source of the run times."""
+    """Source of the run times, as text."""
 
     @property
     def all_s(self) -> float:
@@ -207,11 +207,11 @@ class MapEstimate:
 
     @property
     def most_useful_workers(self) -> int:
-        """Largest useful number of workers; more workers would wait for the main process."""
+        """Largest useful number of workers; more of them would wait for the main process."""
         return max(1, min(self.points, math.floor(self.work_s / (self.points * POINT_S))))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
-        """Return the elapsed time [s]: shared work and a last point, or the time of the main process."""
+        """Return the elapsed time [s], which is limited by the workers or by the main process."""
         return max(work_s / self.workers + work_s / points, points * POINT_S)
 
     @property
@@ -227,7 +227,7 @@ class MapEstimate:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """Return plain values for JSON."""
+        """Return a dict of plain values for JSON."""
         return {
             **asdict(self),
             "all_s": self.all_s,

@@ -1,4 +1,4 @@
-"""Request for a map: fixed parameters, and one or two varying parameters."""
+"""Plan of a map: fixed parameters, and one or two varying parameters."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -52,16 +52,16 @@ KEPT = (
 )
 """Columns of a study that are also columns of a map."""
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
-"""Additional columns of a map with a target."""
+"""Columns in addition to these, in a map with a target."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
-"""Most stored section points (states once per drive period) of a motion, in a map along one quantity."""
+"""Largest number of states (one per drive period) stored for a motion, in a map along one quantity."""
 SECTION_COLUMNS = tuple(
     Column(f"section_{name}", "<f8", "m", f"{what} once a drive period", (), SECTION_STATES, "drive_period")
     for name, what in (("x", "displacement of m0"), ("p", "displacement of m1 against m2"))
 )
-"""Columns for the section points in a map along one quantity."""
+"""Columns for these states, in a map along one quantity."""
 _OF_STUDIES = {column.name: column for column in COLUMNS}
 _MAP_COLUMNS = (
     *(_OF_STUDIES[name] for name in KEPT[:-1]),
@@ -76,20 +76,20 @@ def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
 
 
 LONGER = 64
-"""Base of the labels, kind * LONGER + period; larger than the longest period that is detected."""
+"""Factor in the labels kind * LONGER + period; larger than the longest detected period."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
 
 
 def without_impacts(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Return whether the motion of each point has period 1 and no impacts, shape (points,)."""
+    """Return whether the motion of each point has the drive's period and no impacts, shape (points,)."""
     is_first = (arrays["motion"] == _PERIODIC) & (arrays["period"] == 1)
     return np.asarray(is_first & (arrays["impact_rate"] == 0.0))
 
 
 def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """Return a label of each motion by kind and period; motions without impacts have a separate label."""
+    """Return a label for kind and period of each motion; the motion without impacts has a separate label."""
     motion, period = (arrays[name].astype(np.int64) for name in ("motion", "period"))
     return np.where(without_impacts(arrays), _PERIODIC * LONGER, motion * LONGER + period)
 
@@ -97,7 +97,7 @@ def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:
     """Return the largest energy stored in a stop [J], from the penetration; None without elastic stops.
 
-    None also if the gaps differ and abs(p) exceeds the smaller gap: either stop may have been reached.
+    None also if the gaps differ and abs(p) exceeds the smaller one: it is unknown which stop was reached.
     """
     stops = specimen.contact.stops
     if found.relative_i is None or stops.restitution is not None:
@@ -111,7 +111,7 @@ def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None
 
 
 def section_cells(found: ScenePrediction) -> dict[str, Cell]:
-    """Return the section points to store: one period of a repeating motion, otherwise `SECTION_STATES`."""
+    """Return the states to store: one period of a motion that repeats, otherwise `SECTION_STATES`."""
     if found.section is None:
         return {}
     most = min(SECTION_STATES, found.period or SECTION_STATES)
@@ -123,12 +123,12 @@ def section_cells(found: ScenePrediction) -> dict[str, Cell]:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A parameter of a scene that may be fixed or vary."""
+    """Parameter of a scene that is fixed or varies in a map."""
 
     field: str
     """Name of the field of `Map`."""
     axis: str
-    """Name of the axis of the results."""
+    """Name of the axis for this parameter in the results."""
     units: str
     long_name: str
 
@@ -156,9 +156,9 @@ QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)
 
 
 MOST_POINTS = 4_000_000
-"""Largest number of points; file and memory then have 1 GB each."""
+"""Largest number of points; file and memory then take 1 GB each."""
 MOST_STEP = 16
-"""Default spacing of the first lattice, in grid steps."""
+"""Largest default spacing of the first lattice, in grid steps."""
 FEWEST_STEPS = 8
 """Fewest intervals of the first lattice on an axis; with fewer, most of the map would be interpolated."""
 STARTS = "start"
@@ -235,57 +235,57 @@ class Map(GridPlan):
     format: ClassVar[str] = "vibench-map"
 
     specimen: SpecimenTable = Field(default_factory=usual_specimen)
-    """Name or path of a specimen, or a table that may start from one (``model``); by default the paper's."""
+    """Name or path of a specimen, or a table that may name one in ``model``; by default the paper's."""
     model: ContactWord | None = None
     """Contact law; by default that of the specimen."""
     frequency_hz: Positive = 260.0
-    """Frequency of the drive."""
+    """Drive frequency [Hz]."""
     amplitude_m: Positive = 5e-6
-    """Amplitude of the base displacement."""
+    """Amplitude of the base displacement [m]."""
     gap_m: Positive | None = None
-    """Clearance at both stops; by default that of the specimen, as for the next five parameters."""
+    """Clearance at both stops [m]. For it and the next five fields the default is the specimen's value."""
     damping_time_s: NonNegativeFloat | Range | None = None
-    """Damping over stiffness, c_i / k_i."""
+    """Damping over stiffness, c_i / k_i [s]."""
     k0_n_per_m: Positive | None = None
-    """Stiffness between base and m0; dampings change with it if the specimen has a damping time."""
+    """Stiffness between base and m0 [N/m]; c0 changes with it if the specimen has a damping time."""
     k1_n_per_m: Positive | None = None
-    """Stiffness between m2 and m1."""
+    """Stiffness between m2 and m1 [N/m]."""
     k2_n_per_m: Positive | None = None
-    """Stiffness between m0 and m2."""
+    """Stiffness between m0 and m2 [N/m]."""
     hertz_stiffness: Positive | None = None
     """Hertz stiffness k of a stop, F = k d^(3/2) [N/m^1.5]."""
     x_m: Number = 0.0
-    """Initial absolute displacements and velocities of m0, m1 and m2."""
+    """Initial absolute displacement of m0; below those of m1 and m2, and the three velocities [m, m/s]."""
     y_m: Number = 0.0
     z_m: Number = 0.0
     vx_m_per_s: Number = 0.0
     vy_m_per_s: Number = 0.0
     vz_m_per_s: Number = 0.0
     chain: tuple[Literal[Start.UP, Start.DOWN], ...] = ()
-    """Start each point from the final state of the previous point: up, down, or both along the range."""
+    """Continue each point from the final state of the previous one: up, down, or both along the range."""
     random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
-    """Number of additional random starts at every point, to find coexisting motions and their shares."""
+    """Number of additional random initial states per point, to find coexisting motions and their shares."""
     seed: Annotated[int, Field(ge=0)] = 1
-    """Seed of the random starts."""
+    """Seed of the random initial states."""
     observe: Annotated[tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...], Field(min_length=1)] = (
         Observable.RESPONSE,
     )
-    """Additional observables: "lyapunov" is the largest Lyapunov exponent, averaged over up to 25 s at each
-    point, which takes tens of times longer."""
+    """Observables. "lyapunov" is the largest Lyapunov exponent, averaged over up to 25 s at each point, which
+    takes tens of times longer."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Accuracy of each point."""
+    """Accuracy level of each point."""
     error: TargetError | None = None
-    """Requested relative error of each point, 0.01 or "1 %"; replaces the accuracy."""
+    """Requested relative error of each point, 0.01 or "1 %"; replaces the accuracy level."""
     time_s: TargetTime | None = None
-    """Time limit per point, 2 or "2 s"; with only an error, one minute."""
+    """Limit of the computing time per point, 2 or "2 s"; one minute if only an error is given."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
-    """Longest run of a motion that does not repeat, in drive periods."""
+    """Length of the run, in drive periods, after which a motion that does not repeat is given up as such."""
     window_periods: Annotated[int, Field(ge=10)] = 200
-    """Length of the window for a motion that does not repeat, in drive periods."""
+    """Length of the response window of a motion that does not repeat, in drive periods."""
     refinement: Refinement = Refinement.ADAPTIVE
     """Selection of the computed points of a map over two quantities."""
     coarse: Annotated[int, Field(ge=2, le=64)] | None = None
-    """Grid steps between the points that are computed first; halved until 1. By default 16, or fewer so that
+    """Grid steps between the points computed first, 2 to 64; halved until 1. By default 16, or fewer so that
     each axis has eight intervals. Points between equal neighbours are filled in."""
 
     @property
@@ -323,7 +323,7 @@ class Map(GridPlan):
         return self
 
     def _refuse_unless_felt(self, quantity: Quantity) -> None:
-        """Raise ValueError for a range of a parameter that has no effect with this contact law."""
+        """Raise ValueError for a range of a parameter that has no effect with the plan's contact law."""
         if quantity not in OF_SPECIMEN:
             return
         span = self.range_of(quantity)
@@ -346,7 +346,7 @@ class Map(GridPlan):
     def range_of(self, quantity: Quantity) -> Range:
         """Return the range of a varying quantity."""
         found = getattr(self, quantity.field)
-        assert isinstance(found, Range), "only varied parameters are requested"
+        assert isinstance(found, Range), "only varying quantities have a range"
         return found
 
     @property

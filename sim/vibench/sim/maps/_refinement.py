@@ -1,7 +1,7 @@
 """Selection of the computed cells of a map: a coarse lattice first, then cells whose neighbours differ.
 
-The selection depends only on the known results, and is repeated from the coarse lattice whenever all
-requested cells are done. A resumed map therefore computes the same cells as an uninterrupted map.
+The selection depends only on the known results. It is repeated from the coarse lattice whenever all
+requested cells are done. A resumed map therefore computes the same cells as an uninterrupted one.
 """
 
 from collections.abc import Iterator
@@ -17,40 +17,40 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Largest number and largest share of filled-in cells that are computed for the audit."""
+"""Largest number and largest share of filled-in cells that are computed to check them (audit)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Compared results of the cells of a map, arrays of shape (rows, columns)."""
+    """Results by which the cells of a map are compared; arrays of shape (rows, columns)."""
 
     is_known: Mask
     """Whether the cell has been computed."""
     codes: Codes
-    """Number of the motion, or set of motions, of the cell."""
+    """Number that is equal for cells with the same motion or set of motions."""
     sizes: Floats
     """Natural logarithm of a response; NaN for motions whose response is not reproducible."""
     jump: float
-    """Difference of sizes above which neighbours are different."""
+    """Difference of ``sizes`` above which two neighbours count as different."""
 
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """Filled-in cells of one level, with the cells and weights for interpolation."""
+    """Filled-in cells of one lattice level, with the cells and weights from which they are interpolated."""
 
     cells: Indices
     """Flat indices of the filled-in cells, shape (n,)."""
     donors: Indices
     """Computed cells whose motion is copied, shape (n,)."""
     corners: Indices
-    """Cells of coarser levels with the same motion, as corners for interpolation, shape (n, 4)."""
+    """Computed or filled-in cells of coarser levels between which to interpolate, shape (n, 4)."""
     weights: Floats
     """Interpolation weights of the corners, whose sum is 1, shape (n, 4)."""
 
 
 @dataclass(frozen=True, eq=False)
 class RefinementPlan:
-    """Cells to compute next, or the filled-in cells if there are none."""
+    """Cells to compute next or, if there are none, the cells to fill in."""
 
     missing: Indices
     """Flat indices of the cells to compute next."""
@@ -59,13 +59,13 @@ class RefinementPlan:
     fillings: tuple[Filling, ...] = ()
     """Filled-in cells of each level, from coarse to fine."""
     audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Audited cells, which are computed although they could be filled in."""
+    """Filled-in cells that are computed all the same, to check the filling."""
     audited_donors: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Computed cells whose motion would have been copied to each audited cell."""
+    """Computed cell from which each of these cells would have been filled in."""
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
-    """Return the cells to compute next; none if the map is complete.
+    """Return the cells to compute next or, if all are known, the filled-in cells.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _audit_plan(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> 
 
 
 class _Sketch:
-    """Computed and filled-in cells of the levels processed so far."""
+    """Cells that are computed or filled in at the lattice levels processed so far."""
 
     def __init__(self, seen: Seen) -> None:
         self.seen = seen
@@ -124,7 +124,7 @@ class _Sketch:
         self.donors[cells] = np.flatnonzero(cells)
 
     def refine(self, fine: int, step: int) -> Mask:
-        """Refine a lattice by a factor of two; return the cells that must be computed before, if any."""
+        """Halve the spacing of the lattice; return the cells that must be computed first, if any."""
         cells = np.flatnonzero(lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step))
         corners, weights = _corners(self.codes.shape, cells, step)
         wanted = np.zeros_like(self.is_computed)
@@ -135,16 +135,16 @@ class _Sketch:
             if missing.any():
                 return missing
             self.compute(wanted)
-            # Compute filled-in cells beside a different cell: regions can be narrower than the lattice.
+            # Compute filled-in cells beside a different cell: regions may be narrower than the lattice.
             beside = self._has_other_neighbour(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
             if not beside.any():
                 return missing
             wanted = beside
 
     def filling(self, fine: int, step: int) -> Filling:
-        """Return the filled-in cells of a level.
+        """Return the filled-in cells of one lattice level.
 
-        Corners that were later found to have another motion are not used.
+        A corner that later turned out to have another motion gets no weight.
         """
         is_new = lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step) & ~self.is_computed
         cells = np.flatnonzero(is_new)
@@ -162,7 +162,7 @@ class _Sketch:
         self.sizes.reshape(-1)[cells] = (self.sizes.reshape(-1)[corners] * weights).sum(axis=1)
 
     def _differ(self, corners: Indices) -> Mask:
-        """Return whether the corners of each cell have different motions, shape (n,)."""
+        """Return whether the four corners of each cell have different motions, shape (n,)."""
         codes, sizes = self.codes.reshape(-1)[corners], self.sizes.reshape(-1)[corners]
         spread = sizes.max(axis=1) - sizes.min(axis=1)
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
@@ -201,7 +201,7 @@ def _lines(length: int, step: int) -> Indices:
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Return whether each cell is on a lattice of every n-th line, with the last line of the map."""
+    """Return whether each cell is on every ``step``-th row and column, or on the last one."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found

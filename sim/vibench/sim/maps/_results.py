@@ -1,4 +1,4 @@
-"""Results of a map over its axes, computed or filled in, and the motions that were found."""
+"""Results of a map over its axes, computed or filled in, and the different motions in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from ._refinement import RefinementPlan
 
 UNKNOWN = -1
 SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
-"""Whether the responses of each kind of motion are reproducible."""
+"""Whether the responses of each kind of motion are reproducible, in the order of `MotionKind`."""
 
 
 @dataclass(frozen=True)
 class MapMotion:
-    """A motion in a map or in one of its cells; symmetric partners count as one motion."""
+    """A motion in a map or in one cell. A motion and its mirror image count as one."""
 
     motion: MotionKind
     period: int | None
@@ -33,13 +33,13 @@ class MapMotion:
     """Response I, largest abs(x) over the drive amplitude; median over the points with this motion."""
     response_ii: float
     share: Share
-    """Share of the starts after the drive periods of the map; chaos may die out later. The 95 % intervals of
-    all motions are simultaneous. Random starts are equal in all cells, so each counts as one trial."""
+    """Share of initial states that reach this motion within the map's drive periods; chaos may end later. The
+    95 % intervals of all motions hold together. Random states equal in all cells count as one trial each."""
 
 
 @dataclass(frozen=True)
 class Audit:
-    """Error rate of filled-in cells, from a random sample."""
+    """Error rate of the filled-in cells, from a random sample that was computed."""
 
     filled: int
     """Number of filled-in cells, including the audited cells."""
@@ -47,9 +47,9 @@ class Audit:
     wrong: int
     """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Number of wrong cells by their computed motion; fractional with several starts."""
+    """Number of wrong cells by the motion that was computed; fractional with several initial states."""
     lost: tuple[float, ...]
-    """Number of wrong cells by their filled-in motion."""
+    """Number of wrong cells by the motion that was filled in."""
 
     @property
     def wrong_share(self) -> Share:
@@ -59,10 +59,10 @@ class Audit:
         return wilson_share(self.wrong, self.audited)
 
     def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
-        """Return the shares of motions in a map with ``cells`` cells, corrected for wrong filled-in cells.
+        """Return the shares of the motions in a map with ``cells`` cells, corrected for wrong filling.
 
-        Where motions are finely mixed, the most common motion is filled in too often. Gains and losses of the
-        audited cells are extrapolated to all filled-in cells.
+        Where motions are finely mixed, the most common one is filled in too often. The gains and losses found
+        by the audit are extrapolated to all filled-in cells.
         """
         if not self.filled:
             return tuple(shares)
@@ -70,7 +70,7 @@ class Audit:
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
-            # Without audited cells, nothing is known about filled-in cells.
+            # An audit without cells gives no information about the filled-in cells.
             come, gone = (
                 wilson_share(each, self.audited, unsure) if self.audited else Share(0.0, 0.0, 1.0)
                 for each in (gained, lost)
@@ -86,14 +86,14 @@ class Audit:
 
 
 def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
-    """Return the error rate of filled-in cells.
+    """Compare the audited cells with what would have been filled in; return the error rate.
 
     Parameters
     ----------
     numbers
         Index of the motion of each point, shape (rows, starts, columns).
     found
-        Plan of a complete map.
+        Plan of a complete map, with its audited cells.
     """
     codes = cell_codes(numbers).reshape(-1)
     starts = np.moveaxis(numbers, 1, 2).reshape(len(codes), -1)
@@ -142,7 +142,7 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def motion_counts(self) -> Floats:
-        """Number of different motions reached from the starts of each cell; NaN if unknown."""
+        """Number of different motions reached from the initial states of each cell; NaN if unknown."""
         shape = self.plan.grid.shape
         labels, sizes = self._labels.reshape(shape), self._sizes.reshape(shape)
         order = np.lexsort((sizes, labels), axis=-2)
@@ -157,12 +157,12 @@ class MapResults(GridResults[Map]):
     def motions(self) -> tuple[MapMotion, ...]:
         """Motions of the whole map, in the order of `motion_numbers`.
 
-        Shares are those of all known points, corrected by the audit if some points are filled in.
+        Shares are those among all known points, corrected by the audit if points are filled in.
         """
         return self._described(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Return the motions of a cell, the most common first; `place`: second quantity, first quantity."""
+        """Return the motions of a cell, the most common first; `place` = indices (second, first quantity)."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
@@ -171,9 +171,9 @@ class MapResults(GridResults[Map]):
         return self._described(numbers, None)
 
     def shown(self, name: str, start: int = 0) -> Floats:
-        """Return a result over the varying quantities, for one of the starts; NaN if unknown.
+        """Return a result over the varying quantities, for one of the initial states; NaN if unknown.
 
-        ``name`` is a column, or ``motions`` for the number of motions reached from the starts of a cell.
+        ``name`` is a column, or ``motions`` for the number of motions that a cell's initial states reach.
         """
         if name == "motions":
             return self.motion_counts
@@ -181,7 +181,7 @@ class MapResults(GridResults[Map]):
         return np.asarray(np.take(values, start, axis=len(self.plan.grid.shape) - 2))
 
     def example(self, number: int) -> int:
-        """Return the number of the first computed point whose motion has this index."""
+        """Return the number of the first computed point with the motion of this index."""
         is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
         return int(np.flatnonzero(is_it)[0])
 
@@ -226,7 +226,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Return group numbers by label and, if given, by size; a jump of the size separates two motions."""
+    """Return group numbers by label and, if given, by size; within a label a jump of size splits."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))
@@ -237,7 +237,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the motions renumbered in the order of their frequency, the most common first."""
+    """Return the numbers changed so that 0 is the most common one, 1 the next, and so on."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")
@@ -247,7 +247,7 @@ def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
 def open_map(path: Path | str) -> MapResults:
     """Return the results in the file of a map, complete or still being computed.
 
-    Raises StudyError if the file is not that of a map, or has another format version.
+    Raises StudyError if the file does not contain a map, or has another format version.
     """
     path = Path(path)
     plan = read_plan(path, Map)

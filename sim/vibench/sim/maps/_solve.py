@@ -1,4 +1,4 @@
-"""Compute the selected points of a map, then fill in the other points."""
+"""Compute the points of a map that are needed, then fill in the others."""
 
 from pathlib import Path
 from typing import Literal
@@ -24,7 +24,7 @@ from ._refinement import Filling
 from ._results import MapResults, open_map
 
 WHOLE = ("motion", "period", "outcome")
-"""Columns that are copied from a computed cell to a filled-in cell."""
+"""Columns of a filled-in cell that are copied from one computed cell."""
 BETWEEN = (
     "response_i",
     "response_ii",
@@ -35,7 +35,7 @@ BETWEEN = (
     "lyapunov",
     "duration",
 )
-"""Columns that are interpolated between the corners around a filled-in cell."""
+"""Columns of a filled-in cell that are interpolated between its corners."""
 
 
 def solve_map(
@@ -49,14 +49,14 @@ def solve_map(
 ) -> MapResults:
     """Compute a map, or the missing points of its file, and return the results.
 
-    Raises StudyError, for example for a file of another map, a full disk or a cluster that does not answer.
+    Raises StudyError, for example if the file contains another map, the disk is full or a cluster is silent.
 
     Parameters
     ----------
     plan
         Requested map.
     out, existing, workers, cluster, observer, cancelled
-        As in `vibench.sim.study.solve_study`. The number of requested points increases with every level.
+        As in `vibench.sim.study.solve_study`. The total in progress reports grows with every lattice level.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def compute_map(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the missing points of a map until ``cancelled``, then fill in the other points.
+    """Compute the missing points of a map until done or ``cancelled``; when done, fill in the others.
 
     The solver of the executor must be `map_solver`.
     """
@@ -100,7 +100,7 @@ def fill_in(plan: Map, store: Store) -> None:
 
 
 def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
-    """Interpolate the filled-in cells of one level between their corners, for each start."""
+    """Interpolate the filled-in cells of one level between their corners, for each initial state."""
     cells = points_of(filling.cells, plan.grid)
     starts = plan.grid.shape[-2]
     of_cells = points_of(filling.corners.reshape(-1), plan.grid).reshape(-1, 4, starts)
@@ -114,7 +114,7 @@ def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
 
 
 def _mean(values: Floats, weights: Floats) -> Floats:
-    """Return the weighted mean over the finite corners, shape (n, 4) to (n,); NaN if none is finite."""
+    """Return the weighted mean over finite corners, shape (n, 4) to (n,); NaN if no corner is finite."""
     is_known = np.isfinite(values)
     counted = np.where(is_known, weights, 0.0)
     with np.errstate(invalid="ignore"):
