@@ -15,18 +15,18 @@ from ..specimen.specimen import Specimen
 from ..specimen.state import Floats, Table, Vector
 from ..specimen.stops import chosen
 
-# Division of a drive into intervals on which the base displacement is a cubic polynomial. SI units.
+# Drives as cubic polynomials of the base displacement on equal time intervals. SI units.
 #
 # A sampled drive is defined as the C2 spline through its samples. For a sweep, the cubic has the displacement
 # and the velocity of the sweep at both ends of each interval (C1). Its displacement error is at most
-# amplitude (omega h)^4 / 384 for the highest frequency; h is chosen for a thousandth of the tolerance.
+# amplitude (omega h)^4 / 384 at the highest frequency; the interval h makes it a thousandth of the tolerance.
 
 HERMITE = 384.0
 """Denominator of the error of cubic Hermite interpolation, h^4 / 384 times the fourth derivative."""
 SHARE = 1e-3
-"""Share of the tolerance that is used for the interpolation of a sweep."""
+"""Part of the tolerance that the interpolation of a sweep may use."""
 SHORTEST_TURN = 0.005
-"""Shortest interval [rad]; its error of 2e-12 of the amplitude needs no shorter interval."""
+"""Shortest interval [rad] of the highest frequency; its error, 2e-12 of the amplitude, is small enough."""
 
 
 class BaseMotion(NamedTuple):
@@ -39,9 +39,9 @@ class BaseMotion(NamedTuple):
 
 
 def sampled_motion(drive: Sampled) -> BaseMotion:
-    """Return the cubics of a sampled drive between its samples."""
+    """Return the base motion of a sampled drive, with one cubic between successive samples."""
     interval = 1.0 / drive.sample_rate_hz
-    # Use units of the interval, in which the knots of the spline are exact.
+    # With the interval as unit of time, the spline's knots are integers and therefore exact.
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 - harmonic drives do without scipy
 
     spline = CubicSpline(np.arange(len(drive.displacement_m), dtype=np.float64), drive.displacement_m)
@@ -57,7 +57,7 @@ def sweep_interval_s(drive: Sweep, accuracy: Accuracy) -> float:
 
 
 def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> BaseMotion:
-    """Return the cubics of ``count`` intervals of a sweep, beginning with interval ``first``."""
+    """Return the base motion of a sweep on ``count`` intervals, beginning with interval ``first``."""
     time_s = np.arange(first, first + count + 1, dtype=np.float64) * interval_s
     turns = drive.turns(time_s)
     angle = 2.0 * np.pi * (turns - np.floor(turns))
@@ -71,7 +71,7 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
 
 
 LATEST_START_S = 1e8
-"""Latest start, three years; after it, double precision does not resolve 1e-8 s."""
+"""Latest start time [s], about three years; later ones cannot be resolved to 1e-8 s in double precision."""
 MOST_SAMPLES = 1e9
 """Largest number of samples, which need 48 GB of memory."""
 ROUNDING = 1e-9
@@ -121,10 +121,10 @@ def integrate(
 ) -> Trajectory:
     """Integrate the motion of a specimen under a drive.
 
-    Motion without contact is exact: a harmonic drive in closed form, other drives as piecewise cubics. Bounds
+    Motion without contact is exact for a harmonic drive; other drives are piecewise cubics. Bounds on p
     ensure that no contact is missed. Contacts are integrated with the tolerance of ``accuracy``. Sampling
-    changes no step, so the motion is the same with any sample rate. Raises ValueError when an argument is not
-    allowed, or the drive ends before the run.
+    does not change the time steps, so the motion is the same at any sample rate. Raises ValueError when an
+    argument is not allowed, or the drive ends before the run.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def integrate(
     sample_rate_hz
         Rate of the samples at start_time_s + k / sample_rate_hz up to the end; None for no samples.
     start_time_s
-        Start time on the time axis of the drive, to continue from an earlier final state.
+        Time of the drive at which the run starts [s], for example to continue an earlier run.
     max_impact_rate_hz
         Mean impact rate above which the run ends with TOO_MANY_IMPACTS.
     """
@@ -159,7 +159,7 @@ def integrate(
     else:
         run, outcome = integrate_cubics(specimen, drive, float(start_time_s), end, accuracy, start, record)
     is_whole = outcome is Outcome.REACHED_END
-    # Rounding may place the last sample at or just after the end.
+    # Rounding may place the last sample time just after the end.
     states = record.all_samples(run.motion) if is_whole else record.samples
     return Trajectory(
         time_s=start_time_s + np.arange(len(states)) / rate_hz,
@@ -208,7 +208,7 @@ def check_within(available_s: float, end_s: float) -> None:
 
 
 BATCH = 1 << 16
-"""Number of intervals of a sweep computed at once; limits the memory for a long sweep."""
+"""Number of sweep intervals computed at once; limits the memory for long sweeps."""
 
 
 def integrate_cubics(
@@ -220,7 +220,7 @@ def integrate_cubics(
     start: Vector,
     record: RunRecord,
 ) -> tuple[CubicRun, Outcome]:
-    """Integrate a motion from ``start_s`` to ``end_s``, as `integrate` does; return the run and its outcome.
+    """Integrate a motion as `integrate` does, from ``start_s`` to ``end_s``; return run and outcome.
 
     Raises ValueError when the drive ends before the run.
     """
@@ -265,26 +265,26 @@ def _place(time_s: float, interval_s: float) -> tuple[int, float]:
     return int(position), time_s - int(position) * interval_s
 
 
-# Motion at each sample of a recorded base motion, to overlay a model on a recording. SI units.
+# Motion at each sample of a recorded base motion, to overlay a simulation on a recording. SI units.
 #
-# `integrate` returns more (impact times, any sample rate, any end) and takes several times longer per
-# interval. Here all intervals are whole, the state at each end is stored, and impacts are only counted.
+# `integrate` offers more (impact times, any sample rate, any end) and takes several times longer. Here the
+# run covers whole sample intervals, the state at the end of each is stored, and impacts are only counted.
 
 
 @dataclass(frozen=True, eq=False)
 class FollowedMotion:
-    """States at the samples that the run reached, and impacts between them."""
+    """States at the samples that a run reached, and numbers of impacts between them."""
 
     states: NDArray[np.float64]
     """x, y, z, vx, vy, vz at every sample in the inertial frame, shape (reached, 6) [m, m/s]."""
     impacts: NDArray[np.int64]
-    """Number of contacts that began between a sample and the next, shape (reached - 1,)."""
+    """Number of contacts that began between each sample and the next, shape (reached - 1,)."""
     requested: int
-    """Number of requested samples; larger than the number of states if the motion was lost."""
+    """Number of requested samples; larger than the number of states if the run ended early."""
 
     @property
     def reached_end(self) -> bool:
-        """Whether there is a state for every requested sample."""
+        """Whether the run reached every requested sample."""
         return len(self.states) == self.requested
 
 
@@ -304,8 +304,8 @@ def follow_samples(
     initial_state
         x, y, z, vx, vy, vz in the inertial frame, shape (6,) [m, m/s]; None for rest. May be in contact.
     first, last
-        Samples at which the run begins and ends; by default the whole drive. Samples outside this range
-        also affect the spline.
+        Samples at which the run begins and ends; by default the whole drive. The spline always uses all
+        samples of the drive.
     """
     accuracy = chosen(Accuracy, accuracy)
     base = sampled_motion(drive)

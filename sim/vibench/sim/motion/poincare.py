@@ -1,4 +1,4 @@
-"""Period of a motion, from its states once per drive period, and derivative of its flow. SI units."""
+"""Period of a motion from its states once per drive period, and derivative of its final state. SI units."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from ..specimen.state import Floats
 
 
 def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, most: int = 32) -> int | None:
-    """Return the smallest number of drive periods after which a section repeats; None if it does not.
+    """Return the number of drive periods after which a motion repeats, the smallest one; None if none.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, mo
     scales
         Scales of a state from `state_scales`, shape (6,).
     tolerance
-        Largest change of a state, over its scale, in a section that repeats.
+        Largest change of a state, over its scale, for a motion that repeats.
     most
         Longest period to try.
     """
@@ -40,10 +40,10 @@ def flow_derivative(
     duration_s: float,
     accuracy: Accuracy = Accuracy.REFERENCE,
 ) -> tuple[Floats, Floats]:
-    """Return the final state of a run from the drive's time zero, and its derivative by the initial state.
+    """Return the final state of a run from time zero of the drive, and its derivative by the initial state.
 
-    The shapes are (6,) and (6, 6); NaN if the run was lost. At a grazing impact on a rigid stop the
-    derivative does not exist, and very large numbers are returned.
+    The shapes are (6,) and (6, 6); NaN if the run did not finish. At a grazing impact on a rigid stop the
+    derivative does not exist; very large numbers are then returned.
 
     Parameters
     ----------

@@ -17,15 +17,15 @@ from .integrate import check_impact_rate
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """One point of a response curve; NaN if the run did not reach its end."""
+    """Responses of a motion at one drive; NaN if the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """Length of the window at the end of the run, over which largest values are taken [s]."""
+    """Length of the window at the end of the run from which the largest values are taken [s]."""
     line_periods: int
-    """Number of whole drive periods at the end of the window, over which lines are taken."""
+    """Number of whole drive periods, at the end of the window, from which the phasors are computed."""
     largest_x_m: float
     """Largest abs(x) in the window [m]."""
     largest_p_m: float
@@ -41,7 +41,7 @@ class Response:
     line_start_state: Floats
     """x, y, z, vx, vy, vz at the start of the ``line_periods``, shape (6,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz at the end, as the start of the next point of a sweep, shape (6,)."""
+    """x, y, z, vx, vy, vz at the end; initial state for the next point of a sweep, shape (6,)."""
     outcome: Outcome
 
     @property
@@ -77,9 +77,9 @@ def steady_response(
 ) -> Response:
     """Integrate a motion and return its responses in the window at the end of the run.
 
-    The defaults are those of Gong et al. 2025, section 2: 30 s from rest, of which the last 5 s are observed.
-    In chaos Response I scatters by a few per cent at every accuracy. The final motion may depend on
-    ``initial_state``, shape (6,) [m, m/s]; state it together with the result.
+    The defaults are those of Gong et al. 2025, section 2: 30 s from rest, of which the last 5 s are
+    evaluated. In a chaotic motion Response I scatters by a few per cent at every accuracy level. The final
+    motion may depend on ``initial_state``, shape (6,) [m, m/s]; state it together with the result.
 
     Raises ValueError when the drive amplitude is zero, or the window is longer than the run or shorter than
     one drive period.
@@ -97,7 +97,7 @@ def steady_response(
             line_start = run.motion
             record.watch(watch)
             outcome = run.advance(until, record)
-    # A line is twice the mean of the motion times exp(-i (omega t + phase)).
+    # A phasor is twice the time average of the motion times exp(-i (omega t + phase)).
     scale = 2.0 / line_s if outcome is Outcome.REACHED_END else math.nan
     peaks = (record.peak_x_m, record.peak_p_m) if outcome is Outcome.REACHED_END else (math.nan, math.nan)
     return Response(
@@ -119,7 +119,7 @@ def steady_response(
 
 
 def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
-    """Return the number of whole drive periods in a window; raise ValueError if it cannot be observed."""
+    """Return the number of whole drive periods in a window; raise ValueError for an unusable window."""
     if drive.amplitude_m == 0.0:
         raise ValueError(
             "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."

@@ -20,9 +20,9 @@ def open_to_write(path: Path) -> int:
 
 
 def open_for_all(path: Path) -> int:
-    """Return the descriptor of a lock file for all users, which is created if missing.
+    """Open a lock file for all users, created if missing; return its descriptor.
 
-    Raises OSError if the path is not a regular file with a single name: a link or a pipe, for example.
+    Raises OSError if the path is not a regular file with one name (but a link or a pipe, for example).
     """
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:
@@ -51,7 +51,7 @@ def write_at(descriptor: int, data: bytes | memoryview, offset: int) -> int:
 
 
 def read_at(descriptor: int, size: int, offset: int) -> bytes:
-    """Return up to ``size`` bytes at an offset; fewer at the end of the file."""
+    """Return up to ``size`` bytes at an offset; the result is shorter at the end of the file."""
     return os.pread(descriptor, size, offset)
 
 
@@ -70,7 +70,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def allocate(descriptor: int, offset: int, size: int) -> None:
-    """Allocate disk blocks for a range of a file, if the system can."""
+    """Allocate disk blocks for a range of a file, if the operating system can."""
     if sys.platform == "linux":
         try:
             os.posix_fallocate(descriptor, offset, size)
@@ -85,10 +85,10 @@ def lock_in_use(descriptor: int) -> None:
 
 
 def lock_sole_writer(descriptor: int) -> None:
-    """Lock a file as its only writer; others may read. Raises OSError if another process writes.
+    """Lock a file as its only writer, while others may read. Raises OSError if another process writes.
 
-    The exclusive lock is then replaced by a shared lock, which allows h5py to open the file for reading. If
-    another process takes the lock in between, the second step fails.
+    The exclusive lock is then replaced by a shared one, so that h5py can open the file for reading. This
+    second step fails if another process takes the lock in between.
     """
     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     lock_in_use(descriptor)
@@ -109,14 +109,14 @@ def lower_priority(by: int) -> None:
 
 
 def bound_memory(most_bytes: int) -> None:
-    """Limit the memory of this process, where the system supports limits."""
+    """Limit the memory of this process, where the operating system supports limits."""
     _, most = resource.getrlimit(resource.RLIMIT_DATA)
     bound = most_bytes if most == resource.RLIM_INFINITY else min(most, most_bytes)
     resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
 
 
 def usual_state_folder() -> Path:
-    """Return vibench's folder within the system's folder for the state of a user's programs."""
+    """Return vibench's folder inside the operating system's folder for user-specific program state."""
     home = Path.home()
     linux = Path(os.environ.get("XDG_STATE_HOME", home / ".local" / "state"))
     return (home / "Library" / "Application Support" if sys.platform == "darwin" else linux) / "vibench"
@@ -128,10 +128,10 @@ def usual_shared_folder() -> Path:
 
 
 def process_start(pid: int) -> str | None:
-    """Return the start time of a process in the system's notation; None if there is no such process.
+    """Return the start time of a process as text; None if no such process is alive.
 
-    A zombie counts as ended. The text is empty if the process is alive but its start is unknown. On Linux,
-    the text begins with identifiers of the boot and the container (`Place`).
+    A zombie counts as ended. The text is empty if the process is alive but its start time is unknown. On
+    Linux, the text begins with identifiers of the boot and the container, which `place_of` reads.
     """
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
@@ -140,7 +140,7 @@ def process_start(pid: int) -> str | None:
     except ProcessLookupError:
         return None
     # Split at the last bracket, because a process name may contain brackets and spaces. In proc(5) the state
-    # is field 3 and the start is field 22.
+    # is field 3 and the start time is field 22.
     state, *others = text.rpartition(")")[2].split()
     return None if state in "ZX" else f"{_here()}_{others[18]}"
 

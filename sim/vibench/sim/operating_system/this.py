@@ -1,4 +1,4 @@
-"""Functions of the current operating system."""
+"""Functions that differ between operating systems, for the current one."""
 
 import errno
 import os
@@ -34,7 +34,7 @@ Buffer = bytes | memoryview
 
 
 def write_all(descriptor: int, data: Buffer, offset: int) -> None:
-    """Write all bytes at an offset, with repeated calls after short writes."""
+    """Write all bytes at an offset, calling again if the system writes only part of them."""
     rest = memoryview(data).cast("B")
     while len(rest):
         written = write_at(descriptor, rest, offset)
@@ -63,7 +63,7 @@ class OpenFile:
         return is_locked_alone(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``; it may remain in the system's cache until `sync`."""
+        """Write ``data`` at ``offset``; only after `sync` it is certainly on the disk."""
         write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
@@ -72,11 +72,11 @@ class OpenFile:
 
     @property
     def has_a_name(self) -> bool:
-        """Whether the file still has a name in a folder, which means that it was not removed."""
+        """Whether the file still has a name in a folder; False after it was deleted."""
         return os.fstat(self._descriptor).st_nlink > 0
 
     def reserve(self, offset: int, size: int) -> None:
-        """Allocate disk blocks for a range of the file, if the system can."""
+        """Allocate disk blocks for a range of the file, if the operating system can."""
         allocate(self._descriptor, offset, size)
 
     def close(self) -> None:
@@ -96,7 +96,7 @@ def sync_file(path: Path) -> None:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a path for a new file, which then replaces ``path``; after an error the old file remains."""
+    """Yield a path for a new file, which replaces ``path`` at the end; after an error the old file stays."""
     target = path.resolve()  # follow a link, do not replace it
     if target.exists():
         target.open("r+b").close()  # raises OSError if write-protected
@@ -113,7 +113,7 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 
 def rename(unfinished: Path, final: Path) -> None:
-    """Rename a file, replacing `final`; ignore an error of a network folder if the renaming succeeded."""
+    """Rename a file, replacing `final`; ignore a network folder's error if the file was renamed."""
     made = unfinished.stat()
     try:
         os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
@@ -123,11 +123,11 @@ def rename(unfinished: Path, final: Path) -> None:
 
 
 UNKNOWN = ""
-"""Start time of a living process for which the system reports none."""
+"""Start time of a living process for which the operating system reports none."""
 
 
 class Place(Enum):
-    """Place where a process was started; process numbers are valid only for `HERE`."""
+    """Place where a process was started; its number identifies a process only if this is `HERE`."""
 
     HERE = auto()
     CONTAINER = auto()
@@ -137,7 +137,7 @@ class Place(Enum):
 
 
 def place_of(start: str) -> Place:
-    """Return the place where a process was started; `Place.HERE` if the system does not report it."""
+    """Return the place where a process was started; `Place.HERE` if it is unknown."""
     own, other = ((each or "").split("_") for each in (process_start(os.getpid()), start))
     if len(own) != len(other) or own[:-1] == other[:-1]:
         return Place.HERE
@@ -145,7 +145,7 @@ def place_of(start: str) -> Place:
 
 
 def is_process(pid: int, start: str) -> bool:
-    """Return whether a process is alive; if a start time is `UNKNOWN`, only its number is compared."""
+    """Return whether a process is alive; if one start time is `UNKNOWN`, only the number is compared."""
     now = process_start(pid)
     return now is not None and (UNKNOWN in (now, start) or now == start)
 

@@ -1,4 +1,4 @@
-"""Functions for Windows, which locks bytes of a file and flushes the file names in a folder itself."""
+"""Functions for Windows, which locks ranges of bytes and flushes a folder's file names by itself."""
 
 import ctypes
 import msvcrt
@@ -22,7 +22,7 @@ def open_to_write(path: Path) -> int:
 
 
 def open_for_all(path: Path) -> int:
-    """Return the descriptor of a lock file for all users, which is created if missing."""
+    """Open a lock file for all users, created if missing; return its descriptor."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
     except PermissionError:  # another user's file: reading is enough to lock it
@@ -74,14 +74,14 @@ def is_locked_alone(descriptor: int) -> bool:
     return True
 
 
-def lower_priority(by: int) -> None:  # noqa: ARG001 - there are classes of priority, and no numbers
+def lower_priority(by: int) -> None:  # noqa: ARG001 - Windows has priority classes, not numbers
     """Lower the priority of this process."""
     kernel = ctypes.windll.kernel32
     kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
 
 
 def bound_memory(most_bytes: int) -> None:
-    """Do nothing: memory can be limited only by a job object, which a process cannot leave."""
+    """Do nothing: only a job object limits memory, and a process cannot leave a job object."""
 
 
 def usual_state_folder() -> Path:
