@@ -32,7 +32,7 @@ from .restoring_force import PowerSpring, RestoringForce
 from .shooting import SAMPLES, PeriodicOrbit
 
 TAIL = 4
-"""Ratio of the highest neglected harmonic in the error estimate to the highest harmonic kept."""
+"""Highest harmonic in the error estimate, over the highest harmonic of the solution."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class BalanceOptions:
     most: int = 511
     """Highest harmonic of the last attempt."""
     tolerance: float = 1e-4
-    """Largest allowed effect of neglected harmonics on p, relative to the fundamental of p."""
+    """Largest allowed change of p due to neglected harmonics, relative to the fundamental of p."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kept", chosen(HarmonicSet, self.kept))
@@ -68,7 +68,7 @@ class Guess:
 def first_guess(
     structure: LinearStructure, spring: RestoringForce, frequency_hz: float, amplitude_m: float
 ) -> Guess:
-    """Return the smallest first-order motion of a power law, otherwise the motion without the spring."""
+    """Return the smallest first-order motion for a power law, otherwise the linear motion, as a guess."""
     match spring:
         case PowerSpring():
             return first_order_guesses(structure, spring, frequency_hz, amplitude_m)[0]
@@ -81,7 +81,7 @@ def first_guess(
 def first_order_guesses(
     structure: LinearStructure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
 ) -> list[Guess]:
-    """Return the first-order motions of a power law as initial guesses."""
+    """Return all first-order motions for a power law, as initial guesses."""
     states = first_order_states(structure, spring, frequency_hz, amplitude_m)
     return [Guess(np.array([1]), np.array([state.relative])) for state in states]
 
@@ -94,22 +94,22 @@ def balance(
     options: BalanceOptions = BalanceOptions(),
     start: Guess | None = None,
 ) -> Balance:
-    """Return one periodic motion with the period of the drive.
+    """Return a motion with the drive's period that is near the initial guess.
 
     The number of harmonics is doubled until neglected harmonics change p by less than the tolerance. Check
-    ``outcome`` of the result first: after NO_SOLUTION the result is the best attempt.
+    ``outcome`` of the result first: with NO_SOLUTION the result is only the best attempt.
 
     Parameters
     ----------
     structure, spring
         Linear part of the specimen, and nonlinear force along its direction b.
     frequency_hz, amplitude_m
-        Frequency and amplitude of U = amplitude sin(2 pi frequency t); positive.
+        Frequency [Hz] and amplitude [m] of U = amplitude sin(2 pi frequency t); positive.
     options
         Harmonics and tolerance.
     start
-        Initial guess, which selects one of several motions; by default `first_guess`. Strong contact needs a
-        close guess, such as a neighbouring solution or an integrated orbit.
+        Initial guess, which decides between several motions; by default `first_guess`. Strong contact needs a
+        close guess, such as a solution at a neighbouring drive or an integrated orbit.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
         raise ValueError(
@@ -137,7 +137,7 @@ def balance(
 def balance_of_solution(
     problem: BalanceProblem, unknowns: np.ndarray, frequency_hz: float, amplitude_m: float, tolerance: float
 ) -> Balance:
-    """Return the motion of every mass for a solution, with its truncation error."""
+    """Return displacements, error estimate and outcome of a solution of the balance equations."""
     omega = 2.0 * math.pi * frequency_hz
     harmonics, phasors = problem.harmonics, problem.phasors(unknowns)
     seen = condense(problem.structure, omega, harmonics)
@@ -166,25 +166,25 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Solutions with a fixed number of harmonics; the last component of a point is parameter / scale."""
+    """Solutions with a fixed number of harmonics along a drive path; a point ends with parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath
     scale: float
-    """Parameter per unit of length [Hz, or m]."""
+    """Parameter change that counts as one unit of length [Hz, or m]."""
     options: BalanceOptions
 
     @property
     def tolerance(self) -> float:
-        """Largest allowed truncation error, relative to the fundamental of p."""
+        """Largest allowed truncation error, over the fundamental of p."""
         return self.options.tolerance
 
     def drive(self, point: Vector) -> tuple[float, float]:
-        """Frequency [Hz] and amplitude [m] at a point."""
+        """Return drive frequency [Hz] and amplitude [m] at a point."""
         return self.path.drive(float(point[-1]) * self.scale)
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return the residual, and its derivatives with respect to all unknowns and the parameter."""
+        """Return the residual, and its derivatives by all unknowns and the parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
         residual, jacobian, by_omega, by_amplitude = self.problem.linearised(point[:-1], omega, amplitude)
@@ -207,7 +207,7 @@ class BalanceFamily:
         )
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics (the new ones are zero); None at the highest number."""
+        """Return the family with twice the harmonics, new ones zero; None if the limit is reached."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:
@@ -226,7 +226,7 @@ class BalanceFamily:
 def orbit_signs(
     structure: LinearStructure, spring: RestoringForce, found: Balance, kept: HarmonicSet
 ) -> OrbitSigns:
-    """Return stability and contacts of a solution, from the variational equation along its motion."""
+    """Return Floquet multipliers and contacts of a solution, from perturbations along its motion."""
     motion = Motion(found.frequency_hz, found.harmonics, found.relative)
     contacts = len(crossings(spring, motion, 2.0 * math.pi)) // 2
     if kept is HarmonicSet.ODD:
@@ -247,8 +247,8 @@ def balance_branch_within(
 ) -> Branch:
     """Follow a solution in both directions along a drive path, from ``low`` to ``high`` [Hz, or m].
 
-    The result is ordered as in `periodic_branch_within`. Harmonics are added where the truncation error
-    requires it. Raises ValueError when the start did not converge, or is outside the range.
+    Points are ordered as in `periodic_branch_within`. Harmonics are added where the truncation error is
+    above the tolerance. Raises ValueError when the start did not converge, or is outside the range.
     """
     if start.outcome is BalanceEnd.NO_SOLUTION:
         raise ValueError(
@@ -263,11 +263,11 @@ def balance_branch_within(
 
 
 SPECTRUM_SHARE = 8
-"""Ratio of the samples per period to the number of harmonics used from the spectrum of an orbit."""
+"""Ratio of samples per period to harmonics, when harmonics are taken from the spectrum of an orbit."""
 
 
 def orbit_guess(orbit: PeriodicOrbit) -> Guess:
-    """Return the harmonics of an exact orbit with the drive's period as an initial guess."""
+    """Return the harmonics of an exact orbit with the drive's period, as an initial guess."""
     states = orbit.period_map.orbit(orbit.state, orbit.drive, SAMPLES).states[:SAMPLES]
     harmonics = np.arange(SAMPLES // SPECTRUM_SHARE)
     return Guess(harmonics, phasors_of(states[:, Y] - states[:, Z])[harmonics])

@@ -1,4 +1,4 @@
-"""A branch: periodic motions along a parameter, their stability and special points. SI units."""
+"""A branch: periodic motions along a parameter, with stability and bifurcations. SI units."""
 
 import itertools
 import math
@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Tolerance for a multiplier on the unit circle, where all multipliers are without damping."""
+"""Distance of a multiplier from the unit circle within which it counts as on it, as without damping."""
 
 
 class Parameter(StrEnum):
@@ -29,7 +29,7 @@ ParameterWord = Literal["frequency", "amplitude"]
 
 
 class BifurcationKind(StrEnum):
-    """Kind of a special point of a branch."""
+    """Kind of an event on a branch: a bifurcation, or grazing."""
 
     FOLD = "fold"
     """The branch turns back; the response jumps here in a sweep. One multiplier is +1."""
@@ -40,7 +40,7 @@ class BifurcationKind(StrEnum):
     NEIMARK_SACKER = "Neimark-Sacker"
     """A quasi-periodic motion branches off. A complex pair of multipliers crosses the unit circle."""
     GRAZING = "grazing"
-    """A contact begins or ends at zero speed."""
+    """A contact appears or disappears, at zero approach speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class BranchEvent:
     frequency_hz: float
     amplitude_m: float
     state: Floats
-    """Displacements and velocities at the drive's time zero, as the start of a run, shape (2 n,)."""
+    """Displacements and velocities at time zero of the drive; initial state for a run, shape (2 n,)."""
     index: int
     """Index of the last point of the branch before the event."""
 
@@ -62,7 +62,7 @@ class BranchEvent:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A branch of periodic motions in the order of its points; m points, n displacements."""
+    """Periodic motions along a parameter, in order along the branch; m points, n displacements."""
 
     parameter: Parameter
     frequencies_hz: Floats
@@ -70,24 +70,24 @@ class Branch:
     amplitudes_m: Floats
     """Drive amplitude, shape (m,)."""
     response_i: Floats
-    """Largest magnitude over a period of every displacement (x, y, z) and of p, over the drive amplitude,
+    """Largest magnitude, within a period, of every displacement (x, y, z) and of p, over the drive amplitude,
     shape (m, n + 1)."""
     response_ii: Floats
-    """Amplitude of the component at the drive frequency over the drive amplitude, shape (m, n + 1)."""
+    """Amplitude of the same at the drive frequency, over the drive amplitude, shape (m, n + 1)."""
     states: Floats
-    """Displacements and velocities at the drive's time zero, shape (m, 2 n)."""
+    """Displacements and velocities at time zero of the drive, shape (m, 2 n)."""
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats
-    """Estimated error of each point over the fundamental of p, shape (m,): from neglected harmonics in
-    harmonic balance, from the closure error in shooting."""
+    """Estimated error of each point over the fundamental of p, shape (m,). In harmonic balance it comes from
+    neglected harmonics, in shooting from the closure error and the integration error."""
     contacts: NDArray[np.int64]
     """Number of contacts that begin in a period of the motion, shape (m,)."""
     events: tuple[BranchEvent, ...]
     end: ArcEnd
-    """Reason for the end of the branch at its last point."""
+    """Reason why the branch ends at its last point."""
     begin: ArcEnd | None = None
-    """Reason for the end at its first point, if followed in both directions; None if it was started there."""
+    """Reason why it ends at its first point; None if following began there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
@@ -110,27 +110,27 @@ POINTWISE = (
     "left_out",
     "contacts",
 )
-"""Fields of a branch with one row per point."""
+"""Fields of a branch that are arrays with one entry per point."""
 
 
 # Bifurcations between two points of a branch, from Floquet multipliers.
 #
-# A test function changes sign where a multiplier passes -1 (product of mu + 1), or where a pair passes the
-# unit circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal. 34 (1997) 1).
-# Grazing changes the number of contacts. The continuation itself finds the folds.
+# A test function changes sign where a multiplier passes -1 (product of mu + 1), or where a complex pair
+# crosses the unit circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal.
+# 34 (1997) 1). Grazing changes the number of contacts. The continuation itself detects folds.
 #
-# If a motion mirrors itself after half a period, its monodromy matrix is the square of the half-period
-# matrix. A multiplier -1 of the half-period map means symmetry breaking; +1 means a fold.
+# If a motion is its own mirror image half a period later, its monodromy matrix is the square of that over
+# half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
 
 COMPLEX_PART = 1e-6
-"""Smallest imaginary part of a complex pair; a real pair of product one is no Neimark-Sacker point."""
+"""Smallest imaginary part of a pair at a Neimark-Sacker point; excludes real pairs of product one."""
 
 
 class OrbitShape(StrEnum):
     """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    """The motion is its own mirror image half an odd number of drive periods later; needs equal stops."""
+    """The mirrored motion is the same motion half an odd number of drive periods later; needs equal gaps."""
     REPEATED = "repeated"
     """The motion repeats after a whole number of drive periods."""
 
@@ -143,16 +143,16 @@ class OrbitSigns:
     """Data for the detection of bifurcations at one point of a branch."""
 
     multipliers: Complex
-    """Multipliers of the half-period map if mirrored, otherwise over the period; shape (2 n,)."""
+    """Multipliers over half the period if mirrored, otherwise over the period; shape (2 n,)."""
     contacts: int
     """Number of contacts in a period."""
     shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """Difference from a simpler motion (half the period, or mirrored), shape (6,); empty if there is none."""
+    """Difference from the motion with half the period or mirrored, shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
-    """Bifurcation at which this branch leaves the branch of simpler motions."""
+    """Bifurcation by which this branch leaves the branch of motions with half the period or mirrored."""
     grazing_distance: float = math.inf
-    """Distance from grazing: of p over the gap, or of dp/dt over the gap times 2 pi f."""
+    """Distance from grazing: of p over the gap or, at a contact, of dp/dt over the gap times 2 pi f."""
 
     @property
     def over_period(self) -> Complex:
@@ -166,7 +166,7 @@ class OrbitSigns:
 
     @property
     def torus(self) -> float:
-        """Test function that changes sign where a complex pair leaves the unit circle outwards."""
+        """Test function that changes sign where a complex pair crosses the unit circle."""
         pairs = itertools.combinations(self.multipliers, 2)
         beyond = np.array([a * b - 1.0 for a, b in pairs])
         beyond[np.abs(beyond) < NEUTRAL] = -NEUTRAL
@@ -194,13 +194,13 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Distance to a simpler motion, as a fraction of the gap, below which a step may pass it."""
+"""Distance from a simpler motion, over the gap, below which the branch may have reached it in one step."""
 IS_SIMPLER = 1e-7
-"""Distance from a simpler motion, over the gap, that is due to rounding: both are the same motion."""
+"""Distance from a simpler motion, over the gap, that is only rounding: the motion is the simpler one."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch passed a simpler motion; beyond that point it repeats, shifted or mirrored."""
+    """Return whether a branch passed a motion of half the period or mirrored, where it ends."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0
@@ -209,7 +209,7 @@ def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
-    """Return the test function for a kind of event; it changes sign at the event."""
+    """Return the test function for an event of this kind; it changes sign at the event."""
     match kind:
         case BifurcationKind.GRAZING:
             return 1.0 if here.contacts == before.contacts else -1.0

@@ -1,4 +1,4 @@
-"""Follow a family of periodic motions along a parameter, and return a branch."""
+"""Follow periodic motions along a parameter, and return the points as a branch."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -27,12 +27,12 @@ from .continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, tr
 
 @dataclass(frozen=True)
 class FrequencyPath:
-    """Path along frequency, with a constant amplitude or a recorded level."""
+    """Path along drive frequency, with constant or frequency-dependent amplitude."""
 
     amplitudes_m: tuple[float, ...]
-    """Drive amplitude for each frequency, or one constant amplitude [m]."""
+    """Drive amplitude at each of the frequencies, or one constant amplitude [m]."""
     frequencies_hz: tuple[float, ...] = ()
-    """Ascending frequencies [Hz]; monotone cubic interpolation between them, constant amplitude outside."""
+    """Ascending frequencies [Hz]; monotone cubic interpolation between them, end values outside."""
     parameter: ClassVar = Parameter.FREQUENCY
 
     def __post_init__(self) -> None:
@@ -53,7 +53,7 @@ class FrequencyPath:
         return value, float(self._curve(self._inside(value)))
 
     def slopes(self, value: float) -> tuple[float, float]:
-        """Return the derivatives of frequency and amplitude with respect to frequency: 1 and [m/Hz]."""
+        """Return the derivatives by frequency: 1 for frequency, and that of the amplitude [m/Hz]."""
         if len(self.amplitudes_m) == 1 or self._inside(value) != value:
             return 1.0, 0.0
         return 1.0, float(self._curve(value, 1))
@@ -68,7 +68,7 @@ class FrequencyPath:
 
 @dataclass(frozen=True)
 class AmplitudePath:
-    """Path along amplitude, at one frequency."""
+    """Path along drive amplitude, at one frequency."""
 
     frequency_hz: float
     parameter: ClassVar = Parameter.AMPLITUDE
@@ -81,7 +81,7 @@ class AmplitudePath:
         return self.frequency_hz, value
 
     def slopes(self, value: float) -> tuple[float, float]:  # noqa: ARG002 - the same everywhere
-        """Return the derivatives of frequency and amplitude with respect to amplitude: 0 and 1."""
+        """Return the derivatives by amplitude: 0 for frequency, 1 for amplitude."""
         return 0.0, 1.0
 
 
@@ -96,7 +96,7 @@ def _refuse_unless_positive(name: str, value: float, unit: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class OrbitReport:
-    """Results at one point of a branch, with the fields of `Branch`."""
+    """Results at one point of a branch; fields as in `Branch`."""
 
     frequency_hz: float
     amplitude_m: float
@@ -105,7 +105,7 @@ class OrbitReport:
     response_ii: Vector
     """Response II of every displacement and of p, shape (n + 1,)."""
     state: Vector
-    """Displacements and velocities at the drive's time zero, shape (2 n,)."""
+    """Displacements and velocities at time zero of the drive, shape (2 n,)."""
     signs: OrbitSigns
     left_out: float
 
@@ -130,22 +130,22 @@ class Family(Curve, Protocol):
     def refined(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
         """Return the family at a higher resolution, with a point and a tangent converted to it.
 
-        None at the highest resolution.
+        None if this is the highest resolution.
         """
         ...
 
 
 RANGE_LENGTH = 10.0
-"""Scaled length of the parameter range; the gap or the spring's length scale has length 1."""
+"""Length of the parameter range in scaled units; the gap, or the spring's length scale, has length 1."""
 
 
 def parameter_value(path: DrivePath, drive: Harmonic) -> float:
-    """Return the frequency or amplitude of a drive, whichever the path varies [Hz, or m]."""
+    """Return the varying quantity of a path for a drive: frequency [Hz] or amplitude [m]."""
     return drive.frequency_hz if path.parameter is Parameter.FREQUENCY else drive.amplitude_m
 
 
 def range_scale(low: float, high: float, value: float) -> float:
-    """Return the parameter change that counts as one unit of length in a range [Hz, or m]."""
+    """Return the parameter change that counts as one unit of length [Hz, or m]."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
         raise ValueError(
             f"A branch from {low} to {high} through {value} is not allowed: give 0 < low <= value <= high."
@@ -156,16 +156,16 @@ def range_scale(low: float, high: float, value: float) -> float:
 def follow(
     family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Branch:
-    """Follow a family from one of its points; refine the resolution where the error requires it.
+    """Follow a family from one of its points; increase the resolution where the error is too large.
 
     Parameters
     ----------
     family
         Family at its first resolution.
     start
-        Point on the curve.
+        Point on the curve, from which to start.
     toward, bounds
-        Sign of the first step of the scaled parameter, and its range.
+        Direction in which the scaled parameter first changes (by the sign), and its range.
     steps
         Step lengths and tolerances.
     """
@@ -185,11 +185,11 @@ def follow(
 
 
 NEARLY_GRAZING = 0.01
-"""A branch that cannot be continued within this distance of grazing, over the gap, ends by grazing."""
+"""Distance from grazing, over the gap, within which a branch that cannot be continued ends by grazing."""
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
-    """Follow a family from a point in both directions; follow a closed branch only once."""
+    """Follow a family from a point in both directions, or once around if the branch is closed."""
     onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
     if onward is not None and onward.end is ArcEnd.CLOSED:
         return replace(onward, begin=ArcEnd.CLOSED)
@@ -202,7 +202,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
 
 
 def _join_branches(back: Branch, onward: Branch) -> Branch:
-    """Join two branches that start at the same point; the first is reversed."""
+    """Join two branches that start at the same point; points of the first are reversed."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
@@ -219,7 +219,7 @@ class _Followed:
     """Points and events of a branch while it is followed."""
 
     family: Family
-    """Family at the present resolution."""
+    """Family at the current resolution."""
     steps: ArcSteps
     reports: list[OrbitReport] = field(default_factory=list)
     events: list[BranchEvent] = field(default_factory=list)
@@ -227,14 +227,14 @@ class _Followed:
     def go_on(
         self, start: Vector, toward: float, bounds: tuple[float, float]
     ) -> tuple[ArcEnd | None, ArcPoint]:
-        """Follow at one resolution; return the last point and the reason for the end (None: refine)."""
+        """Follow at one resolution; return the reason for the end (None: refine), and the last point."""
         family = self.family
         points = trace(family, start, toward, bounds, self.steps)
         before = next(points)
         first = family.report(before.point)
         signs = first.signs
         if not self.reports:
-            # After a refinement the first point has been reported already.
+            # The first point was already reported at a lower resolution.
             self.reports.append(first)
         for here in points:
             if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):
@@ -262,7 +262,7 @@ class _Followed:
         return ArcEnd.TOO_MANY_POINTS, before
 
     def end_where_stuck(self) -> Branch:
-        """End a branch that cannot be continued; add an event if it ends by grazing at a rigid stop."""
+        """End a branch that cannot be continued; add a grazing event if a rigid stop is being grazed."""
         if self.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
             self._add_event(BifurcationKind.GRAZING, self.reports[-1])
         return self.branch(ArcEnd.STEP_TOO_SHORT)
@@ -289,7 +289,7 @@ class _Followed:
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
     def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
-        """End a branch on a simpler motion; beyond that point it would repeat, shifted or mirrored."""
+        """End a branch at a motion of half the period or mirrored, beyond which it would repeat itself."""
 
         def measure(point: ArcPoint) -> float:
             return float(self.family.report(point.point).signs.apart @ signs.apart)

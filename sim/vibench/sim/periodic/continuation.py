@@ -3,7 +3,7 @@
 The n equations r(u, lambda) = 0 in n unknowns and one parameter define a curve in n + 1 dimensions. Each step
 follows the tangent of the curve and is then corrected perpendicular to the tangent (Keller 1977; Allgower and
 Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 2, 6 and 9). Folds need no special
-treatment: the tangent's last component changes sign there. Scale unknowns and parameter to the order of one.
+treatment: the last component of the tangent changes sign there. Unknowns and parameter must be of order one.
 """
 
 import math
@@ -19,19 +19,19 @@ from ..specimen.state import Table, Vector
 
 
 class Curve(Protocol):
-    """Equations whose solutions form the curve."""
+    """Equations r(u, lambda) = 0 whose solutions form the curve."""
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return r, shape (n,), and dr/dpoint, shape (n, n + 1), at (u, lambda), shape (n + 1,).
+        """Return r, shape (n,), and dr/dpoint, shape (n, n + 1), at a point (u, lambda), shape (n + 1,).
 
-        Values are not finite where the equations cannot be evaluated.
+        Return NaN or infinite values where the equations cannot be evaluated.
         """
         ...
 
 
 @dataclass(frozen=True)
 class ArcSteps:
-    """Step lengths and tolerances."""
+    """Step lengths, tolerances and limits for following a curve."""
 
     first: float = 0.01
     """Length of the first step along the curve."""
@@ -65,43 +65,43 @@ class ArcPoint:
     """One point of a curve."""
 
     point: Vector
-    """(u, lambda), shape (n + 1,)."""
+    """Point (u, lambda), shape (n + 1,)."""
     tangent: Vector
     """Unit tangent in the direction of travel, shape (n + 1,)."""
     arc: float = 0.0
     """Arc length from the start of the curve."""
     is_fold: bool = False
-    """Whether the parameter reverses at this point, which is inserted between two steps."""
+    """Whether the parameter reverses here; such a point is inserted between two steps."""
     end: ArcEnd | None = None
-    """Reason for the end of the curve at this point; None for all points before the last."""
+    """Reason why the curve ends at this point; None for all points before the last."""
 
 
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
-"""Number of iterations for which the step length is kept; after fewer iterations the next step is longer."""
+"""Number of Newton iterations at which the step length is kept; with fewer, the next step is longer."""
 FARTHEST_ASIDE = 0.5
-"""Largest correction over the step length; a larger correction means another branch."""
+"""Largest correction, over the step length; a larger one would lead to another branch."""
 LEAP_GROWTH = 10.0
-"""Ratio between successive step lengths tried across a kink."""
+"""Ratio of successive step lengths that are tried across a kink."""
 LONGEST_LEAP = 5.0
-"""Largest distance between the points before and after a kink, over the length of the step."""
+"""Largest distance between the points before and after a kink, over the tried step length."""
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
-"""Tolerance of a zero of a test function (a component of the tangent, a multiplier's distance)."""
+"""Value at which a test function (a component of the tangent, a multiplier's distance) counts as zero."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
-"""A kink is assumed if MOST_CRAWLED successive steps are shorter than CRAWLING times the shortest step."""
+"""More than MOST_CRAWLED successive steps, all below CRAWLING times the shortest step, indicate a kink."""
 NEAR_START = 0.2
-"""Distance of a step from the start, over the step length, below which the curve may have closed."""
+"""Distance from the start, over the step length, below which the curve may have closed."""
 SAME_POINT = 1e-6
-"""Distance between two points below which they are the same point of the curve."""
+"""Distance below which two points are the same point of the curve."""
 SHORTEST_BRACKET = 1e-12
-"""Length of the interval at which the search for a zero ends."""
+"""Length of the bracketing interval at which the search for a zero ends."""
 
 
 def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:
     """Correct ``guess`` by Newton's method in the hyperplane perpendicular to ``normal``.
 
-    Return the point and the number of iterations; 0 iterations mean that the method did not converge.
+    Return the point and the number of iterations; the number is 0 if the method did not converge.
     """
     point = guess.copy()
     for iteration in range(1, NEWTON_ITERATIONS + 1):
@@ -120,7 +120,7 @@ def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tu
 
 
 def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
-    """Return the unit tangent of the curve whose product with ``along`` is positive, shape (n + 1,)."""
+    """Return the unit tangent at a point, in the direction of ``along``, shape (n + 1,)."""
     _, jacobian = curve.linearised(point)
     system = np.vstack([jacobian, along])
     aim = np.zeros(len(point))
@@ -136,18 +136,18 @@ def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
 def trace(
     curve: Curve, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Iterator[ArcPoint]:
-    """Follow the curve from a point on it until the parameter leaves its bounds.
+    """Follow the curve from one of its points until the parameter leaves its range.
 
-    Yield the start, then every point and the folds between points; `end` of the last point is the reason.
+    Yield the start, then each point, and folds in between. `end` of the last point is the reason for the end.
 
     Parameters
     ----------
     curve
-        Equations, scaled by the caller.
+        Equations; unknowns and parameter scaled to the order of one.
     start
         Point on the curve within the tolerance, shape (n + 1,).
     toward
-        Its sign is the direction of the parameter at the start.
+        Direction in which the parameter first changes: up if positive, down if negative.
     bounds
         Range of the parameter, ends included.
     steps
@@ -165,7 +165,7 @@ def trace(
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
         if ahead is None or slow > MOST_CRAWLED:
-            # Between two kinks this close together there is no smooth curve: stop here.
+            # No smooth curve exists between two kinks this close together, so end here.
             is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap(curve, here, steps)
@@ -195,7 +195,7 @@ def trace(
 
 
 def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
-    """Take one step, shortened until it converges; return its point and the length of the next step."""
+    """Take one step, shortened until it converges; return the new point and the next step length."""
     while step >= steps.shortest:
         guess = here.point + step * here.tangent
         point, iterations = correct(curve, guess, here.tangent, steps.tolerance)
@@ -222,7 +222,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
         return False
     if float(start.tangent @ ahead.tangent) < 0.0:
         return False
-    # Compare points of this curve only, because another curve may be equally close.
+    # Move along this curve to the start: a point of another curve may be equally close.
     guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
     point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
@@ -231,8 +231,8 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
 def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
     """Return a point beyond a kink, where a contact begins and the branch may turn back; None if not found.
 
-    The unknowns continue, but the parameter may reverse. Steps of growing length are tried along the tangent,
-    and along the tangent with reversed parameter, without a limit on the rotation of the tangent.
+    At a kink the parameter may reverse while the unknowns continue. Steps of growing length are tried along
+    the tangent, and along the tangent with reversed parameter, with any rotation of the tangent.
     """
     mirrored = here.tangent.copy()
     mirrored[-1] = -mirrored[-1]
@@ -250,7 +250,7 @@ def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the ratio of the next step length to the last, from iterations and rotation of the tangent."""
+    """Return the next step length over the last one, from the iterations and the tangent's rotation."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))
@@ -271,9 +271,9 @@ Measure = Callable[[ArcPoint], float]
 def locate(
     curve: Curve, before: ArcPoint, after: ArcPoint, measure: Measure, tolerance: float
 ) -> ArcPoint | None:
-    """Return the point at which ``measure`` vanishes between two neighbouring points, by regula falsi.
+    """Return the point between two neighbours at which ``measure`` vanishes, found by regula falsi.
 
-    None if no point of the curve can be found between them.
+    None if no point of the curve is found between the neighbours.
     """
     low, high = before, after
     value_low, value_high = measure(before), measure(after)
@@ -286,7 +286,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois method: halve the value at an end that is kept twice, so that both ends move.
+        # Illinois method: if the same end is kept twice, halve its value so that it will move too.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0
@@ -299,7 +299,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Return a point of the curve at a fraction of the chord; a kink may require other fractions."""
+    """Return a point of the curve between two others, if possible at a fraction of the chord."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:

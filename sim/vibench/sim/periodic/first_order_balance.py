@@ -1,14 +1,14 @@
 """The paper's analytical solution: first-order harmonic balance of power laws, all branches. SI units.
 
-With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs. 4 and 5) is
-P (1 + G N(|P|)) = P_lin. G is the compliance at the spring, and N the describing function of the spring. The
-squared magnitude is an equation with a few powers of |P|; all its zeros are found, so no branch is missed.
+With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs. 4 and 5) is P (1 + G N(|P|))
+= P_lin. G is the compliance at the spring, N the describing function of the spring, and P_lin the solution
+without the spring. The squared magnitude is an equation with a few powers of |P|; all its zeros are found, so
+no branch is missed.
 
-`positive_zeros` finds all positive zeros of a sum of a few powers with any exponents. Companion matrices are
-not accurate enough for this: a polynomial of degree 201 with four terms has at most three positive zeros
-(Descartes), but they miss some. Instead, by Rolle's theorem, a sum of m powers over its lowest power is
-monotone between the zeros of its derivative, which has m - 1 powers. The sum is evaluated in t = ln u with
-every term divided by the largest, which avoids overflow.
+`positive_zeros` finds all positive zeros of a sum of a few powers. Companion matrices would miss some, for
+example of a polynomial of degree 201 with four terms. Instead Rolle's theorem is used: divided by its lowest
+power, a sum of m powers is monotone between the zeros of its derivative, which has m - 1 powers. The sum is
+evaluated in t = ln u, relative to its largest term, to avoid overflow.
 """
 
 import math
@@ -22,15 +22,15 @@ from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
-"""Relative value of the sum at an extremum below which the extremum is a double zero."""
+"""Value of the sum, over its largest term, below which an extremum counts as a double zero."""
 ROOT_TOLERANCE = 1e-15
-"""Absolute tolerance of ln u; brentq adds four units in the last place."""
+"""Absolute tolerance of ln u; the method `brentq` adds a relative tolerance of rounding size."""
 
 
 def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
     """Return every u > 0 with sum c_i u^e_i = 0, ascending, shape (n,) with n < m.
 
-    A double zero is returned once.
+    A double zero is listed once.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
 
 
 def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Floats, Floats]:
-    """Add coefficients of equal exponents, drop zeros, and sort by exponent."""
+    """Add the coefficients of equal exponents, drop zero coefficients, and sort by exponent."""
     powers, place = np.unique(exponents, return_inverse=True)
     sums = np.zeros(len(powers))
     np.add.at(sums, place, coefficients)
@@ -52,13 +52,13 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Return the sum divided by its largest term, because only its sign is needed."""
+    """Return the sum over its largest term, which has the sign of the sum."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 
 
 def _bounds(coefficients: Floats, exponents: Floats) -> tuple[float, float]:
-    """Return bounds on t; beyond them the lowest or the highest power exceeds the sum of all others."""
+    """Return bounds on t, outside which one term (of the lowest or highest power) exceeds all others."""
     sizes = np.log(np.abs(coefficients)) + np.log(len(coefficients))
     own = np.log(np.abs(coefficients))
     low = np.min((own[0] - sizes[1:]) / (exponents[1:] - exponents[0]))
@@ -94,7 +94,7 @@ FUNDAMENTAL = np.array([1])
 def fundamental_share(exponent: int) -> float:
     """Return the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1), 3/4 for n = 3, 5/8 for n = 5.
 
-    The quotient of two exact integers is correctly rounded for every odd n.
+    The quotient of two exact integers is correctly rounded for every n.
     """
     if exponent < 1 or exponent % 2 == 0:
         raise ValueError(
@@ -112,9 +112,9 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """Stability to amplitude changes; False on the middle of three branches, absent in experiments.
+    """Whether amplitude perturbations decay; False on the middle one of three branches.
 
-    Other instabilities are not included; Floquet multipliers show them (`vibench.sim.periodic.floquet`).
+        Floquet multipliers also show all other instabilities (`vibench.sim.periodic.floquet`).
     """
 
 

@@ -3,9 +3,9 @@
 Small perturbations d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
 e = dF/d(dp/dt) along the motion. Their map over one period is the monodromy matrix, whose eigenvalues
 determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Motion
-without contact is one matrix exponential. A contact, from the exact times at which p reaches a stop, is
-integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253). Steps are shorter
-at both ends, where the stiffness of a Hertz contact is a square root.
+without contact is one matrix exponential. Contacts begin and end at the exact times at which p reaches a
+stop; each is integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253).
+Steps are shorter near both ends, where the stiffness of a Hertz contact varies like a square root.
 """
 
 import math
@@ -21,15 +21,15 @@ from .harmonic_balance import Harmonics, LinearStructure, grid_size, motion_on_g
 from .restoring_force import RestoringForce
 
 CONTACT_STEPS = 96
-"""Fewest Magnus steps across one contact."""
+"""Smallest number of Magnus steps in one contact."""
 STEPS_PER_TURN = 8.0
-"""Magnus steps per radian of the fastest motion of structure and compressed spring."""
+"""Number of Magnus steps per radian of the fastest motion of the structure with the compressed spring."""
 STEPS_PER_HARMONIC = 16
-"""Magnus steps per period of the highest harmonic, for a spring that is smooth everywhere."""
+"""Number of Magnus steps per period of the highest harmonic, for a force that is smooth at every p."""
 SMOOTH_STEPS = 128
-"""Fewest steps per period, for a spring that is smooth everywhere."""
+"""Smallest number of Magnus steps per period, for such a force."""
 GAUSS = math.sqrt(3.0) / 6.0
-"""Distance of the two Gauss points from the middle of a step of length one."""
+"""Distance of the two Gauss points from the middle of a step, over the step length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class Motion:
     """Phasors P_k, shape (m,) [m]."""
 
     def p(self, turn: Floats) -> Floats:
-        """Return p at phases ``turn`` [rad], shape (k,) [m]."""
+        """Return p at the phases ``turn`` [rad] of the drive, shape (k,) [m]."""
         return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ self.relative)
 
     def rate(self, turn: Floats) -> Floats:
-        """Return dp/dt at phases ``turn`` [rad], shape (k,) [m/s]."""
+        """Return dp/dt at the phases ``turn`` [rad] of the drive, shape (k,) [m/s]."""
         omega = 2.0 * math.pi * self.frequency_hz
         factors = 1j * omega * self.harmonics * self.relative
         return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ factors)
@@ -61,7 +61,7 @@ def multipliers(monodromy: NDArray[np.float64]) -> Complex:
 def transition(
     structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
 ) -> NDArray[np.float64]:
-    """Return the transition matrix of small perturbations (d, d') over ``span_rad``, shape (2 n, 2 n)."""
+    """Return the matrix from perturbations (d, d') at phase 0 to those at ``span_rad``, shape (2 n, 2 n)."""
     departures = _Departures(structure, spring, motion)
     edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
     result = np.eye(2 * structure.size)
@@ -71,7 +71,7 @@ def transition(
 
 
 class _Departures:
-    """Transition matrices of small perturbations, between the phases at which p crosses a stop."""
+    """Transition matrices of small perturbations between phases without a contact change in between."""
 
     def __init__(self, structure: LinearStructure, spring: RestoringForce, motion: Motion) -> None:
         self._structure, self._spring, self._motion = structure, spring, motion
@@ -83,8 +83,8 @@ class _Departures:
         self._system[n:, n:] = -np.linalg.solve(structure.mass, structure.damping)
         push = -np.linalg.solve(structure.mass, structure.direction)
         self._spring_in = np.concatenate([np.zeros(n), push])
-        """Derivative of the state's rate by the spring's force, shape (2 n,)."""
-        # Fastest eigenvalue of the structure plus angular frequency on the stiffest spring [rad/s].
+        """Derivative of the state's time derivative by the spring's force, shape (2 n,)."""
+        # Sum of the fastest eigenvalue of the structure and the frequency on the stiffest spring [rad/s].
         samples = grid_size(int(motion.harmonics[-1]))
         omega = 2.0 * math.pi * motion.frequency_hz
         p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
@@ -93,7 +93,7 @@ class _Departures:
         self._fastest = own + math.sqrt(stiffest * float(-structure.direction @ push))
 
     def over(self, start: float, stop: float) -> Floats:
-        """Return the transition matrix from one phase to another [rad]."""
+        """Return the transition matrix between two phases [rad]."""
         length = (stop - start) / (2.0 * math.pi * self._motion.frequency_hz)
         stiffness, _ = self._slopes(np.array([0.5 * (start + stop)]))
         if self._spring.kinks and stiffness[0] == 0.0:
@@ -101,7 +101,7 @@ class _Departures:
         return self._by_magnus(self._marks(start, stop, self._fastest * length))
 
     def _marks(self, start: float, stop: float, turn: float) -> Floats:
-        """Return the phases that bound the Magnus steps, shape (steps + 1,) [rad]."""
+        """Return the phases at the ends of the Magnus steps, shape (steps + 1,) [rad]."""
         needed = math.ceil(STEPS_PER_TURN * turn)
         if self._spring.kinks:
             even = np.linspace(0.0, math.pi, max(CONTACT_STEPS, needed) + 1)
@@ -119,25 +119,25 @@ class _Departures:
         exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
         steps = _exponentials(exponents)
         while len(steps) > 1:
-            # Multiply in pairs, so that numpy works on whole arrays.
+            # Multiply the matrices in pairs, so that numpy works on whole arrays.
             pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
             steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
         return np.asarray(steps[0])
 
     def _rates(self, turn: Floats) -> Floats:
-        """Return the state matrices at phases, shape (k, 2 n, 2 n)."""
+        """Return the state matrices with spring at phases ``turn``, shape (k, 2 n, 2 n)."""
         direction = self._structure.direction
         rows = np.concatenate([np.multiply.outer(slope, direction) for slope in self._slopes(turn)], axis=1)
         return np.asarray(self._system + self._spring_in[None, :, None] * rows[:, None, :])
 
     def _slopes(self, turn: Floats) -> tuple[Floats, Floats]:
-        """Return stiffness and damping of the spring at phases, shape (k,) each."""
+        """Return dF/dp and dF/d(dp/dt) at phases ``turn``, shape (k,) each."""
         p, rate = self._motion.p(turn), self._motion.rate(turn)
         return self._spring.stiffness(p, rate), self._spring.damping(p, rate)
 
 
 def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[float]:
-    """Return the phases from 0 to ``span_rad`` at which p crosses a stop, ascending [rad]."""
+    """Return the phases from 0 to ``span_rad`` at which p reaches or leaves a stop, ascending [rad]."""
     samples = grid_size(int(motion.harmonics[-1]))
     grid = 2.0 * math.pi * np.arange(samples + 1) / samples
     wave = waveform(motion.relative, motion.harmonics, samples)
@@ -157,7 +157,7 @@ def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[f
 
 
 def _exponentials(small: Floats) -> Floats:
-    """Return the exponentials of matrices whose eigenvalues are below one, by the Pade approximant [3/3]."""
+    """Return the exponentials of matrices with eigenvalues below one, by the [3/3] Pade approximant."""
     squared = small @ small
     even = np.eye(small.shape[-1]) + squared / 10.0
     odd = small / 2.0 + squared @ small / 120.0

@@ -1,9 +1,9 @@
 """Periodic motion by harmonic balance, with any number of harmonics, condensed to p. SI units.
 
-The equations P_k + compliance_k F_k(P) = linear_k U, one for each harmonic kept, are solved by a damped
-Newton iteration with the exact Jacobian. The alternating frequency-time scheme gives the force. Contact needs
-many harmonics (51 to 400); power laws need few. The estimated effect of neglected harmonics determines their
-number, and shows whether the result has converged.
+The equations P_k + compliance_k F_k(P) = linear_k U, one for each harmonic in the solution, are solved by a
+damped Newton iteration with the exact Jacobian. The alternating frequency-time scheme gives the force F.
+Contact needs many harmonics (51 to 400), power laws few. Harmonics are added until the estimated effect of
+the neglected ones is small enough.
 """
 
 import math
@@ -18,11 +18,11 @@ from ..specimen.specimen import Specimen
 from ..specimen.state import Complex, Floats, Table, Vector
 from .restoring_force import RestoringForce
 
-# Condensation of a linear structure to its one nonlinear spring. SI units.
+# Condensation of a linear structure with one nonlinear spring to the spring's elongation p. SI units.
 #
-# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. At each harmonic k of omega the equations are
-# linear in q and are solved for q, so that only the scalar p is unknown (Krack and Gross, Harmonic Balance
-# for Nonlinear Vibration Problems, Springer 2019, section 2.5):
+# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. For each harmonic k of the drive the equations
+# are linear in q and are solved for q, so that only the scalar p is unknown (Krack and Gross, Harmonic
+# Balance for Nonlinear Vibration Problems, Springer 2019, section 2.5):
 #
 #     P_k = linear_k U - compliance_k F_k,   compliance_k = b.Z_k^-1 b,   Z_k = K - (k w)^2 M + i k w C
 
@@ -32,7 +32,7 @@ Harmonics = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class LinearStructure:
-    """Linear structure, with the directions in which the nonlinear spring and the drive act."""
+    """Linear structure, with the directions of the nonlinear spring and of the drive."""
 
     mass: Matrix
     """Mass matrix M, regular, shape (n, n) [kg]."""
@@ -41,11 +41,11 @@ class LinearStructure:
     stiffness: Matrix
     """Stiffness matrix K, regular, shape (n, n) [N/m]."""
     direction: Vector
-    """Direction b of the spring, shape (n,): p = b.q, and the spring's force on the structure is -b F."""
+    """Direction b of the spring, shape (n,): p = b.q, and the spring exerts the force -b F."""
     entry_stiffness: Vector
-    """Force e_k per displacement of the drive, shape (n,) [N/m]."""
+    """Force on the structure per base displacement, e_k, shape (n,) [N/m]."""
     entry_damping: Vector
-    """Force e_c per velocity of the drive, shape (n,) [N s/m]."""
+    """Force on the structure per base velocity, e_c, shape (n,) [N s/m]."""
 
     def __post_init__(self) -> None:
         size = len(self.direction)
@@ -62,7 +62,7 @@ class LinearStructure:
 
 
 def structure_of(specimen: Specimen) -> LinearStructure:
-    """Return the linear structure without stops: q = (x, y, z), p = y - z, driven at m0 by k0 and c0."""
+    """Return the structure without stops: q = (x, y, z), p = y - z, base acting on m0 by k0 and c0."""
     return LinearStructure(
         mass=specimen.mass_matrix,
         damping=specimen.damping_matrix,
@@ -74,7 +74,7 @@ def structure_of(specimen: Specimen) -> LinearStructure:
 
 
 class Condensed(NamedTuple):
-    """Condensed structure at one frequency, for each harmonic; slopes are derivatives by omega."""
+    """Condensed structure at m harmonics of one frequency; slopes are derivatives by omega."""
 
     compliance: Complex
     """b.Z_k^-1 b, shape (m,) [m/N]."""
@@ -83,13 +83,13 @@ class Condensed(NamedTuple):
     """P_1 / U without the spring."""
     linear_slope: complex
     reach: Complex
-    """Displacements per force of the spring, Z_k^-1 b, shape (m, n) [m/N]."""
+    """Displacements per unit force of the spring, Z_k^-1 b, shape (m, n) [m/N]."""
     carried: Complex
-    """Displacements without the spring over U, Z_1^-1 e, shape (n,)."""
+    """Displacements without the spring over U, Z_1^-1 (e_k + i w e_c), shape (n,)."""
 
 
 def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> Condensed:
-    """Return the structure condensed to its spring, at the given multiples of ``omega``.
+    """Return the structure condensed to p, at the given harmonics of ``omega``.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> 
     slope = -2.0 * omega * turn**2 * structure.mass + 1j * turn * structure.damping
     spring = np.broadcast_to(structure.direction[:, None], (len(harmonics), structure.size, 1))
     reach: Complex = np.linalg.solve(dynamic, spring).astype(np.complex128)
-    # Z is symmetric (no gyroscopic terms), so that the slope of b.Z^-1 b is -(Z^-1 b).Z' (Z^-1 b).
+    # Z is symmetric (no gyroscopic terms), so the slope of b.Z^-1 b is -(Z^-1 b).Z' (Z^-1 b).
     bent = (slope @ reach)[:, :, 0]
     first = _dynamic(structure, np.array(omega))
     first_slope = -2.0 * omega * structure.mass + 1j * structure.damping
@@ -128,14 +128,14 @@ def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
 
 # Alternating frequency-time scheme for one spring. SI units.
 #
-# p(theta) = Re sum P_k exp(i k theta) over the harmonics kept, with theta = omega t in [0, 2 pi). The force
-# and its derivatives are evaluated on a time grid and transformed by FFT. The Fourier coefficients S_m of
-# dF/dp and E_m of dF/d(dp/dt) give the exact Jacobian,
+# p(theta) = Re sum P_k exp(i k theta) over the harmonics in the solution, with theta = omega t in [0, 2 pi).
+# The force and its derivatives are evaluated on a time grid and transformed by FFT. The Fourier coefficients
+# S_m of dF/dp and E_m of dF/d(dp/dt) give the exact Jacobian,
 # dF_k = sum_l (S_{k-l} + i l w E_{k-l}) dP_l + (S_{k+l} - i l w E_{k+l}) dP_l*
 # (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
 
 SAMPLES_PER_HARMONIC = 16
-"""Grid points per period of the highest harmonic; only components 15 times above that harmonic alias."""
+"""Grid points per period of the highest harmonic; only components above 15 times it cause aliasing."""
 FEWEST_SAMPLES = 1024
 
 
@@ -145,15 +145,15 @@ class ForceHarmonics(NamedTuple):
     force: Complex
     """Force harmonics F_k, shape (m,) [N]."""
     holomorphic: Complex
-    """dF_k / dP_l, shape (m, m) [N/m]."""
+    """Derivative dF_k / dP_l, shape (m, m) [N/m]."""
     conjugate: Complex
-    """dF_k / dP_l*, shape (m, m) [N/m]."""
+    """Derivative by the complex conjugate, dF_k / dP_l*, shape (m, m) [N/m]."""
     frequency_slope: Complex
-    """dF_k / domega at fixed P, which is due to the rate-dependent force, shape (m,) [N s]."""
+    """Derivative dF_k / domega at constant P, due to rate-dependent forces, shape (m,) [N s]."""
 
 
 def grid_size(highest: int) -> int:
-    """Return the samples per period, a power of two, that resolve harmonics up to ``highest``."""
+    """Return the number of samples per period, a power of two, for harmonics up to ``highest``."""
     return max(FEWEST_SAMPLES, 1 << (SAMPLES_PER_HARMONIC * highest - 1).bit_length())
 
 
@@ -185,7 +185,7 @@ def motion_on_grid(
 def force_harmonics(
     spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float
 ) -> ForceHarmonics:
-    """Return the harmonics of the spring's force for those of the motion; not finite on overflow."""
+    """Return the harmonics of the spring's force at the harmonics of p; not finite on overflow."""
     samples = grid_size(int(harmonics[-1]))
     p, rate = motion_on_grid(phasors, harmonics, omega, samples)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -204,7 +204,7 @@ def _force_harmonics(
     turning = 1j * omega * harmonics[None, :]
     holomorphic = stiffness_lines[difference] + turning * damping_lines[difference]
     conjugate = stiffness_lines[total] - turning * damping_lines[total]
-    # The mean has no conjugate partner: it counts once, not as half of a pair.
+    # The mean has no conjugate partner, so it counts once and not as half of a pair.
     once = np.where(harmonics == 0, 0.5, 1.0)[:, None]
     return ForceHarmonics(
         force=phasors_of(spring.force(p, rate))[harmonics],
@@ -215,7 +215,7 @@ def _force_harmonics(
 
 
 def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float) -> Complex:
-    """Return all force harmonics that the grid resolves, for the error estimate, shape (samples/2 + 1,)."""
+    """Return all force harmonics that the grid resolves, shape (samples/2 + 1,); for the error estimate."""
     samples = grid_size(int(harmonics[-1]))
     p, rate = motion_on_grid(phasors, harmonics, omega, samples)
     return phasors_of(spring.force(p, rate))
@@ -224,14 +224,14 @@ def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, o
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12
 ROUNDING = 1e-12
-"""Largest residual of a converged Newton iteration, over the spring's length scale."""
+"""Residual at which Newton's iteration has converged, over the spring's length scale."""
 
 
 class HarmonicSet(StrEnum):
-    """Harmonics of a solution."""
+    """Which harmonics a solution contains."""
 
     ODD = "odd"
-    """Odd harmonics, for motions that mirror themselves after half a period (equal stops, low levels)."""
+    """Odd harmonics: for motions that are their own mirror image half a period later (equal gaps)."""
     ALL = "all"
     """All harmonics and the mean: any motion with the drive's period."""
 
@@ -253,7 +253,7 @@ def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
 
 @dataclass(frozen=True, eq=False)
 class BalanceProblem:
-    """Equations of harmonic balance with the real unknowns (Re P, Im P) over the spring's length scale."""
+    """Equations of harmonic balance; the unknowns are (Re P, Im P) over the spring's length scale."""
 
     structure: LinearStructure
     spring: RestoringForce
@@ -265,11 +265,11 @@ class BalanceProblem:
         return 2 * len(self.harmonics) - int(self.harmonics[0] == 0)
 
     def packed(self, phasors: Complex) -> Vector:
-        """Return the unknowns for phasors [m], shape (size,)."""
+        """Return the unknowns for the phasors P_k [m], shape (size,)."""
         return _real(phasors, self.harmonics) / self.spring.length
 
     def phasors(self, unknowns: Vector) -> Complex:
-        """Return the phasors for unknowns, shape (m,) [m]."""
+        """Return the phasors P_k for the unknowns, shape (m,) [m]."""
         scaled = unknowns * self.spring.length
         count = len(self.harmonics)
         imaginary = np.zeros(count)
@@ -313,7 +313,7 @@ class BalanceProblem:
 
 
 def _real(phasors: Complex, harmonics: Harmonics) -> Vector:
-    """Return the real parts, then the imaginary parts; the mean has no imaginary part."""
+    """Return the real parts, then the imaginary parts; the mean (harmonic 0) has no imaginary part."""
     return np.concatenate([phasors.real, phasors.imag[int(harmonics[0] == 0) :]])
 
 
@@ -329,19 +329,19 @@ class Balance:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (m, n) [m]."""
     left_out: float
-    """Error estimate: effect of neglected force harmonics on p, over the fundamental of p."""
+    """Error estimate: change of p due to neglected force harmonics, over the fundamental of p."""
     outcome: BalanceEnd
 
     @property
     def state(self) -> Vector:
-        """Displacements and velocities at the drive's time zero, shape (2 n,)."""
+        """Displacements and velocities at time zero of the drive, shape (2 n,)."""
         turning = 2j * math.pi * self.frequency_hz * self.harmonics[:, None]
         velocities = turning * self.displacements
         return np.concatenate([self.displacements.real.sum(axis=0), velocities.real.sum(axis=0)])
 
     @property
     def response_ii(self) -> Vector:
-        """Fundamental of every displacement and of p, over the drive amplitude, shape (n + 1,)."""
+        """Amplitude of every displacement and of p at the drive frequency, over A0, shape (n + 1,)."""
         first = int(np.searchsorted(self.harmonics, 1))
         lines = np.append(self.displacements[first], self.relative[first])
         return np.asarray(np.abs(lines) / self.amplitude_m)
@@ -355,7 +355,7 @@ class Balance:
 
 
 def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
-    """Return the largest magnitude, from a parabola through the largest grid value and its neighbours."""
+    """Return the largest magnitude of a waveform, refined by a parabola through three samples."""
     wave = np.abs(waveform(phasors, harmonics, samples))
     top = int(np.argmax(wave))
     before, here, after = wave[top - 1], wave[top], wave[(top + 1) % samples]
@@ -382,7 +382,7 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
             if trial_error < error:
                 break
         else:
-            # No step reduces the error: the iteration has converged if the error is at rounding level.
+            # No step reduces the error. This means convergence if the error is at rounding level.
             return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
         unknowns, residual, jacobian, error = trial, trial_residual, trial_jacobian, trial_error
     return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
@@ -395,7 +395,7 @@ def size_of(values: Vector) -> float:
 
 
 def with_harmonics(phasors: Complex, known: Harmonics, wanted: Harmonics) -> Complex:
-    """Return the phasors for another set of harmonics; harmonics that are not known are zero."""
+    """Return the phasors for another set of harmonics; harmonics without a known phasor are zero."""
     carried = np.zeros(max(int(known[-1]), int(wanted[-1])) + 1, dtype=np.complex128)
     carried[known] = phasors
     return carried[wanted]

@@ -27,18 +27,18 @@ from .continuation import ArcSteps
 from .shooting import PeriodicOrbit, PeriodMap, ShootingEnd, describe_orbit
 
 ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
-"""Step lengths; the tolerance of 1e-9 gaps is the smallest that integration at reference accuracy allows."""
+"""Step lengths; the tolerance, 1e-9 gaps, is the smallest that reference accuracy can reach."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExactFamily:
-    """Fixed points of the period map."""
+    """Periodic motions as fixed points of the period map."""
 
     mapping: PeriodMap
     reference: Harmonic
-    """Drive that defines the scales of states."""
+    """Drive whose frequency scales the velocities."""
     tolerance: ClassVar = math.inf
-    """No limit on the error estimate, because the integration is exact."""
+    """No limit on the error estimate: shooting has no resolution that could be increased."""
 
     @property
     def scales(self) -> Vector:
@@ -46,37 +46,37 @@ class ExactFamily:
         return state_scales(self.mapping.specimen, self.reference)
 
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
-        """Return the closure error over a period, its derivative by the state, and a ratio of scales.
+        """Return the closure error after a period, its derivative by the state, and a ratio of scales.
 
-        The map scales velocities by its drive, the family by its reference drive; the ratio converts slopes.
+        The map scales velocities by its own drive, the family by the reference drive; the ratio converts.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
         return (self.mapping.image(state, drive) - state) / self.scales, derivative - np.eye(6), ratio
 
     def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002
-        """Return None: there is no finer resolution."""
+        """Return None, because shooting has no finer resolution."""
         return None
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitFamily(ExactFamily):
-    """Fixed points along a drive path; the last component of a point is parameter / scale."""
+    """Fixed points of the period map along a drive path; a point ends with parameter / scale."""
 
     path: DrivePath
     scale: float
-    """Parameter per unit of length [Hz, or m]."""
+    """Parameter change that counts as one unit of length [Hz, or m]."""
 
     def drive_at(self, point: Vector) -> Harmonic:
         """Return the drive at a point."""
         return Harmonic(*self.path.drive(float(point[-1]) * self.scale))
 
     def state_at(self, point: Vector) -> Vector:
-        """Return the state at the drive's time zero."""
+        """Return the state at time zero of the drive."""
         return point[:-1] * self.scales
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return the closure error over a period, and its derivatives by state and parameter."""
+        """Return the closure error after a period, and its derivatives by state and parameter."""
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
         drive, state = self.drive_at(point), self.state_at(point)
@@ -85,7 +85,7 @@ class OrbitFamily(ExactFamily):
         return gone, np.column_stack([by_state, along])
 
     def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
-        """Return d image / d parameter, over the scales of the drive [1/Hz or 1/m]."""
+        """Return the derivative of the map's final state by the parameter, over scales [1/Hz or 1/m]."""
         by_frequency, by_amplitude = self.path.slopes(value)
         slope = np.zeros(6)
         if by_frequency != 0.0:
@@ -115,7 +115,7 @@ def periodic_branch(
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m] to ``stop``.
 
-    The branch ends at ``stop``, or at its starting value if it turns back. It is followed through folds by
+    The branch ends at ``stop``, or at its starting value if it turns back there. Folds are passed by
     pseudo-arclength continuation (Keller 1977).
 
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.
@@ -138,8 +138,8 @@ def periodic_branch_within(
 ) -> Branch:
     """Follow a periodic motion in both directions along a drive path, from ``low`` to ``high``.
 
-    Return the whole branch, through its folds; its parameter ascends where it has no fold. `Branch.begin` and
-    `Branch.end` are the reasons for its ends. A closed branch is followed once. Raises ValueError when the
+    Return the whole branch, with its folds; without folds its parameter ascends. `Branch.begin` and
+    `Branch.end` say why it ends. A closed branch is followed once around. Raises ValueError when the
     orbit did not converge, or is outside the range.
 
     Parameters
@@ -151,7 +151,7 @@ def periodic_branch_within(
     low, high
         Ends of the range, ascending [Hz, or m].
     steps
-        Step lengths and tolerances; the range is ten units long.
+        Step lengths and tolerances. In their units the range is 10 long.
     """
     value = parameter_value(path, orbit.drive)
     family, start = _family_at(orbit, path, value, range_scale(low, high, value))

@@ -2,9 +2,9 @@
 
 At a phase resonance the fundamental of m0 lags the base by a given angle, usually a quarter of a period
 (Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u exerts the inertia force m w^2 u
-on the motion relative to the base. It is in phase with u, so the relative motion lags u by a quarter of a
-period. Shooting with the phase as a seventh equation and the frequency as a seventh unknown finds the phase
-resonance. Pseudo-arclength continuation follows it over the level.
+on the motion relative to the base. This force is in phase with u, so the relative motion lags u by a quarter
+of a period. Shooting finds the phase resonance, with the phase as a seventh equation and the frequency as a
+seventh unknown. Pseudo-arclength continuation follows it over the level.
 """
 
 import math
@@ -27,25 +27,25 @@ from .shooting import PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
-"""Step lengths along the branch; a decade of level has the length `LENGTH_PER_DECADE`."""
+"""Step lengths along the branch, in units in which a decade of level is `LENGTH_PER_DECADE` long."""
 LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
-"""Relative change of the frequency that counts as one unit of length."""
+"""Relative change of the frequency that is one unit of length."""
 FARTHEST = 20.0
-"""Largest change of frequency or level in an iteration, in units of length."""
+"""Largest change of frequency or level that an iteration may try, in units of length."""
 STRAYED = 1e3
-"""Largest state in an iteration, over the gap; on a hard spring, larger states would take minutes."""
+"""Largest state that an iteration may try, over the gap; larger ones would take minutes on a hard spring."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
-"""Step of the finite differences for derivatives of the phase, over the scale of each unknown."""
+"""Step of the finite differences that give derivatives of the phase, over the scale of each unknown."""
 SCAN_POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseResonanceFamily(ExactFamily):
-    """Motions with a given phase; the last two unknowns are the logarithms of frequency and amplitude.
+    """Motions with a given phase of m0; the last two unknowns are scaled logarithms of frequency and level.
 
-    The logarithms are relative to the reference drive.
+    Both are relative to the reference drive.
     """
 
     phase_rad: float
@@ -53,7 +53,7 @@ class PhaseResonanceFamily(ExactFamily):
 
     @property
     def path(self) -> DrivePath:
-        """Path along amplitude; its frequency is not used, because the phase determines the frequency."""
+        """Path along amplitude; its frequency has no effect, because the phase determines the frequency."""
         return AmplitudePath(self.reference.frequency_hz)
 
     def amplitude_m(self, point: Vector) -> float:
@@ -66,7 +66,7 @@ class PhaseResonanceFamily(ExactFamily):
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return closure error and phase error, shape (7,), and their derivatives, shape (7, 8)."""
+        """Return closure error and phase error, shape (7,), and their derivatives by the point, (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         drive, state = self.drive_at(point), point[:6] * self.scales
@@ -107,22 +107,22 @@ def phase_resonance_branch(
     """Follow the phase resonance of a mode over the level of the base, from a level without contact.
 
     Return the branch over amplitude, with the frequency and the multipliers of each motion; it may turn back.
-    Raises ValueError when the specimen has no damping, the motion without contact does not have this phase
-    exactly once in the band, no motion is found at the lower level, m1 reaches its stops at this level, or
-    `of` is not a word of `PhaseReference`.
+    Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1 reaches its
+    stops at this level, the linear motion does not have this phase exactly once in the band, or `of` is not a
+    word of `PhaseReference`.
 
     Parameters
     ----------
     specimen
         Specimen with any contact law, and two equal stops or none.
     band_hz
-        Band around one mode, in which the motion without contact has this phase once [Hz].
+        Frequencies around one mode [Hz]. The motion without contact must have the phase exactly once in it.
     levels_m
         Drive amplitudes, ascending [m]; at the lower level m1 must not reach its stops.
     of, phase_rad
-        Motion of m0 (absolute or relative to the base), and its phase relative to the base displacement.
+        Motion of m0 (absolute or relative to the base), and its phase against the base displacement [rad].
     steps
-        Step lengths along the branch: half a unit is a quarter of a decade of level, or 5 % of frequency.
+        Step lengths along the branch; 0.5 is a quarter of a decade of level, or 5 % of frequency.
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
     if not any(specimen.dampings):
@@ -144,7 +144,7 @@ def phase_resonance_branch(
     guess = np.concatenate([state / family.scales, [0.0, 0.0]])
     start, iterations = correct(family, guess, np.eye(8)[7], steps.tolerance)
     if iterations == 0 or not band_hz[0] <= family.drive_at(start).frequency_hz <= band_hz[1]:
-        # A power law acts at every p, so the motion may be far from the linear one.
+        # A power law acts at every p, so even the motion at the lower level may be far from the linear one.
         raise ValueError(
             f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
             "starting from the linear motion: give a lower first level, or a wider band."
@@ -165,7 +165,7 @@ def linear_phase_resonance_hz(
 
     grid = np.linspace(*band_hz, SCAN_POINTS)
     values = [off(float(each)) for each in grid]
-    # Use only falling values: the lag increases as the frequency rises through a mode.
+    # Use falling values only: through a mode, the lag increases with frequency.
     found_hz = [
         float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
         for k in range(len(grid) - 1)

@@ -14,10 +14,10 @@ from ..specimen.state import Floats
 
 @dataclass(frozen=True)
 class PowerSpring:
-    """Sum of odd powers, F = sum F_i (p / length)^n_i; in this form the coefficients do not overflow."""
+    """Sum of odd powers, F = sum F_i (p / length)^n_i. Scaling by ``length`` avoids overflow."""
 
     length: float
-    """Reference displacement, at which term i has the force F_i [m]."""
+    """Reference displacement at which term i equals F_i [m]."""
     terms: tuple[tuple[int, float], ...]
     """Exponents and forces (n_i, F_i [N]) with n_i odd; empty for no force."""
 
@@ -42,18 +42,18 @@ class PowerSpring:
         """Whether F(-p, -v) = -F(p, v): True, because all powers are odd."""
         return True
 
-    def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
+    def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - does not depend on the rate
         """Return the force F, shape of ``p`` [N]; infinite on overflow."""
         with np.errstate(over="ignore", under="ignore"):
             return np.asarray(sum(f * (p / self.length) ** n for n, f in self.terms) + 0.0 * p)
 
-    def stiffness(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
+    def stiffness(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - does not depend on the rate
         """Return the stiffness dF/dp, shape of ``p`` [N/m]."""
         with np.errstate(over="ignore", under="ignore"):
             slope = sum(n * f / self.length * (p / self.length) ** (n - 1) for n, f in self.terms)
             return np.asarray(slope + 0.0 * p)
 
-    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - no loss of its own
+    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - a power law has no loss
         """Return the damping dF/d(dp/dt), which is zero, shape of ``p`` [N s/m]."""
         return np.zeros_like(p)
 
@@ -71,7 +71,7 @@ class GapSpring:
     lower: float
     """Gap at negative p, positive [m]; infinite for no stop."""
     loss: float = 0.0
-    """Hunt and Crossley's lambda over k [s/m]."""
+    """Loss factor: Hunt and Crossley's lambda over k [s/m]."""
     beside: float = 0.0
     """Stiffness of a linear spring parallel to the stop [N/m]."""
 
@@ -88,7 +88,7 @@ class GapSpring:
 
     @property
     def length(self) -> float:
-        """Smaller gap [m]."""
+        """Length scale: the smaller gap [m]."""
         return min(self.upper, self.lower)
 
     @property
@@ -112,7 +112,7 @@ class GapSpring:
         slope = self.exponent * self.stiffness_coefficient * depth ** (self.exponent - 1.0) + self.beside
         return np.where(depth > 0.0, slope * (1.0 + self.loss * side * rate), 0.0)
 
-    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - linear in the rate
+    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the force is linear in the rate
         """Return the damping dF/d(dp/dt), shape of ``p`` [N s/m]."""
         _, depth = self._pressed(p)
         return self.loss * self._push(depth)
@@ -126,9 +126,9 @@ class GapSpring:
 
 
 RestoringForce = PowerSpring | GapSpring
-"""Force F(p, dp/dt) between m1 and m2, in addition to the linear spring."""
+"""Nonlinear force F(p, dp/dt) between m1 and m2, parallel to the spring k1."""
 LINEAR = PowerSpring(1.0, ())
-"""Spring without force, with an arbitrary length scale."""
+"""Spring without force; its length scale is arbitrary."""
 
 
 def spring_of(specimen: Specimen) -> RestoringForce:

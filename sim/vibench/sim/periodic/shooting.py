@@ -32,16 +32,16 @@ from .harmonic_balance import phasors_of, size_of
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #
 # A mirrored motion has the opposite state half a drive period later. It is a fixed point of the half-period
-# map: integrate over half a period, then change all signs. The derivative by the state is exact, because it
-# is propagated with the motion; it tends to infinity as a contact with a rigid stop approaches grazing. The
-# derivatives by frequency and amplitude are fourth-order central differences at reference accuracy. Their
-# steps are far above the integration error (1e-10) and far below the gap. They are accurate to five to seven
-# digits, and only Newton's iteration uses them.
+# map: integrate over half a period, then change all signs. The derivative by the state is exact, because
+# tangent vectors are integrated with the motion; it tends to infinity if an impact on a rigid stop approaches
+# grazing. Derivatives by frequency and amplitude are fourth-order central differences at reference accuracy,
+# with steps far above the integration error (1e-10) and far below the gap. They are accurate to five to seven
+# digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
-"""Step of the finite differences, over the parameter."""
+"""Step of the finite differences, over the parameter's value."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
-"""Offsets and weights of the fourth-order central difference."""
+"""Offsets (in steps) and weights of the fourth-order central difference."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +63,12 @@ class PeriodMap:
 
     @property
     def turns(self) -> float:
-        """Duration of the map in drive periods."""
+        """Time that the map covers, in drive periods."""
         return 0.5 * self.periods if self.shape is OrbitShape.MIRRORED else float(self.periods)
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Map for simpler fixed points (half the period, or mirrored); None if there can be none."""
+        """Map for motions with half the period or mirrored; None if there can be none."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -77,7 +77,7 @@ class PeriodMap:
         return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the image of a state at the drive's phase zero, shape (6,); NaN if the run was lost."""
+        """Return the final state for an initial state at drive phase zero, (6,); NaN if the run failed."""
         if not self._may_start(state):
             return np.full(6, math.nan)
         run = self._run(state, drive, self.turns)
@@ -86,11 +86,11 @@ class PeriodMap:
         return -run.final_state if self.shape is OrbitShape.MIRRORED else run.final_state
 
     def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
-        """Return the motion over its whole period, with ``samples`` samples per drive period."""
+        """Return the motion over its whole period, sampled ``samples`` times per drive period."""
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
-        """Return d image / d state, both over their scales, shape (6, 6)."""
+        """Return the derivative of the final by the initial state, both over their scales, shape (6, 6)."""
         if not self._may_start(state):
             return np.full((6, 6), math.nan)
         scales = state_scales(self.specimen, drive)
@@ -100,11 +100,11 @@ class PeriodMap:
         return -scaled if self.shape is OrbitShape.MIRRORED else scaled
 
     def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return d image / d ln frequency, over the scales, shape (6,)."""
+        """Return the derivative of the final state by ln(frequency), over the scales, shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, frequency_hz=part * drive.frequency_hz))
 
     def amplitude_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return d image / d ln amplitude, over the scales, shape (6,)."""
+        """Return the derivative of the final state by ln(amplitude), over the scales, shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, amplitude_m=part * drive.amplitude_m))
 
     def _slope(self, state: Vector, drive: Harmonic, scaled: Callable[[float], Harmonic]) -> Vector:
@@ -112,7 +112,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * state_scales(self.specimen, drive)))
 
     def _may_start(self, state: Vector) -> bool:
-        """Return whether a run can start from a state; a diverging iteration may pass a rigid stop."""
+        """Return whether a run can start here; Newton's iteration may try states beyond a rigid stop."""
         match self.specimen.contact:
             case RigidStops():
                 lower, upper = self.specimen.gaps_m
@@ -136,14 +136,14 @@ class PeriodMap:
 NEWTON_ITERATIONS = 30
 MOST_HALVINGS = 8
 RETURNED = 1e-9
-"""Largest closure error of a periodic motion, over the state's scale."""
+"""Largest closure error (final minus initial state, over its scale) of a periodic motion."""
 FLOW_ERROR = 1e-10
 """Assumed integration error in a period at reference accuracy, over the state's scale; ten times the measured
 error (docs/accuracy.md)."""
 SAMPLES = 4096
-"""Samples per drive period for the responses."""
+"""Samples per drive period from which responses are computed."""
 SETTLING_PERIODS = 400
-"""Drive periods of the run from rest that gives the initial guess if no state is given."""
+"""Length in drive periods of the run from rest that gives the default initial guess."""
 
 
 class ShootingEnd(StrEnum):
@@ -160,12 +160,12 @@ class PeriodicOrbit:
     drive: Harmonic
     period_map: PeriodMap
     state: Vector
-    """x, y, z, vx, vy, vz at the drive's time zero, shape (6,)."""
+    """x, y, z, vx, vy, vz at time zero of the drive, shape (6,)."""
     signs: OrbitSigns
     defect: float
-    """Closure error over the state's scale."""
+    """Closure error: final minus initial state over the state's scale."""
     error: float
-    """Error bound over the fundamental of p: closure and integration error, amplified by (map - I)^-1."""
+    """Error bound over the fundamental of p: closure and integration error times |(map - I)^-1|."""
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
@@ -174,12 +174,12 @@ class PeriodicOrbit:
 
     @property
     def floquet_multipliers(self) -> Complex:
-        """Multipliers over the whole period of the motion, largest first, shape (6,)."""
+        """Floquet multipliers over the whole period of the motion, largest first, shape (6,)."""
         return self.signs.over_period
 
     @property
     def is_stable(self) -> bool:
-        """Whether no multiplier lies outside the unit circle."""
+        """Whether no Floquet multiplier lies outside the unit circle."""
         return bool(abs(self.floquet_multipliers[0]) < 1.0 + NEUTRAL)
 
     @property
@@ -195,7 +195,7 @@ def periodic_orbit(
     periods: int = 1,
     start: ArrayLike | None = None,
 ) -> PeriodicOrbit:
-    """Return the periodic motion near a state; check its ``outcome`` first.
+    """Return the periodic motion near an initial state; check its ``outcome`` first.
 
     Raises ValueError when the phase of the drive is not zero, or its amplitude is zero.
 
@@ -204,9 +204,9 @@ def periodic_orbit(
     specimen, drive
         Specimen, and drive with positive amplitude and phase zero.
     shape, periods
-        Symmetry (see `OrbitShape`), and period in drive periods; odd for a mirrored motion.
+        Symmetry (see `OrbitShape`), and period in drive periods, which is odd for a mirrored motion.
     start
-        x, y, z, vx, vy, vz at time zero, shape (6,); None for the state 400 periods after a start from rest.
+        x, y, z, vx, vy, vz at time zero, shape (6,). None for the state 400 periods after rest.
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         raise ValueError(
@@ -234,7 +234,7 @@ def periodic_orbit(
 def _damped_step(
     mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
 ) -> tuple[Vector, Vector, bool]:
-    """Halve the step until the closure error falls; return the state, its error, and whether it fell."""
+    """Halve a step until the closure error falls; return state, closure error, and whether it fell."""
     scales = state_scales(mapping.specimen, drive)
     for halving in range(MOST_HALVINGS):
         trial = state - 0.5**halving * step
@@ -245,9 +245,9 @@ def _damped_step(
 
 
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
-    """Return the motion from ``state`` with its responses; ``gone`` is its closure error over scales."""
+    """Return the motion from ``state`` with its responses; ``gone`` is its scaled closure error."""
     run = mapping.orbit(state, drive, SAMPLES)
-    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # NaN if the run was lost before the end
+    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # NaN after the end of a run that failed
     moved[: len(run.states)] = run.states[: len(moved)]
     waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
     derivative = mapping.derivative(state, drive)
@@ -268,9 +268,9 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
 
 
 def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
-    """Return the largest magnitudes, shape (n,), of periodic waves, shape (m, n), interpolated by cubics.
+    """Return the largest magnitudes, shape (n,), of periodic waves, shape (m, n), between samples too.
 
-    Two samples of a wave and of its rate define a Hermite cubic, whose extremes are zeros of its slope.
+    Two samples of a wave and of its rate define a Hermite cubic; its slope is zero at the extremes.
     """
     found = np.abs(waves).max(axis=0)
     ahead, rates_ahead = np.roll(waves, -1, axis=0), np.roll(rates, -1, axis=0)
@@ -281,7 +281,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
         cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
-            # Both extremes, in a form without cancellation; those outside the step are ignored.
+            # Both extremes, in a form without cancellation; those outside the interval are ignored.
             places = np.stack([-first / (square + root), -first / (square - root)])
         inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
         tops = start + inside * (first + inside * (square + inside * cubic))
@@ -290,7 +290,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
 
 
 def _missing(derivative: Table, gone: Vector) -> float:
-    """Return the error bound: closure and integration error times the norm of (map - identity)^-1."""
+    """Return the error bound: closure plus integration error, times the norm of (map - identity)^-1."""
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
         return math.inf
@@ -318,7 +318,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the smallest distance from grazing: of p over the gap, of dp/dt over the gap times 2 pi f."""
+    """Return the distance from grazing: of p over the gap, or of dp/dt over the gap times 2 pi f."""
     match specimen.contact:
         case NoContact() | PowerLaw():
             return math.inf
@@ -331,22 +331,22 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
     dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
     nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
     rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
-    # Use the speed at the last sample before each contact.
+    # Take the speed at the last sample before each contact.
     places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
     slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
     return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))
 
 
 class PhaseReference(StrEnum):
-    """Motion of m0 whose phase defines a phase resonance."""
+    """Which motion of m0 defines the phase at a phase resonance."""
 
     RELATIVE = "relative"
-    """Motion relative to the base: for the lowest mode, or where contacts allow little relative motion."""
+    """Motion relative to the base: for the lowest mode, or if contacts limit the relative motion."""
     ABSOLUTE = "absolute"
     """Absolute motion: for a mode far above the others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
-        """Return the motion whose phase is used, over the base motion, from the transmissibility of m0."""
+        """Return this motion of m0 over the base motion, from the transmissibility of m0."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 
