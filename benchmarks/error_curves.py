@@ -244,7 +244,10 @@ def section(curves, models, chaos):
         "  is the uncertainty of this mean, and no accuracy level reduces it. At 1 %, other starts change",
         "  the mean by at most 1 % in 19 of 20 cases. A single run may differ by far more.",
         "",
-        "| scene | requested error | stated error | time | stated error, 30 s at `standard` | its time |",
+        (
+            "| contact law, drive | requested error | stated error | time "
+            "| stated error, 30 s at `standard` | its time |"
+        ),
         "|---|---|---|---|---|---|",
     )
     for name, points in curves.items():
