@@ -43,7 +43,7 @@ _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Least median difference of two estimators that counts as bias, in standard deviations of the median."""
+"""Median difference of two estimators above which it is bias, in standard deviations of the median."""
 _ALIKE_LINES = 4
 """Variance of a median over lines correlated by a window, relative to a mean over independent lines."""
 
@@ -60,7 +60,7 @@ class NoiseResponse(Labelled):
     )
 
     frequency_response: FrequencyResponse
-    """The estimate to use; by default referenced to the drive voltage, which avoids bias by noise."""
+    """Requested estimate of the transmission; the default, referenced to the drive, has no bias by noise."""
     h1: FrequencyResponse
     h2: FrequencyResponse
     resonances: tuple[Resonance, ...]
@@ -404,10 +404,10 @@ _QUIET_BLOCKS = 200
 
 
 def scatter_over_silence(channels: Channels, noise: Noise, found: NoiseResponse) -> float:
-    """Return the variance about the linear response over that of the channels in silence, median of lines.
+    """Return the variance about the linear response, relative to that in silence, as the median of the lines.
 
-    NaN for hits. Chaos scatters alike between periods and between realisations, so only silence reveals it.
-    Recordings start or end in silence; without one, the ratio is too small.
+    NaN for hits. Chaos scatters equally between periods and between realisations, so only silence reveals it.
+    Recordings start or end in silence (no drive); without silence, the ratio is too small.
     """
     length, rate = round(_QUIET_S * channels.sample_rate_hz), round(channels.sample_rate_hz)
     label = SegmentLabel.NOISE if found.periodic is None else SegmentLabel.REALISATION
