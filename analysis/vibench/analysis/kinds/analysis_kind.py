@@ -54,7 +54,7 @@ class AnalysisKind(Generic[P, A, L]):
     """Name of the results in JSON; kinds with equal results share it."""
     analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
     draws: Callable[[A], Callable[[SimulatedChannels], Draw[Any]]]
-    """Return the function that estimates the recorded quantities from simulated channels."""
+    """Return the function that estimates the measured quantities from simulated channels."""
     compared: Callable[[A], tuple[Quantity, ...]]
     """Return the measured quantities that are compared with the simulated records (draws)."""
     lay: Callable[[A, Drawn[Any]], L]
@@ -64,4 +64,4 @@ class AnalysisKind(Generic[P, A, L]):
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
     """Return uncertainty budgets of the main results."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()
-    """Return the key that sorts the results of a family, weak to strong; by default they are not sorted."""
+    """Return the key by which results of a family are sorted from weak to strong; unsorted by default."""

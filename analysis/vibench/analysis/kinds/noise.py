@@ -72,7 +72,7 @@ def _noise(
 
 
 def _estimate_for_draws(analysis: NoiseAnalysis) -> Estimate:
-    """Return the estimator for simulated records; they have the recorded drive, so its period is known."""
+    """Return the estimator for simulated records; their drive is the recorded one, whose period is known."""
     found = analysis.response
     if found.periodic is None or found.left_out:
         return repeated_response

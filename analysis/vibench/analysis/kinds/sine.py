@@ -1,4 +1,4 @@
-"""Sweeps, dwells and steps: responses over frequency or at a frequency, collisions, kind of motion."""
+"""Analysis of sweeps, dwells and stepped sines: responses, collisions, kind of motion."""
 
 from collections.abc import Callable
 from functools import partial
@@ -102,7 +102,7 @@ def _analyse_dwell(
     facts: RecordingFacts, channels: Channels, plan: DwellPlan, _: FrequencyResponseRequest
 ) -> DwellAnalysis:
     towards_hz = bound_frequencies_hz(facts)
-    # A dwell that is recorded until its bounds are small enough is analysed as a whole.
+    # A dwell recorded until its bounds were small enough (`until` in its plan) is analysed as a whole.
     longest_s = WINDOW_S if facts.measurement.until is None else inf
     found = measured_dwell(channels, plan, towards_hz, longest_s)
     motion = dwell_motion(channels, found)
