@@ -100,9 +100,9 @@ LEGIBLE_COLUMNS = 6.0
 _MARGIN = 1.25
 """Number of periods over which a column takes extremes; above 1, because a sweep changes its period."""
 _CLEAR = 0.25
-"""Hysteresis of zero crossings relative to the typical peak-to-peak value."""
+"""Hysteresis for counting zero crossings, relative to the typical peak-to-peak value."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
-"""Number of stretches in which periods are counted, and minimum columns of each stretch."""
+"""Number of parts of the signal in which periods are counted, and minimum columns of each part."""
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
@@ -145,7 +145,7 @@ def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[
 
 
 def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the reach of each column: the longest period in its stretch and both neighbours [columns]."""
+    """Return the reach of each column: the longest period in its part and its two neighbours [columns]."""
     is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
     reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
     beside = np.pad(reach, 1, mode="edge")
@@ -187,18 +187,17 @@ def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
     return found
 
 
-# Pictures of bounded width, of any stretch of a recording. Long stretches are drawn from the extremes stored
-# in the file, short stretches from the samples. No sample is skipped, so an impact of three samples is in
-# every picture.
+# Pictures of bounded width, of any part of a recording. Long parts are drawn from the extremes stored in the
+# file, short parts from the samples. No sample is skipped, so an impact of three samples is in every picture.
 #
 # A thumbnail shows a whole recording in about a hundred columns, for lists of recordings.
 
 _COARSER = 16
 """Number of bins of one level that form one bin of the next level."""
 _LEAST_BINS = 20_000
-"""Number of bins up to which no coarser level is needed; reducing them takes 0.1 ms."""
+"""Number of bins up to which no coarser level is needed; reducing these to columns takes 0.1 ms."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
-"""Stretches of a long recording in which periods are counted: number, columns of each, maximum samples."""
+"""Parts of a long recording in which periods are counted: number, columns of each, maximum samples."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
@@ -212,7 +211,7 @@ def ignore_reading(done: int, total: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A stretch of some channels, for drawing."""
+    """Part of a recording for drawing: lower and upper edges of some channels."""
 
     time_s: Reals
     """Left edge of each column [s since the first sample], shape (columns,)."""
@@ -279,7 +278,7 @@ class RecordingOverview:
         return Picture(time_s, lows, highs, per_column)
 
     def _reach(self, role: str, begin: int, end: int, columns: int) -> NDArray[np.int64]:
-        """Return the reach of each column, from periods in some stretches of samples.
+        """Return the reach of each column, from the periods in some parts of the samples.
 
         Stored bins are too long to show periods of less than two columns.
         """

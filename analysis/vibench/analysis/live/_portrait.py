@@ -13,7 +13,7 @@ from ._sine_response import drive_tone, drive_turns, look_samples, motion_of
 
 SHOWN_PERIODS = 20
 _EDGE_PERIODS = 25
-"""Additional periods at each end of the stretch, needed for integration and drive phase."""
+"""Additional periods at each end of the orbit, needed for integration and drive phase."""
 POINTS_A_PERIOD = 120
 """Points per period of the orbit; 2400 points in 20 periods are painted in about 1 ms."""
 MOST_POINTS = 3000
@@ -44,7 +44,7 @@ def portrait(
     *,
     delay_s: float = 0.0,
 ) -> Portrait | None:
-    """Return the portrait of the newest periods; None without a sine drive or with too few samples.
+    """Return the phase portrait of the newest periods; None without a sine drive or with too few samples.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class Ring:
         return 0 if self._begun is None else min(self.next_sample - self._begun, self._capacity)
 
     def add(self, first_sample: int, values: Values) -> None:
-        """Add samples, shape (channels, samples); gaps become NaN and known samples are skipped."""
+        """Add samples, shape (channels, samples); missing samples become NaN, known samples are skipped."""
         if self._begun is None:
             self._begun = self.next_sample = first_sample
         late = self.next_sample - first_sample

@@ -18,12 +18,12 @@ _LEAST_SHARE = 0.5
 _NEIGHBOURS = 3
 """Lines on each side that belong to a sine under a Hann window, even if its frequency changes slowly."""
 _LEAST_LINE = 4
-"""Minimum number of periods in a stretch, so that the line of the sine is separate from the offset."""
+"""Minimum number of periods to analyse, so that the sine's line is separate from the offset's."""
 
 
 @dataclass(frozen=True)
 class DriveTone:
-    """Sine in a short stretch of the drive signal."""
+    """Sine in a short part of the drive signal."""
 
     frequency_hz: float
     """Frequency [Hz]; in a sweep, the frequency at the middle of the stretch."""
@@ -63,7 +63,7 @@ def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
 
 
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
-    """Return the times of the maxima of the drive, a cosine or a slow sweep [samples].
+    """Return the times of the maxima of the drive signal, a cosine or a slow sweep [samples].
 
     The drive is demodulated with its frequency and low-pass filtered at half this frequency; a slow phase
     remains. A tenth of the stretch at each end is left out, because the filter is inaccurate there.
@@ -90,23 +90,23 @@ _BAND_BELOW = 0.3
 """High-pass frequency for displacement relative to the drive; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
-"""Length of the stretch in which the drive frequency is searched; five periods of 10 Hz [s]."""
+"""Length of the newest signal in which the drive frequency is searched; five periods of 10 Hz [s]."""
 _STRETCH_PERIODS = 25
-"""Number of drive periods without the disturbed ends; their duration is at least 0.1 s."""
+"""Number of drive periods for one point, without the disturbed ends; they last at least 0.1 s."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Smallest ratio of the drive amplitude at the end of a stretch to that at its start; less is a ramp down."""
+"""Smallest ratio of final to initial drive amplitude in the samples of a point; less is a ramp down."""
 _STEEPEST_POWER = 2
 """Largest power of frequency that the voltage of a sweep follows (constant displacement)."""
 
 
 @dataclass(frozen=True)
 class SinePoint:
-    """Responses and amplitudes from one stretch of samples."""
+    """Responses and amplitudes from some consecutive drive periods."""
 
     time_s: float
-    """Middle of the stretch [s since the first sample of the run]."""
+    """Time of the middle of these periods [s since the first sample of the run]."""
     frequency_hz: float
     drive_amplitude_m: float
     """Amplitude A0 of the base displacement at the drive frequency."""
@@ -136,7 +136,7 @@ def sine_point(
     sample_rate_hz: float,
     quantity: Quantity = Quantity.VELOCITY,
 ) -> SinePoint | None:
-    """Return a point from the newest samples.
+    """Return Responses I and II from the newest samples.
 
     None without a sine, with too few or lost samples, and while the drive is ramped down (m0 then still rings
     while the base hardly moves).
@@ -168,7 +168,7 @@ def sine_point(
 
 
 def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
-    """Return whether the drive falls along a stretch more steeply than in a downward sweep."""
+    """Return whether the drive amplitude falls more steeply than in a downward sweep."""
     quarter = drive.size // 4
     first, last = (drive_tone(each, sample_rate_hz) for each in (drive[:quarter], drive[-quarter:]))
     if first is None or last is None:
@@ -180,7 +180,7 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
 def _point(
     time_s: float, stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity
 ) -> SinePoint | None:
-    """Return a point; all quantities come from one stretch, because they change together in a sweep."""
+    """Return a point; all quantities are from the same samples, because they change together in a sweep."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
     omega = 2 * np.pi * frequency_hz

@@ -92,7 +92,7 @@ class LiveSpectra:
         data = np.concatenate((self._carry, values), axis=1)
         size = self._settings.segment_samples
         whole = max(0, (data.shape[1] - size) // self._hop + 1)
-        # After a long pause, only the newest segments are transformed.
+        # After a long pause between calls, only the newest segments are transformed.
         for number in range(max(0, whole - self._settings.averages), whole):
             self._take(data[:, number * self._hop : number * self._hop + size])
         self._carry = data[:, whole * self._hop :].copy()
@@ -140,8 +140,8 @@ class LiveSpectra:
         Parameters
         ----------
         rows
-            Row numbers of base acceleration and response. A third row, the drive voltage, gives an estimate
-            without bias by noise.
+            Row numbers of base acceleration and response, and optionally of the drive voltage, which gives an
+            estimate without bias by noise.
         quantity
             Quantity of the response channel.
         low_hz, high_hz
@@ -185,7 +185,7 @@ class LiveSpectra:
         )
 
     def _used(self) -> Flags:
-        """Return which entries of the memory contain a valid segment."""
+        """Return flags of the stored segments that are valid."""
         known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)
 
@@ -195,7 +195,7 @@ _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
 """Half-power width of a line under a Hann window, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
-"""Ratio of the visible range to the segment length, within the limits above."""
+"""Ratio of the visible range to the default segment length, within the limits above."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0

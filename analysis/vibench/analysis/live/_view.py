@@ -28,7 +28,7 @@ from ._spectra import LiveSpectra, LiveSpectrum
 # impacts. Only contacts that change m0's motion by less than the noise are missed.
 
 _SPAN_S = 78e-6
-"""Interval of the difference; a longer interval passes more of the motion, a shorter one more noise [s]."""
+"""Step of the sixth difference; a longer step passes more of the motion, a shorter step more noise [s]."""
 _DAMPING_TIME_S = 2e-5
 """Damping time of the springs at m0: ratio of the acceleration step to the change of its slope."""
 _CONTACT_S = 30e-6
@@ -36,7 +36,7 @@ _CONTACT_S = 30e-6
 _APART_S = 100e-6
 """Kinks that are closer than this are counted as one [s]."""
 _LEAST_FRESH_S = 20e-3
-"""Shortest stretch for an estimate of the noise [s]."""
+"""Shortest piece of signal for an estimate of the noise [s]."""
 _MOST_FRESH_S = 0.1
 """Longest piece that is processed at once [s]."""
 _NOISE_FACTOR = 5.2
@@ -49,7 +49,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""First quartile of |noise| in standard deviations; larger values may be affected by impacts."""
+"""Quantile of |noise| used as its measure, and its value for normal noise; impacts affect larger values."""
 
 
 class ImpactCounter:
@@ -165,7 +165,7 @@ class SweepHistory:
 
 
 class SweepTrace:
-    """Growing list of points in memory that is allocated once."""
+    """Growing list of sweep points, in memory that is allocated once."""
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
