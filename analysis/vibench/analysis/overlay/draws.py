@@ -1,4 +1,4 @@
-"""Simulated draws of a recording: random runs of rig and specimen under its recorded voltage."""
+"""Draws: simulated runs of rig and specimen, driven by a recorded voltage, with random start and noise."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -51,7 +51,7 @@ class ChannelNoise:
 
     rms: dict[str, float]
     converter_v: float
-    """Smallest noise of all inputs, taken as the noise of the converter itself [V]."""
+    """Smallest noise of all inputs [V], taken as the noise of the converter."""
 
 
 def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
@@ -120,8 +120,8 @@ def unseen_noise(
 ) -> tuple[UnseenNoise, ChannelNoise] | None:
     """Return the noise of an amplifier whose output is not recorded; None without enough silence.
 
-    In silence, the motion under the recorded voltage is subtracted from the recorded base motion. The rest is
-    noise of amplifier, converter and sensor. The median over lines ignores hum. The second result is the
+    In silence, the motion due to the recorded voltage is subtracted from the recorded base motion. The rest
+    is noise of amplifier, converter and sensor. The median over lines ignores hum. The second result is the
     channel noise without the amplifier's contribution.
     """
     if rig.driven is Driven.AMPLIFIER:
@@ -179,11 +179,11 @@ _SURELY = 20.0
 
 
 class PlayedVoltage:
-    """A recorded voltage, freed from converter noise as far as possible.
+    """A recorded voltage, from which converter noise is removed as far as possible.
 
     Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each line of
-    each frame, a Wiener filter estimates the played part; the uncertain rest is drawn at random. Draws
-    scatter by the uncertainty of the voltage, and their power excludes the converter noise.
+    each frame, a Wiener filter estimates the part that drove the shaker; the uncertain rest is random in each
+    draw. Draws scatter by the voltage's uncertainty, without the power of converter noise.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
@@ -198,7 +198,7 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Return the filtered voltage, and per batch the square root of each line's kept share."""
+        """Return the filtered voltage, and for each batch the square root of the share kept of each line."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
         # Synthesis window, with which half-overlapping frames add up to the signal.
@@ -260,19 +260,19 @@ class PlayedVoltage:
 
 
 DRAWS, MOST_DRAWS = 16, 1000
-"""Usual and largest number of draws of a colliding motion; 16 determine the 95 % band to a fifth."""
+"""Usual and largest number of draws of a colliding motion; 16 draws determine the 95 % band to a fifth."""
 FIRST_DRAWS = 8
-"""Number of draws made first; enough if the agreement is clear or nothing collides."""
+"""Number of draws computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
-"""Number of draws added before the next check of whether they are enough."""
+"""Number of draws computed between checks of whether there are enough."""
 START_M = 5e-9
 """Standard deviation of each mass's initial position."""
 CLOCK_TOLERANCE = 50e-6
 """Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
-"""Lead-in before a stretch, fade-in at its start, and faded tail after the stretch [s]."""
+"""Lead-in before the simulated part, fade-in at its start, and faded tail after the part [s]."""
 _NOISE = 0.15
-"""Uncertainty (± natural logarithm) of a channel's noise taken from its quietest stretch."""
+"""Uncertainty (± natural logarithm) of a channel's noise, estimated in its quietest part."""
 _MORE = 3
 _SEED = 17
 _BLOCK = 1 << 17
@@ -295,14 +295,14 @@ class SimulatedRun:
     specimen: Specimen
     driven: Driven
     accuracy: Accuracy
-    """Accuracy of simulated contacts under a recorded base motion; always standard under a voltage."""
+    """Accuracy of simulated contacts if the base motion drives the specimen; standard for a voltage."""
     base_band_hz: tuple[float, float] | None
-    """Band of the driving base displacement; None under a voltage."""
+    """Band of the base displacement that drives the specimen; None if a voltage drives it."""
     why: str = ""
     """Reason why the recorded voltage was not used, or remarks on the rig."""
     draws: int = 0
     impacts: float = 0.0
-    """Number of contacts during the analysed parts, mean over the draws."""
+    """Number of contacts during the analysed parts of the recording, mean over the draws."""
     played_s: float = 0.0
 
     @property
@@ -324,7 +324,7 @@ class Draw(Generic[R]):
     """One simulated run with random start and noise, analysed like the recording."""
 
     response: Callable[[], R]
-    """Function that completes the estimate; comparisons need only the quantities."""
+    """Function that computes the complete response; comparisons need only ``quantities``."""
     quantities: tuple[Quantity, ...]
     endings: tuple[Ending, ...]
     impacts: float
@@ -343,10 +343,10 @@ class Drawn(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class DrawSource:
-    """Source of draws; the same number always gives the same draw."""
+    """Source of draws; the draw with a given number is always the same."""
 
     run: SimulatedRun
-    """Facts of the simulation before the first draw."""
+    """Facts on the simulation that are known before the first draw."""
     most: int
     samples: int
     channels: Callable[[int], SimulatedChannels]
@@ -358,7 +358,7 @@ def voltage_source(
     fitted: FittedShaker | None = None,
     draws: int = DRAWS,
 ) -> DrawSource:
-    """Return a source of draws of rig and specimen under the recorded voltage.
+    """Return a source of draws of rig and specimen, driven by the recorded voltage.
 
     Raises UnusableData when samples were lost or the shaker is unknown.
 
@@ -387,7 +387,7 @@ def voltage_source(
 def base_source(
     recording: Recording, measurement: Measurement, specimen: Specimen, accuracy: Accuracy, why: str = ""
 ) -> DrawSource:
-    """Return a source of one draw under the recorded base motion, for linear and coherent motion."""
+    """Return a source of one draw driven by the recorded base motion, for linear and coherent motion."""
     channels = under_base_motion(recording, measurement, specimen, accuracy)
     rate = recording.sample_rate_hz
     band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
@@ -400,8 +400,8 @@ def drawn(
 ) -> Drawn[R]:
     """Return all draws of a source, each analysed like the recording.
 
-    Fewer draws are made if the first ones agree clearly. Up to three times as many are made if few show the
-    ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
+    Fewer draws are made if the first draws agree clearly. Up to three times as many are made if few draws
+    show the ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
     """
     responses: list[R] = []
 
@@ -409,7 +409,7 @@ def drawn(
 
     def estimated(number: int) -> Draw[None]:
         channels = source.channels(number)
-        # One at a time: an estimate is at most half of the work but takes twice the memory of a simulation.
+        # One estimate at a time: it is at most half of the work, but takes twice the simulation's memory.
         with estimating:
             draw = estimate(channels)
             if number == 0:
@@ -466,7 +466,7 @@ def _drawn_channels(
 def _moved(
     rig: DrivenRig, volts: Samples, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
 ) -> SampledMotion:
-    """Simulate rig and specimen from a random start, with noise on the channels of base and m0."""
+    """Simulate rig and specimen from a random initial state, with noise on the channels of base and m0."""
     try:
         motion = follow_voltage(
             rig.table,
@@ -475,7 +475,7 @@ def _moved(
             start=np.concatenate([START_M * rng.standard_normal(3), np.zeros(3)]),
         )
     except MotionFailed as error:
-        raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
+        raise UnusableData(f"the simulation from the {rig.driven.value} ended: {error}") from error
     for role, seen in ((BASE, motion.base_acceleration), (rig.response, motion.m0_velocity)):
         _with_noise(seen, role, noise.rms[role], recording.sample_rate_hz, rng)
     return motion
@@ -492,9 +492,9 @@ def _with_noise(samples: Samples, role: str, rms: float, rate_hz: float, rng: np
 
 @dataclass(frozen=True, eq=False)
 class StretchDraws:
-    """Simulated draws of part of a recording with given specimens, for statistics of irregular motion.
+    """Source of draws of part of a recording for any specimen, for statistics of irregular motion.
 
-    A run starts from rest half a second before the stretch, with the recorded voltage faded in.
+    A run starts from rest half a second before this part, with the recorded voltage faded in.
     """
 
     recording: Recording
@@ -506,7 +506,7 @@ class StretchDraws:
     first: int
     """Index in the recording of the first sample of ``volts``."""
     kept: slice
-    """Slice of ``volts`` that contains the stretch."""
+    """Slice of ``volts`` that contains this part."""
 
     @property
     def measured(self) -> Reals:
@@ -559,7 +559,7 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, VELOCITY))
-    # The channel's own noise would drive the simulation, so only lines far above it are played.
+    # The channel's noise would drive the simulation, so only spectral lines far above it are used.
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0
     played = np.asarray(np.fft.irfft(spectrum, volts.size))

@@ -23,7 +23,7 @@ AMPLIFIER = "amplifier_voltage"
 
 
 class Driven(StrEnum):
-    """What drives the simulated specimen."""
+    """Recorded signal that drives the simulated specimen."""
 
     AMPLIFIER = "recorded amplifier voltage"
     GENERATOR = "recorded generator voltage"
@@ -31,13 +31,13 @@ class Driven(StrEnum):
 
     @property
     def by_voltage(self) -> bool:
-        """Whether the table is simulated too, loaded by the specimen."""
+        """Whether a voltage drives the simulation, which then includes the shaker's table."""
         return self is not Driven.BASE
 
 
 @dataclass(frozen=True)
 class DrivenRig:
-    """Rig and specimen under a recorded voltage."""
+    """Rig and specimen that a recorded voltage drives."""
 
     table: DrivenTable
     driven: Driven
@@ -48,7 +48,7 @@ class DrivenRig:
 
 
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
-    """Return the rig under the recorded voltage.
+    """Return the rig that the recorded voltage drives.
 
     Raises UnusableData when the recording does not describe its shaker or amplifier, or does not measure m0.
 

@@ -1,7 +1,7 @@
 """Compare a measurement with simulated draws: bands, ranks and z, corrected for multiple comparisons.
 
-In chaos, a measurement and its simulation are two draws from one distribution. The test is whether the
-measurement could be another draw.
+In chaos, a measurement and its simulation (a draw) are two samples from one distribution. The test is whether
+the measurement could be another draw.
 """
 
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ from ..signals.arrays import Flags, Integers, Reals
 from ..tables import Labelled
 
 AGREEMENT = 0.99
-"""Probability that all values of a correct simulation are within the limit, for any number of values."""
+"""Probability that a correct simulation has all values within the limit, however many they are."""
 BAND = 0.95
 MIXED = -1
 """State of a value that mixes two kinds of motion; it is not compared."""
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the normal limit; if all values are within it after half of the draws, more change nothing."""
+"""Share of the normal limit; if all values are within it after half of the draws, no more are needed."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -38,12 +38,12 @@ class Quantity:
     value: Reals
     """Values; NaN where missing."""
     state: Integers | None = None
-    """Kind of motion (colliding or not), if there are several; only equal kinds are compared."""
+    """Kind of motion at each point (colliding or not), if it varies; only equal kinds are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleCurve(Labelled):
-    """One quantity as measured and in every draw.
+    """One quantity, measured and in every draw.
 
     Square roots are compared because they are nearly normal, both for accurate and for random magnitudes
     (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
@@ -67,27 +67,27 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def count(self) -> Integers:
-        """Number of draws at each point, shape (points,)."""
+        """Number of draws with a value at each point, shape (points,)."""
         return np.asarray(np.sum(np.isfinite(self._roots), axis=0), dtype=np.int64)
 
     @cached_property
     def median(self) -> Reals:
-        """Median of the draws, shape (points,); NaN below two draws."""
+        """Median of the draws, shape (points,); NaN for fewer than two draws."""
         return _over_draws(self.draws, np.nanmedian)
 
     @cached_property
     def lower(self) -> Reals:
-        """Lower end of the band that contains 95 % of further draws; NaN below five draws."""
+        """Lower end of the band that contains 95 % of further draws; NaN for fewer than five draws."""
         return np.asarray(np.maximum(self._mean - self._reach, 0.0) ** 2)
 
     @cached_property
     def upper(self) -> Reals:
-        """Upper end of the band that contains 95 % of further draws; NaN below five draws."""
+        """Upper end of the band that contains 95 % of further draws; NaN for fewer than five draws."""
         return np.asarray((self._mean + self._reach) ** 2)
 
     @cached_property
     def relative_sd(self) -> Reals:
-        """Relative scatter of the draws, shape (points,); NaN below two draws."""
+        """Relative scatter of the draws, shape (points,); NaN for fewer than two draws."""
         return 2 * self._sd / self._mean
 
     @cached_property
@@ -163,7 +163,7 @@ class EnsembleCurve(Labelled):
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
             agrees = "agrees with" if self.agrees else "differs from"
-            # If the band alone does not show the verdict, state the limit.
+            # State the limit if the value agrees although it is outside the 95 % band.
             limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
             return (
                 f"{self.name} {self.measured[0]:.4g} {agrees} the twin's {self.median[0]:.4g} (95 % of draws "
@@ -217,7 +217,7 @@ class EnsembleCurve(Labelled):
 
 
 def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
-    """Return Student's t of one more draw as a normal deviate; its probability is at least 1e-300."""
+    """Return Student's t of one more draw as a normal deviate, limited to a probability of 1e-300."""
     with np.errstate(invalid="ignore", divide="ignore"):
         deviate = (roots - mean) / (sd * np.sqrt(1 + 1 / np.maximum(count, 1)))
         tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(count - 1, 1))
@@ -225,7 +225,7 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
 
 
 def largest_of_chance(largest: Reals) -> float:
-    """Return the limit that the largest |z| of another draw does not exceed in 99 % of cases.
+    """Return the limit that, in 99 % of cases, the largest |z| of another draw does not exceed.
 
     ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
     distribution with their mean and deviation. It is widened, because few draws determine these poorly:
@@ -237,7 +237,7 @@ def largest_of_chance(largest: Reals) -> float:
 
 
 def z_limit(values: int) -> float:
-    """Return the |z| that none of ``values`` independent normal deviates exceeds in 99 % of cases."""
+    """Return the |z| that, in 99 % of cases, none of ``values`` independent normal deviates exceeds."""
     return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
 
 
@@ -323,19 +323,19 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If all runs stop within this time, the cause is common, such as the end of the record [s]."""
+"""If all runs end within this interval, the cause is common, such as the end of the record [s]."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """One run of a motion: its earliest possible end, and its actual end or the end of the record."""
+    """End of a motion in one run: the earliest possible end, and the actual end or the end of the record."""
 
     what: str
     """Kind of motion: ``"collisions"`` or ``"irregular motion"``."""
     start_s: float
     stop_s: float
     ended: bool
-    """False where the motion outlasted the record."""
+    """Whether the motion ended; False if it lasted to the end of the record."""
 
 
 @dataclass(frozen=True)
@@ -355,7 +355,7 @@ class EscapeRate:
     exposure_s: float
     """Total time of all runs in which an end was counted [s]."""
     events: int
-    """Number of counted ends, without the end at ``from_s``."""
+    """Number of counted ends, excluding the end at ``from_s``."""
     from_s: float
     """Time of the first end in any run, from which ends are counted [s]."""
 
@@ -383,7 +383,7 @@ class EscapeRate:
 
 
 def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -> EscapeRate | None:
-    """Return the rate from the measured run and its draws; None if no run ended or all stop together."""
+    """Return the rate from the measured run and its draws; None if no run ended or all ended together."""
     if not measured:
         return None
     mine = measured[0]
@@ -391,7 +391,7 @@ def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -
     stops = np.array([each.stop_s for each in runs if each.ended])
     if len(runs) == 1 or not stops.size or np.ptp([each.stop_s for each in runs]) < _ONE_EDGE_S:
         return None
-    # Count from the first end of a run: before it, perhaps no run could end yet.
+    # Count from the first end in any run, because before this time perhaps no run could end.
     from_s = float(stops.min())
     exposure_s = sum(max(each.stop_s - from_s, 0.0) for each in runs)
     if exposure_s <= 0.0:

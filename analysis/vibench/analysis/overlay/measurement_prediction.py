@@ -19,19 +19,19 @@ SIMULATED_S = 6.0
 """Duration from rest at each frequency; the transient decays to 0.1 % in half of it."""
 FOLLOWED_POINTS = 200
 FOLLOWED_S = 2.0
-"""Number of frequency steps that follow a sweep (small steps disturb little), and time per step [s]."""
+"""Number of frequency steps that imitate a sweep (small steps disturb little), and time per step [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPrediction(Labelled):
-    """Responses under sines with the base amplitude of the plan or of the rig's model."""
+    """Responses to sines with the base amplitude of the plan or of the rig's model."""
 
     measurement: Measurement
     prediction: ResponsePrediction
     basis: str
     """Source of the base amplitude."""
     approach: Approach
-    """Start of each simulated point: at rest, or in the final state of the previous point."""
+    """Initial state of each simulated point: rest, or the final state of the previous point."""
     specimen_name: str
     """Name of the specimen in the rig's configuration."""
 

@@ -59,7 +59,7 @@ class AbstractOverlay(Labelled, Generic[R]):
     response: R
     """Response of the first draw, one of several equivalent runs."""
     ensemble: tuple[EnsembleCurve, ...]
-    """Every compared quantity, measured and in all draws, with bands if there are enough draws."""
+    """Every compared quantity, measured and in all draws; with bands if there are five or more draws."""
     escape: EscapeRate | None
     """Rate at which the motion ends, if its end is random."""
     difference: CurveDifference
@@ -69,7 +69,7 @@ class AbstractOverlay(Labelled, Generic[R]):
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
-        """Quantities that have draws but are not compared."""
+        """Quantities that are simulated in all draws but not compared."""
         return ()
 
     @property
@@ -82,7 +82,7 @@ class AbstractOverlay(Labelled, Generic[R]):
         return (*(headline if outside else []), *(each.sentence for each in ordered))
 
     def quantity(self, name: str) -> EnsembleCurve | None:
-        """Return one quantity with draws; None without draws."""
+        """Return the quantity with this name, measured and in all draws; None if it has no draws."""
         return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
 
 
@@ -118,13 +118,13 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
-    """Levels of the terminal bands; like the displacement, of the first draw."""
+    """Levels of the terminal bands in the first draw, as for `displacement`."""
     spectrum: EnsembleCurve
     """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
-        """Only the spectrum."""
+        """The spectrum, which is not compared."""
         return (self.spectrum,)
 
 
@@ -144,7 +144,7 @@ TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", 
 def _difference(
     drawn: Drawn[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
 ) -> CurveDifference:
-    """Compare with the median of the draws, or with a single draw and its standard deviation."""
+    """Compare the measurement with the median of the draws, or with a single draw and its deviation."""
     (found,) = ensemble_curves([measured], drawn.quantities)
     if drawn.run.draws > 1:
         simulated = found.median, found.relative_sd
@@ -260,7 +260,7 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOv
 
 
 _LEAST_BAND = 1e-3
-"""Band level relative to the drive's line; lower levels are noise of generator and amplifier."""
+"""Minimum level of a compared band relative to the drive's line; lower levels are generator noise."""
 
 
 def dwell_quantities(
@@ -336,10 +336,10 @@ def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]
 
 
 class Simulation(StrEnum):
-    """How a measurement is simulated: excitation of the model, or no simulation."""
+    """Input of the simulation of a measurement, or no simulation."""
 
     UNDER_VOLTAGE = "rig and specimen under the recorded voltage"
-    """Rig and specimen under the recorded voltage, or base motion for an unknown shaker."""
+    """Rig and specimen driven by the recorded voltage; for an unknown shaker, the same as UNDER_BASE."""
     UNDER_BASE = "the specimen under the recorded base motion"
-    """The specimen alone under the recorded base motion: for linear and coherent motion."""
+    """The specimen alone, driven by the recorded base motion: for linear and coherent motion."""
     LEFT_OUT = "nothing"

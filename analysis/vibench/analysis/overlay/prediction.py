@@ -1,4 +1,4 @@
-"""Predicted Responses I and II and linear transmission under sines, over frequency."""
+"""Predicted Responses I and II to sines, and linear transmission, over frequency."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +24,7 @@ from ..tables import Labelled
 PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 """Base amplitude A0 that the paper simulates for each of its voltages V0 (Gong et al. 2025, Fig. 13)."""
 PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
-"""Resonances without contact; from the same place in the paper."""
+"""Resonances without contact; from the same section of the paper."""
 PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
 """Resonances with m1 bound to m2; from the same section of the paper."""
 PREDICTION_S = 8.0
@@ -34,7 +34,7 @@ WINDOW_S = 5.0
 
 @dataclass(frozen=True, eq=False)
 class ResponsePrediction(Labelled):
-    """Responses of m0 under sines; arrays of shape (points,)."""
+    """Responses of m0 to sines; arrays of shape (points,)."""
 
     specimen: Specimen
     frequency_hz: Reals
@@ -53,7 +53,7 @@ class ResponsePrediction(Labelled):
 
     @property
     def is_colliding(self) -> Flags:
-        """Points with collisions within the window."""
+        """Flags of points with collisions within the window."""
         return np.asarray(self.impacts > 0)
 
 
@@ -71,7 +71,7 @@ def predict(
     Parameters
     ----------
     frequency_hz
-        Shape (points,), rising.
+        Frequencies of the sines [Hz], ascending, shape (points,).
     amplitude_m
         Base amplitude A0, one value for all points or one per point [m].
     accuracy
@@ -80,7 +80,7 @@ def predict(
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
-    # In a sequence, half of the time is for settling after the step in frequency.
+    # If points follow one another, half of the time is for settling after the step in frequency.
     window_s = min(WINDOW_S, duration_s if approach is Approach.REST else duration_s / 2)
 
     def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:

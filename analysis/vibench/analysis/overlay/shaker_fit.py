@@ -1,4 +1,4 @@
-"""Fit the shaker to weak noise, from the recorded voltage to the motion of the loaded table."""
+"""Fit the shaker's parameters to weak noise, from the recorded voltage to the loaded table's motion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -20,10 +20,10 @@ from ..tables import plus_minus
 from .driven_rig import AMPLIFIER, acceleration_per_volt, carried_mass
 
 LARGEST_CHI2 = 3.0
-"""Largest reduced chi square; more means collisions or other moving parts."""
+"""Largest reduced chi square of a valid fit; a larger one means collisions or other moving parts."""
 FEWEST_LINES = 30
 _TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
-"""Start of the search: a small electrodynamic shaker."""
+"""Starting point of the search: parameters of a small electrodynamic shaker."""
 _REACH = np.log(300.0)
 """Largest natural logarithm of the ratio of a parameter to its typical value."""
 _STARTS = 12
@@ -108,7 +108,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starts, because data determine products of parameters better than each one."""
+    """Search from several starting points: data determine products of parameters better than each factor."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)
@@ -150,7 +150,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return s times base acceleration / voltage; estimators read these as velocity and acceleration."""
+    """Return base acceleration over voltage, times s, since estimators take these for velocity and base."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     match analysis.excitation:

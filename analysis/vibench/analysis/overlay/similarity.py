@@ -10,7 +10,7 @@ from ..signals.arrays import Flags, Reals
 from ..tables import Labelled
 
 SIMILARITY_THRESHOLD = 0.1
-"""Largest difference of similar points (Gong et al. 2025, section 4)."""
+"""Largest `Similarity.difference` of similar points (Gong et al. 2025, section 4)."""
 DRAWS = 2000
 """Number of bootstrap resamples; an interval's limits scatter by about a fortieth of its width."""
 CONFIDENCE = 0.95
@@ -98,7 +98,7 @@ class Similarity(Labelled):
 
     @property
     def is_similar(self) -> Flags:
-        """Points whose difference is at most the threshold."""
+        """Flags of points whose difference is at most the threshold."""
         return np.asarray(self.difference <= self.threshold)
 
 

@@ -1,4 +1,4 @@
-"""Simulate the specimen under the recorded base motion; the result has the interface of a recording.
+"""Simulate a specimen driven by the recorded base motion; the result has the interface of a recording.
 
 The base displacement is computed from the recorded acceleration.
 """
@@ -18,7 +18,7 @@ from ..signals.arrays import Complexes, Flags, Integers, Reals, Samples
 from ..signals.quantity import Quantity, converted_signal
 
 LOWEST_PART = 0.25
-"""High-pass frequency relative to the lowest played frequency; prevents drift by double integration."""
+"""High-pass frequency relative to the lowest drive frequency; prevents drift by double integration."""
 HIGHEST_PART = 0.33
 """Low-pass frequency relative to the sample rate, within the converter's pass band."""
 
@@ -65,7 +65,7 @@ def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reco
 
 
 def lowest_frequency_hz(measurement: Measurement) -> float:
-    """Return the lowest played frequency of a plan without its bench check [Hz]."""
+    """Return the lowest drive frequency of a plan, excluding its bench check [Hz]."""
     plan = measurement.excitation.model_dump()
     named = [plan[key] for key in ("band_start_hz", "start_hz", "stop_hz", "frequency_hz") if key in plan]
     grid = plan.get("grid") or {}
@@ -83,7 +83,7 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 
 
 _PIECE_S = 5.0
-"""Length simulated at once, to bound memory [s]."""
+"""Duration simulated at once, to limit memory [s]."""
 _OVERLAP = 48
 """Extra samples on each side of a piece; the end effect of a spline falls to 0.27 with every sample."""
 _VX = 3
@@ -98,7 +98,7 @@ class SimulatedChannels:
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
-    """Times since the first sample [s], and number of contacts until each time."""
+    """Times since the first sample [s], and number of contacts up to each time."""
     response_delay_s: float
     """Lag of the response channel behind the base channel."""
     base_acceleration: Samples
@@ -134,15 +134,15 @@ class SimulatedChannels:
         )
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Return where the recording was overloaded; measurement and simulation use the same samples."""
+        """Return flags of overloaded samples in the recording; the simulation is analysed without them."""
         return self.recorded.overloaded(start, stop)
 
     def bridged(self, start: int, stop: int) -> Flags:
-        """Return where the recording was bridged; measurement and simulation use the same samples."""
+        """Return flags of samples that were bridged (drop-outs) in the recording."""
         return self.recorded.bridged(start, stop)
 
     def played_impacts(self, label: str) -> tuple[float, float]:
-        """Return the number of impacts inside the stretches of one label, and their duration [s]."""
+        """Return the number of impacts in all segments with this label, and the segments' duration [s]."""
         rate = self.sample_rate_hz
         ends = np.array([(each.start / rate, each.stop / rate) for each in self.stretches(label)])
         if not ends.size:
@@ -157,7 +157,7 @@ def under_base_motion(
     specimen: Specimen,
     accuracy: Accuracy = Accuracy.STANDARD,
 ) -> SimulatedChannels:
-    """Simulate a specimen from rest under the base motion of a recording, at its full sample rate.
+    """Simulate a specimen from rest, driven by the base motion of a recording, at its full sample rate.
 
     Raises UnusableData when samples were lost, or the simulation did not finish.
     """
@@ -192,7 +192,7 @@ def shaken(
         path = follow_samples(specimen, part, accuracy, state, first=before, last=before + last - first)
         if not path.reached_end:
             raise UnusableData(
-                f"the simulation under the recorded base motion failed after "
+                f"the simulation from the recorded base motion failed after "
                 f"{(first + len(path.states)) / sample_rate_hz:.3g} s: the base moves too much"
             )
         velocity[first : last + 1] = path.states[:, _VX]
