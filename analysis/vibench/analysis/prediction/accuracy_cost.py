@@ -1,4 +1,4 @@
-"""Cost and error of each accuracy level, as measured in docs/accuracy.md."""
+"""Computing time and error of each accuracy level, as measured in docs/accuracy.md."""
 
 from dataclasses import dataclass
 
@@ -34,11 +34,11 @@ MEASURED = {
     Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
 }
 CHAOS_SCATTER = 0.03
-"""Relative scatter of Response I in chaos between different starts, equal for all levels."""
+"""Relative scatter of Response I in chaos between different initial states, equal for all levels."""
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
-    """Return sentences on cost, error and duration of a request on ``cores`` idle cores."""
+    """Return sentences on error and computing time of a request on ``cores`` idle cores."""
     if request.has_target:
         wish = "" if request.error is None else f" to an error of {100.0 * request.error:g} %"
         limit = "a minute" if request.time_s is None else f"{request.time_s:g} s"
@@ -51,7 +51,7 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
     on_top = "; about twice as long with the exponent" if request.exponent is Exponent.COMPUTED else ""
     if request.budget_s > 0.0:
-        on_top += f"; a point sensitive to its start takes up to {request.budget_s:g} core seconds more"
+        on_top += f"; up to {request.budget_s:g} core seconds more if a motion depends on its initial state"
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
     shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
     return (

@@ -1,4 +1,4 @@
-"""Requests for simulations and maps, the pieces of their results, and the results so far."""
+"""Requests for simulations and maps, the pieces in which results arrive, and the results so far."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -72,7 +72,7 @@ class MapRequest(SpecimenChoice):
     rows: Annotated[int, Field(ge=3, le=1000)] = 81
     """Number of amplitudes."""
     random_starts: Annotated[int, Field(ge=0, le=100)] = 0
-    """Number of random starts at every point, in addition to rest, to find coexisting motions."""
+    """Number of random initial states at every point, in addition to rest, to find coexisting motions."""
     periods: Annotated[int, Field(ge=300, le=30_000)] = 3000
     """Maximum length of a run in drive periods, for a motion that does not repeat."""
 
@@ -105,7 +105,7 @@ class MapRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class MapPicture:
-    """A map as far as it is computed; unknown cells show the nearest known cell."""
+    """A map as far as it is computed; cells that are not computed show the nearest computed cell."""
 
     frequency_hz: tuple[float, float]
     """Outer edges of the picture."""
@@ -227,7 +227,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
         amplitude_m=request.amplitude_m,
         text=(
             f"{request.frequency_hz:.5g} Hz, {1e6 * request.amplitude_m:.4g} µm, from rest: {kind}, Response "
-            f"I {found.response_i or 0.0:.3g}, {found.impact_rate_hz:.4g} impacts a second"
+            f"I {found.response_i or 0.0:.3g}, {found.impact_rate_hz:.4g} impacts per second"
         ),
         time_s=np.asarray(run.time_s)[: len(states)],
         displacement_m=states[:, 0],
@@ -252,7 +252,7 @@ class SimulatedPoint:
     error_estimate: float | None
     memory: StartMemory = StartMemory.UNKNOWN
     ensemble: Ensemble | None = None
-    """Motions from other starts; computed if the motion depends sensitively on its start."""
+    """Motions from other initial states; computed if the motion depends sensitively on its initial state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,7 +272,7 @@ class SimulatedSignal:
 
 @dataclass(frozen=True)
 class Trouble:
-    """Error message for a scene that could not be computed."""
+    """Error message for a point that could not be computed."""
 
     sentence: str
 
@@ -288,7 +288,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Maximum number of points of both models together; more points take hours and are not visible."""
+"""Maximum number of points of both models together; more points take hours and cannot be seen."""
 
 
 class Exponent(StrEnum):
@@ -302,7 +302,7 @@ class SimulationRequest(SpecimenChoice):
     """Request for simulations at every frequency of a range."""
 
     compared_with: ContactWord = "linear"
-    """Second model, for its similarity with the first; empty for none."""
+    """Contact law of a second model, whose similarity with the first is shown; empty for none."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement."""
     start_hz: PositiveFloat = 50.0
@@ -318,19 +318,19 @@ class SimulationRequest(SpecimenChoice):
     window_s: PositiveFloat = 5.0
     """Observed time at the end of each run."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Maximum processor time per point for other starts if the motion depends on the start; 0 for none."""
+    """Maximum processor time per point for other initial states if the motion depends on them; 0: none."""
     error: TargetError | None = None
     """Requested relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
     """Time limit per point, with or without a requested error."""
     exponent: Exponent = Exponent.LEFT_OUT
-    """Whether to compute the largest Lyapunov exponent; this about doubles the work."""
+    """Whether to compute the largest Lyapunov exponent, which about doubles the computing time."""
     signal_hz: PositiveFloat | None = 260.0
     """Frequency whose time signal is shown; empty for none."""
 
     @model_validator(mode="after")
     def _is_a_study(self) -> Self:
-        """Refuse invalid studies with the error of the study, and requests that would take too long."""
+        """Refuse requests that are invalid as a study (with the study's error) or would take too long."""
         points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
         if points > MOST_POINTS:
             raise ValueError(
@@ -463,7 +463,7 @@ class SimulationProgress:
         return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
     def other_motions(self, model: str) -> tuple[Reals, Reals]:
-        """Return frequency and Response I of each additional motion found from other starts."""
+        """Return frequency and Response I of each additional motion found from other initial states."""
         found = [
             (point.frequency_hz, motion.response_i)
             for point in self._found.get(model, {}).values()
@@ -487,7 +487,7 @@ class SimulationProgress:
 
     @property
     def forgotten(self) -> int:
-        """Number of points whose motion depends sensitively on the start."""
+        """Number of points whose motion depends sensitively on the initial state."""
         points = (point for found in self._found.values() for point in found.values())
         return sum(point.memory is StartMemory.LOST for point in points)
 

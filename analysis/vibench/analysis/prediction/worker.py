@@ -71,7 +71,7 @@ def simulate(
 ) -> None:
     """Compute a request, the time signals first; return early when cancelled.
 
-    ``cancelled`` is called several times a second; scenes that are running (below one second) are finished.
+    ``cancelled`` is called several times a second; points that are being computed (below 1 s) are finished.
     """
     for model in request.models if request.signal_hz is not None else ():
         if cancelled():
