@@ -269,7 +269,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
 def test_a_force_response_of_a_sine_is_refused(tmp_path):
     path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
-    with pytest.raises(UnusableData, match="base_force has results only under noise"):
+    with pytest.raises(UnusableData, match="base_force has results only for noise"):
         analyse(path, response="base_force")
     with pytest.raises(UnusableData, match=r"drive_voltage does not measure .* a mass or a force"):
         analyse(path, response="drive_voltage")

@@ -184,8 +184,8 @@ def test_more_parts_than_planned_are_explained_by_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]
-    assert said[0] == "1 of 1 planned parts were recorded whole"
-    assert said[1] == "78 parts were recorded whole; feedback determined their number"
+    assert said[0] == "1 of 1 planned parts were recorded completely"
+    assert said[1] == "78 parts were recorded completely; feedback determined their number"
 
 
 def test_levels_of_all_channels_are_shown_with_units(dwell_file):

@@ -33,7 +33,7 @@ def result_with(*ensemble, by_voltage=True, why=""):
             result_with(GOOD, by_voltage=False),
             None,
             Agreement.OPEN,
-            "simulated once, under the recorded base",
+            "simulated once, from the recorded base",
         ),
         (
             result_with(by_voltage=False, why="no gain"),

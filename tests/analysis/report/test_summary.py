@@ -84,7 +84,7 @@ def test_undecided_motion_is_named_and_long_lists_are_shortened():
     many = tuple(dwell(1.0, MotionKind.PERIODIC, 200.0 + each) for each in range(50))
     words = said(dwells=many)
     assert len(words.split()) <= MOST_WORDS
-    assert words.endswith("The table has the rest.")
+    assert words.endswith("The table shows all results.")
 
 
 @pytest.mark.parametrize(
@@ -110,4 +110,4 @@ def test_a_recording_without_a_result_comes_first_and_many_findings_stay_short()
     many = tuple(noise(0.05, 94.6, 266.2, 499.6) for _ in range(40))
     words = summary(campaign(many, failures=(failed,)), [YES] * 40)
     assert len(words.split()) <= MOST_WORDS
-    assert words.endswith("The table has the rest. The simulation agrees with all 40 recordings.")
+    assert words.endswith("The table shows all results. The simulation agrees with all 40 recordings.")

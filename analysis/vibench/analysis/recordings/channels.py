@@ -223,7 +223,7 @@ class RecordedChannels:
 
 
 def far_from(marks: Flags, reach: int) -> Flags:
-    """Return which samples are more than ``reach`` samples away from any marked sample, shape (samples,)."""
+    """Return flags of samples more than ``reach`` samples away from every mark, shape (samples,)."""
     if not marks.any():
         return np.ones(marks.size, dtype=np.bool_)
     total = np.concatenate(([0], np.cumsum(marks)))

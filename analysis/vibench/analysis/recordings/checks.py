@@ -23,7 +23,7 @@ class Verdict(StrEnum):
 
     PASSED = "passed"
     NOTE = "note"
-    """Nothing is wrong, but the text is important for the reader."""
+    """Nothing is wrong, but the text should be known before the result is used."""
     WARNING = "warning"
     """The result may be wrong, or contains less than was planned."""
 
@@ -38,14 +38,14 @@ class Check:
 
 
 _LEAST_SHARE_OF_RANGE = 1e-3
-"""Smallest used share of a channel's range; below it, the converter resolves the signal poorly."""
+"""Smallest share of its input range that a channel should use, so that the converter resolves the signal."""
 _OFTEN_DARK = 0.01
 """Share of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
-"""Largest overshoot of the drive over its setting that noise and the converter's filter explain."""
+"""Largest relative overshoot of the drive over its setting that noise and the converter's filter explain."""
 _SHORTFALL = 0.15
-"""Largest shortfall of the drive peak below its setting; also the limit of a bench check."""
+"""Largest relative shortfall of the drive peak below its setting; also the limit of a bench check."""
 
 
 P = TypeVar("P")
@@ -101,12 +101,12 @@ def _seal(facts: RecordingFacts) -> Check:
 
 
 def _stretches(facts: RecordingFacts) -> Check:
-    text = f"{facts.whole_stretches} of {facts.planned_stretches} planned parts were recorded whole"
+    text = f"{facts.whole_stretches} of {facts.planned_stretches} planned parts were recorded completely"
     if facts.whole_stretches > facts.planned_stretches:
-        text = f"{facts.whole_stretches} parts were recorded whole; feedback determined their number"
+        text = f"{facts.whole_stretches} parts were recorded completely; feedback determined their number"
     whole = facts.whole_stretches >= facts.planned_stretches
     if not whole and facts.measurement.until is not None and facts.state is RecordingState.COMPLETE:
-        return Check("Parts", Verdict.PASSED, f"{text}; then the results were accurate enough")
+        return Check("Parts", Verdict.PASSED, f"{text}; then the requested accuracy was reached")
     return Check("Parts", Verdict.PASSED if whole else Verdict.WARNING, text)
 
 

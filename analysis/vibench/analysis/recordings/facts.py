@@ -105,7 +105,7 @@ class RecordingFacts(RecordingDescription):
     response: str = VELOCITY
     """Channel whose motion is analysed."""
     feedback: tuple[FeedbackNote, ...] = ()
-    """Notes of feedback control during the run; empty without feedback."""
+    """Events that feedback control noted during the run; empty without feedback."""
     feedback_s: tuple[float, ...] = ()
     """Time of each note since the start of the recording [s]."""
 
