@@ -1,4 +1,4 @@
-"""Tables and choices of figures; importing this module needs no drawing library."""
+"""Tables and choices for figures; importing this module needs no drawing library."""
 
 from ..figure_choices import SHOWN, ImageKind
 from ..tables import Table, table

@@ -58,7 +58,7 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
     yield from feedback_sentences(result.analysis.facts.feedback)
     if result.overlay is not None:
         yield (
-            f"Simulated under the {result.overlay.run.driven.value}: median difference "
+            f"Simulated from the {result.overlay.run.driven.value}: median difference "
             f"{result.overlay.difference.median_abs_db:.2g} dB, "
             f"{result.overlay.run.impact_rate_hz:.0f} impacts per second{agreement_text(result.overlay)}."
         )
@@ -128,19 +128,19 @@ def limits(results: CampaignResults) -> Iterator[str]:
         if lows_hz:
             yield (
                 f"The recorded base acceleration was integrated above {min(lows_hz):.3g} Hz (a quarter of "
-                "the lowest frequency played). Simulations under it lack slower motion of the base, and "
+                "the lowest drive frequency). Simulations from it lack slower motion of the base, and "
                 "simulated impacts do not move the recorded base."
             )
         if any(each.driven.by_voltage for each in runs):
             yield (
-                "Draws under the recorded voltage vary the start, the noise of the channels, the clock of "
+                "Draws from the recorded voltage differ in initial state, noise of the channels, clock of "
                 f"the converter ({1e6 * CLOCK_TOLERANCE:.0f} ppm) and the parameters of a fitted shaker, "
                 "within their uncertainty. Calibrations and the parameters of the specimen are taken as "
                 "exact. Of 100 agreeing quantities, one exceeds the limit of |z| by chance."
             )
         yield (
-            f"Curves under sines are simulated from rest for {PREDICTION_S:g} s and evaluated over the last "
-            f"{WINDOW_S:g} s. Where two states are stable, a sweep or noise may be in the other state."
+            f"Responses to sines are simulated from rest for {PREDICTION_S:g} s and evaluated over the last "
+            f"{WINDOW_S:g} s. Where two motions are stable, a sweep or noise may show the other motion."
         )
     if results.dwells or results.sweeps:
         yield (
@@ -160,10 +160,10 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 @dataclass(frozen=True)
 class Drawing(Generic[A, L]):
-    """How results of one kind are presented: each on its card, and several together."""
+    """Presentation of results of one kind: each result on a card, and several results in common figures."""
 
     figures: Callable[[Result[A, L]], Iterator[DrawnFigure]]
-    """Figures of a card; all except the first are folded."""
+    """Figures of a card; the first is visible, all others are folded."""
     findings: Callable[[Result[A, L]], Iterator[str]]
     """Sentences: the main result first, then its statistics."""
     numbers: Callable[[Result[A, L]], Iterator[tuple[str, str]]]

@@ -56,7 +56,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Card:
-    """One recording, or one group of claims: its card, and its row in the overview table."""
+    """Content of the card, and of the row in the overview table, of one recording or group of claims."""
 
     name: str
     result: str
@@ -84,7 +84,7 @@ class Page:
     """Summary of at most 120 words."""
     figure: DrawnFigure | None
     noun: str
-    """What the rows of the overview table are, such as recording or claims."""
+    """Noun for the rows of the overview table, such as recording or claims."""
     cards: tuple[Card, ...]
     further: Fold
     """Unfolded part: common figures of several recordings, and sentences on the model."""
@@ -99,7 +99,7 @@ class _Embedded:
     """A ``data:`` address that contains the whole image."""
     caption: str
     rest: str
-    """Sentences of the caption that are folded."""
+    """Further sentences of the caption, which are folded."""
 
 
 def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Path:

@@ -34,7 +34,7 @@ from ._result_tables import nearest_resonance, uncertainty_table
 
 MOST_WORDS = 120
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-_REST = "The table has the rest."
+_REST = "The table shows all results."
 
 
 def summary(results: CampaignResults, verdicts: Sequence[Agreement]) -> str:
@@ -229,7 +229,7 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
         sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
     text = f"At {level_m_per_s2:g} m/s² the control did not lock on a periodic motion;"
     if not sizes:
-        return f"{text} the branches contain none there."
+        return f"{text} the branches contain none at this level."
     multipliers = ", ".join(f"{each:.3g}" for each in sizes)
     return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
 
@@ -244,9 +244,9 @@ def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tupl
     ]
     name = result.analysis.facts.name
     if not ratios:
-        return f"The drive of {name} was outside of these frequencies."
+        return f"The drive of {name} was outside of the frequencies of the branches."
     low, high = np.min(ratios), np.max(ratios)
-    return f"The base amplitude of {name} is {low:.2g} to {high:.2g} times that of the branches."
+    return f"The base amplitude of {name} is {low:.2g} to {high:.2g} times the amplitude of the branches."
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:
@@ -476,7 +476,7 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
 
 
 def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Agreement, str]:
-    """Return whether the measurement could be one of the simulated draws, and the reason if not.
+    """Return whether the measurement could be one of the simulated draws, and a remark or reason.
 
     Parameters
     ----------
@@ -489,7 +489,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
     if not overlay.run.driven.by_voltage:
         return (
             Agreement.OPEN,
-            f"simulated once, under the recorded base{overlay.run.why and ': '}{overlay.run.why}",
+            f"simulated once, from the recorded base{overlay.run.why and ': '}{overlay.run.why}",
         )
     outside = [each.name for each in overlay.ensemble if each.compared and not each.agrees]
     if outside:

@@ -39,7 +39,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
             "paper [Hz]",
         ),
         tuple(row for each in noise for row in _resonance_rows(each)),
-        "± is two standard deviations, from the scatter of lines only. Simulated: one draw under the recorded"
+        "± is two standard deviations, from the scatter of lines only. Simulated: one draw from the recorded"
         " voltage or base motion, same estimator. Model: undamped natural frequency, without contact "
         "or (terminal) with m1 stuck to m2. Paper: Gong et al. 2025, section 5.",
     )
@@ -140,7 +140,7 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 
 
 def edge_text(edge: Edge, instead: str) -> str:
-    """Return an edge with its bounds as text, or ``instead`` if that is not empty."""
+    """Return an edge with its bounds as text, or the text ``instead`` if it is not empty."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
 
 
@@ -169,8 +169,8 @@ def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
         tuple(_dwell_row(each) for each in dwells),
         "Response I: largest |x| in the window, over A0; in chaos, a random value. Response II:"
         " component at the drive frequency, over A0. ± is the expanded uncertainty (k = 2); the table of"
-        " uncertainty shows its parts. Simulated: median and 95 % band of the draws under the recorded "
-        "voltage, or one run under the recorded base motion; z: standardised difference from the draws; "
+        " uncertainty shows its parts. Simulated: median and 95 % band of the draws from the recorded "
+        "voltage, or one run from the recorded base motion; z: standardised difference from the draws; "
         "|z| exceeds 2.6 in one of 100 agreeing cases.",
     )
 
@@ -198,19 +198,19 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
 
 
 def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, str]:
-    """Return the draws' response with its 95 % band, and the z of the measured response."""
+    """Return the simulated response with its 95 % band, and the z of the measured response."""
     found = None if overlay is None else overlay.quantity(name)
     if overlay is None or found is None:
         return ABSENT, ABSENT
     if overlay.run.draws == 1:
         return f"{found.draws[0, 0]:.4g}", ABSENT
     if not found.compared:
-        return "none of this motion", ABSENT
+        return "no draw has this motion", ABSENT
     return f"{found.median[0]:.4g} ({found.lower[0]:.4g} to {found.upper[0]:.4g})", f"{found.z[0]:+.2f}"
 
 
 def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
-    """Return a band's level over all draws [dB]; for a single run or a low level, the level of the first."""
+    """Return a band's median level in all draws [dB]; for one run or a low level, that of the first draw."""
     found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]
