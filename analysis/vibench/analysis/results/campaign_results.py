@@ -70,7 +70,7 @@ def overlay(
     shaker
         Result of `fit_shaker` for another recording; used if the bench configuration describes no shaker.
     draws
-        Number of runs of a colliding motion under the voltage, from slightly different starts.
+        Number of simulated runs of a colliding motion, from slightly different initial states.
     stage
         Receives a description of each step.
     """
@@ -203,7 +203,7 @@ def analyse_files(
     observer
         Receives the progress.
     specimen
-        Specimen to simulate instead of that in the bench configuration.
+        Specimen to simulate; by default the specimen of each bench configuration.
     draws
         Number of simulated runs of each test.
     response

@@ -110,7 +110,7 @@ def recorded_response(path: Path) -> RecordedLevel:
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
-    """Return the level over frequency of a result; empty for other kinds or a single frequency."""
+    """Return base amplitude over frequency of a result; empty for other kinds or a single frequency."""
     match result.analysis.response:
         case (SweepResponse() | SteppedResponse()) as found:
             try:
@@ -123,7 +123,7 @@ def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
 
 def _of_draws(curve: Curve, overlay: AbstractOverlay[Any]) -> Curve:
     """Return the curve with the median and the scatter of all draws instead of the first draw."""
-    note = f"{curve.note}; under the {overlay.run.driven.value}"
+    note = f"{curve.note}; from the {overlay.run.driven.value}"
     found = overlay.quantity(curve.response.value)
     if found is None or overlay.run.draws == 1:
         return replace(curve, note=note)
@@ -136,7 +136,7 @@ def _of_draws(curve: Curve, overlay: AbstractOverlay[Any]) -> Curve:
         curve,
         magnitude=found.median[place],
         relative_sd=found.relative_sd[place],
-        note=f"median of {overlay.run.draws} draws under the {overlay.run.driven.value}",
+        note=f"median of {overlay.run.draws} draws from the {overlay.run.driven.value}",
     )
 
 

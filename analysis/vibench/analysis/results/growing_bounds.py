@@ -1,8 +1,8 @@
-"""Process that computes bounds of a recording during its run.
+"""Process that computes the bounds of a recording's results while it is being recorded.
 
 It runs as ``python -m vibench.analysis.results.growing_bounds``. The first output line means it is ready.
 Then each input line requests bounds, and one output line answers. All lines are JSON objects. A run that
-lasts until a bound is met starts this process (`vibench.acquisition.run.until`).
+lasts until a bound is small enough starts this process (`vibench.acquisition.run.until`).
 """
 
 import json
@@ -71,7 +71,7 @@ def bounds_of(result: AnyResult) -> dict[str, float | None]:
 
 
 def bound_of(budget: Budget) -> float | None:
-    """Return the relative 95 % random bound of one quantity; None if its budget does not state it."""
+    """Return the relative 95 % random bound of one quantity; None if its budget states no bound."""
     parts = [budget.share(cause) for cause in (Cause.NOISE, Cause.CHANCE)]
     stated = [each for each in parts if each is not None]
     return COVERAGE * hypot(*stated) if len(stated) == len(parts) else None

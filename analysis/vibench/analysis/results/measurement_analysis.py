@@ -57,7 +57,7 @@ def analyse(
         plan = facts.measurement.excitation
         if channels.is_force and ANALYSES[plan.kind].family != NOISE_FAMILY:
             raise UnusableData(
-                f"{facts.response} has results only under noise (the apparent mass); analyse a motion, "
+                f"{facts.response} has results only for noise (the apparent mass); analyse a motion, "
                 "or measure noise"
             )
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)

@@ -101,7 +101,7 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
 
 
 def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
-    """Return a function on the lines of the first point; clock drift shifts the lines of later points."""
+    """Return a function at the lines of the scan's first point; clock drift shifts those of later points."""
     values = np.asarray(np.interp(lines_hz, function.frequency_hz, function.values), dtype=np.complex128)
     return replace(function, frequency_hz=lines_hz, values=values)
 
