@@ -136,7 +136,7 @@ class Acquisition(Stream):
 
     @property
     def enough_before_s(self) -> float:
-        """Rig time from which the reference trigger is accepted; infinite if it is accepted already [s]."""
+        """Rig time at which enough samples before a trigger are stored [s]; infinite once they are."""
         kept = self._pretrigger
         return self.began_s + kept / self.rate_hz if self.transferred < kept else math.inf
 

@@ -53,7 +53,7 @@ class AFG1022(ScpiInstrument):
     serial
         Serial number, part of the VISA address.
     quirks, terminal
-        Peculiarities of the firmware; load, clock error and noise of the output.
+        Peculiarities of the firmware; properties of the output (load, clock error, noise).
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
@@ -299,7 +299,7 @@ SHARED_COMMANDS = (
 )
 COMMANDS = (
     *SHARED_COMMANDS,
-    Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, but for 45 built-in shapes", _write_shape,
+    Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, except 45 built-in shapes", _write_shape,
         lambda generator, channel: generator.settings(channel).shape.encode("ascii")),
     setting("[SOURce#:]PHASe[:ADJust]", "AFG1062",
         lambda s: s.phase_deg, lambda s, deg: replace(s, phase_deg=deg),

@@ -92,7 +92,7 @@ class Decimator:
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
-    """Return the filter of one channel for ``ratio`` steps per sample."""
+    """Return the filter of one channel: ``ratio`` steps per sample, starting and delayed by these steps."""
     delay = max(delay_steps, EARLIEST_STEPS)
     centre = Decimator(ratio, start_step, delay, np.zeros((1, 1))).centre(0)
     if ratio == round(ratio):

@@ -15,7 +15,7 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Samples per draw: a compromise between the number of generators and of unused samples."""
+"""Random numbers per draw: a compromise between the number of draws and that of unused numbers."""
 
 
 class NoiseStream:
