@@ -59,7 +59,7 @@ class BranchContinuation(AbstractFeedback):
     """Time recorded at each point [s]."""
     perturbation: float = Field(default=0.0, ge=0, le=0.1)
     """Small changes of the drive that measure the stability of each point: relative rms change of the
-    fundamental of base or m0, whichever is larger. 0.02 if noise is low; 0 for no measurement."""
+    fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 for no measurement."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
     """Number of periods with these changes at each point; a few more periods find their size."""
 

@@ -165,9 +165,9 @@ _POINTS = 25
 _PERIODS, _WHOLE = range(1, 41), 2e-5
 """Numbers of periods to try, and tolerance; the smallest with a whole number of samples is used."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Samples per period at which the slope of the spring force is taken, without and with stops."""
+"""Points per period at which the slope of the spring force is computed, without and with stops."""
 _PART_S = 1e-6
-"""Longest part of a sample for which the slope of the stops is constant [s]; a contact has a hundred."""
+"""Longest part of a control step with one slope of the stops' force [s]; a contact has a hundred parts."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Decreasing levels, relative to the required level, that lead to a motion with impacts."""
 

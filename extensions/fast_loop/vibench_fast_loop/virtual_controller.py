@@ -91,7 +91,7 @@ class VirtualController:
                 self._keep_block(time_s)
             now = self._now
             if now["unheard"] > now["most_unheard"]:
-                self._end(f"its host said nothing for {self.facts.watchdog_s:g} s", RAMP_S)
+                self._end(f"its host sent no request for {self.facts.watchdog_s:g} s", RAMP_S)
             elif now["at_limit"] > now["most_at_limit"]:
                 self._end(f"its output stayed at its limit of {self.facts.limit_v:g} V", RAMP_S)
             if self._state is LoopState.ENDING and now["fade"] <= 0.0:

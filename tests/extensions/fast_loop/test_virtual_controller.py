@@ -139,7 +139,7 @@ def test_without_its_host_the_controller_goes_silent_and_states_the_reason(wired
     assert not np.any(wired.played[-100:])
     told = wired.report()
     assert told.state is LoopState.SILENT
-    assert "said nothing for 0.5 s" in told.reason
+    assert "sent no request for 0.5 s" in told.reason
 
 
 def test_an_unstable_law_is_ended_by_the_controller():
