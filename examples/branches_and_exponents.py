@@ -1,4 +1,4 @@
-"""Follow the specimen's periodic motions through its first resonance, and find all exponents beside it."""
+"""Follow the specimen's periodic motions through its first resonance; compute all exponents at 260 Hz."""
 
 from vibench.analysis.dynamics import BranchRequest, SpectrumRequest, diagram_of, exponent_spectrum
 

@@ -1,4 +1,4 @@
-"""Measure a campaign on the virtual rig into a folder, and say what noise tells of m0.
+"""Measure a campaign on the virtual rig, and print the resonances of m0 found in its noise recording.
 
 python examples/campaign_on_the_virtual_rig.py recordings
 """

@@ -13,7 +13,7 @@ print(f"gap of the endless chain: {gap.lower_hz:.1f} to {gap.upper_hz:.1f} Hz")
 for amplitude_m in (1e-6, 40e-6):
     sweep = LinearSweep(200.0, 600.0, 4.0, amplitude_m)
     run = integrate_chain(chain, sweep, sweep.duration_s, sample_rate_hz=10e3)
-    # The component at the momentary frequency: what rings on from lower ones turns away from it.
+    # Demodulate at the instantaneous frequency: free vibration from earlier frequencies averages out.
     turning = run.states[:, -1, 0] * np.exp(-2j * np.pi * sweep.turns(run.time_s))
     within, above = (
         2.0 * abs(turning[abs(sweep.frequency_hz(run.time_s) - middle_hz) < 10.0].mean()) / amplitude_m

@@ -1,4 +1,4 @@
-"""Read a recording with h5py alone: what was played, and how fast m0 moved. No vibench is needed for it.
+"""Read a recording with h5py alone, without vibench: the signal played, and the peak velocity of m0.
 
     python examples/read_a_recording_with_h5py.py recordings/noise.h5
 

@@ -1,4 +1,4 @@
-"""Ask the model of the paper's specimen how strongly it answers at 260 Hz, and whether that is chaos."""
+"""Compute the response of the paper's specimen at 260 Hz, and its largest Lyapunov exponent."""
 
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent, steady_response
 

@@ -1,9 +1,9 @@
-"""Hold a recording against its seal with h5py and hashlib alone. No vibench is needed for it.
+"""Check a recording against its seal with h5py and hashlib alone, without vibench.
 
     python examples/verify_a_recording_with_h5py.py recordings/noise.h5 [KEYFILE]
 
-The seal is a manifest: for every group and dataset a checksum of its attributes, type and shape, and one of
-its data. docs/recording-format.md says the same in words.
+A manifest lists two checksums for every group and dataset: one of its attributes, type and shape, one of its
+data. The seal is the checksum of the manifest; see docs/recording-format.md.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")  # how HDF5 notes what is whose axis: addresses, no content
+LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")  # HDF5's links to axes: file addresses, not content
 
 
 def attributes_sha256(item):
@@ -47,7 +47,7 @@ with h5py.File(sys.argv[1]) as file:
     found = {
         path: {"attributes": attributes_sha256(item), "data": data_sha256(item)}
         for path, item in items.items()
-        if path.split("/")[1] not in ("seal", "results")  # results are added later, with seals of their own
+        if path.split("/")[1] not in ("seal", "results")  # results are added later and sealed separately
     }
 
 changed = sorted(path for path in manifest.keys() | found.keys() if manifest.get(path) != found.get(path))

@@ -1,20 +1,19 @@
-"""HELIC-DAQ as a real-time controller of vibench: an example of a driver for somebody else's board.
+"""HELIC-DAQ as a real-time controller of vibench: an example of a driver for a third-party board.
 
 HELIC-DAQ (D. A. W. Barton, MIT licence, https://github.com/dawbarton/helic-daq) is open firmware for RP2350
-boards: 1 to 8 kHz, a Fourier series and a control chosen when the firmware is built, both told over TCP;
-samples come back over UDP. Written from its documents (protocol 3, release 0.3.0), and never run on a board.
+boards. At 1 to 8 kHz it plays a Fourier series and runs a control that is chosen when the firmware is built.
+Both are set over TCP; samples return over UDP. This driver follows the firmware's documents (protocol 3,
+release 0.3.0) and has never run on a board. The firmware must have the control `PidController`, fed by the
+source that the option `m0` names, and a rig with the safety gate.
 
-The firmware must have the control `PidController`, which answers the source that is named `m0` in the
-options, and a rig with the safety gate. What it is told, and what it does:
-
-- A program's series goes to ``forcing_coeffs`` and ``freq``, which the board changes without a jump of the
-  phase; a glide is many small changes, since the board knows none.
-- A law goes to ``ctrl_kp``, ``ctrl_kd`` and ``ctrl_tau_d``: proportional and derivative, of m0 alone. Any
-  other is refused.
+- The series of a program is written to ``forcing_coeffs`` and ``freq``, which the board changes without a
+  jump of the phase. The board has no glides, so a glide is played as many small changes.
+- A law is written to ``ctrl_kp``, ``ctrl_kd`` and ``ctrl_tau_d``. Only a proportional-derivative law of m0
+  is accepted.
 - Coefficients are computed here, from every sample and the board's own phase, under a Hann window.
-- The gate is open while a program plays. It closes by itself when the connection ends: at once when the
-  host's program dies, within 10 s when a cable is pulled. A host that hangs with its connection open is
-  unknown to the board: a thread in here watches whether anybody talks to it, and nothing watches the thread.
+- The gate is open while a program plays. The board closes it when the connection ends: at once if the host's
+  program dies, within 10 s if a cable is pulled. The board does not notice a host that hangs with an open
+  connection. A thread of this driver then silences the board, but nothing monitors that thread.
 """
 
 import re
@@ -34,12 +33,12 @@ from vibench_fast_loop.protocol import LoopBlock, LoopFacts, LoopProgram, LoopRe
 GAINS = ("ctrl_kp", "ctrl_kd", "ctrl_tau_d")
 GATE_OPEN, GATE_TRIPPED = 1, 2
 ENDING_S = 0.05
-"""How fast it ramps down by itself [s]."""
+"""Duration of a ramp down that the driver starts by itself [s]."""
 LONGEST_AT_LIMIT_S = 0.05
 LATEST_S = 0.02
-"""Samples may be so much older than what the board says of itself [s]."""
+"""Largest delay of the received samples behind the tick count that the board reports [s]."""
 PATIENCE_S = 2.0
-"""How long samples are waited for [s]."""
+"""Longest wait for samples [s]."""
 LISTENING_S = 0.02
 MOST_BLOCKS = 2000
 _AT_LIMIT = 0.999
@@ -70,18 +69,18 @@ class HelicController:
         self._turn = threading.Condition()
         self._state, self._reason = LoopState.SILENT, ""
         self._error: InstrumentError | None = None
-        """Why nothing can be asked any more."""
+        """Error after which no further request is possible; None without one."""
         self._gains: tuple[float, ...] = ()
         self._now = Played(0.0, np.zeros(self._harmonics, dtype=np.complex128))
         self._glide: Glide | None = None
         self._coefficients: Coefficients | None = None
         self._blocks: list[LoopBlock] = []
         self._following, self._number = -1, 0
-        """Sample and packet that come next; no sample has come yet."""
+        """Numbers of the next sample and packet; -1 before the first sample."""
         self._talked = self._at_limit = self._late = 0
-        """Sample at which its host last said anything, samples at the limit, and ticks that came late."""
+        """Sample number of the last request; samples at the output limit; late ticks when the gate opened."""
         (self._ticks,) = link.get("ticks")
-        """Ticks of the board less samples heard; its ticks until any was."""
+        """Tick count of the board minus number of the next sample; before any sample, the tick count."""
         self._close_gate()
         link.stream(read)
         self._leaving = threading.Event()
@@ -90,32 +89,32 @@ class HelicController:
 
     @classmethod
     def open(cls, config: ControllerConfig) -> Self:
-        """Connect, silence whatever plays, and compare the board with its configuration."""
+        """Connect, silence the output, and check the board against its configuration."""
         host, port = session(config.resource)
         link = HelicLink(host, port, int(config.options.get("stream_port", port + 1)))
         try:
             read = checked(link, config)
             return cls(link, config, read)
         except BaseException:
-            link.close()  # whatever has been opened of its gate closes
+            link.close()  # this closes the board's gate
             raise
 
     @property
     def identity(self) -> Identity:
-        """Who answered."""
+        """Identity of the board."""
         return self._identity
 
     @property
     def facts(self) -> LoopFacts:
-        """Rate, latency, limit and watchdog."""
+        """Sample rate, latency, output limit and watchdog time."""
         return self._facts
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Go over to a program."""
+        """Change to a program over its glide time; return the report."""
         if len(program.reference_v) > self._harmonics:
             raise InstrumentError(
-                f"{len(program.reference_v)} harmonics were requested, and the board at {self._link.where} "
-                f"plays {self._harmonics}. Nothing was changed; ask for fewer"
+                f"{len(program.reference_v)} harmonics were requested, but the board at {self._link.where} "
+                f"plays at most {self._harmonics}. Nothing was changed; request fewer"
             )
         gains = pd_gains(program.feedback, 1 / self._facts.rate_hz)
         wanted = np.zeros(self._harmonics, dtype=np.complex128)
@@ -132,7 +131,7 @@ class HelicController:
             return report.model_copy(update={"state": self._state, "reason": ""})
 
     def report(self) -> LoopReport:
-        """Hand over what has been measured since the last report."""
+        """Return the state and the blocks measured since the last report."""
         with self._turn:
             self._require_there()
             try:
@@ -154,7 +153,7 @@ class HelicController:
             return report.model_copy(update={"state": self._state})
 
     def close(self) -> None:
-        """Silence, and end the connection."""
+        """Silence the output, and close the connection."""
         with self._turn:
             if self._leaving.is_set():
                 return
@@ -165,8 +164,8 @@ class HelicController:
                     self._close_gate()
             finally:
                 self._error = self._error or InstrumentError(
-                    f"the connection to the board at {self._link.where} was closed. It is silent; open the "
-                    "bench again"
+                    f"the connection to the board at {self._link.where} was closed. The board is silent; "
+                    "open the bench again"
                 )
                 self._leaving.set()
                 self._link.close()
@@ -177,7 +176,7 @@ class HelicController:
             raise self._error
 
     def _new_report(self) -> LoopReport:
-        """Give what a report holds; its host has said something."""
+        """Return the report, and restart the watchdog."""
         self._require_there()
         self._talked = self._following
         blocks, self._blocks = tuple(self._blocks), []
@@ -216,7 +215,7 @@ class HelicController:
         self._tell(replace(self._now, volts=np.zeros_like(self._now.volts)))
 
     def _give_up(self, error: InstrumentError) -> None:
-        """Be silent after an error: by command, or by the end of the connection."""
+        """Silence the board after an error: by command or, if that fails, by closing the connection."""
         if self._state is not LoopState.SILENT:
             self._reason = str(error)
         self._state, self._glide = LoopState.SILENT, None
@@ -236,8 +235,8 @@ class HelicController:
             lambda: self._error is not None or ticks - self._ticks - self._following <= late, PATIENCE_S
         ):
             raise InstrumentError(
-                f"the board at {self._link.where} answers, and its samples do not arrive any more. It was "
-                "silenced; let the datagrams of its stream through the firewall, and look at the network"
+                f"the board at {self._link.where} answers, but its samples no longer arrive. It was "
+                "silenced; let the UDP datagrams of its stream pass the firewall, and check the network"
             )
         self._require_there()
         if self._state is not LoopState.SILENT and not (safety & GATE_OPEN and arm):
@@ -249,7 +248,7 @@ class HelicController:
             self._end(f"{self._ticks_late() - self._late} of its ticks came late", ENDING_S)
 
     def _listen(self) -> None:
-        """Take samples as they come, and go on with what is under way; a thread of its own."""
+        """Receive samples and continue a glide or a ramp, in a separate thread."""
         while not self._leaving.is_set():
             try:
                 packets = self._link.heard(LISTENING_S)
@@ -263,7 +262,7 @@ class HelicController:
                 with self._turn:
                     self._give_up(error)
                     self._turn.notify_all()
-            except OSError:  # the connection was closed under it
+            except OSError:  # another thread has closed the connection
                 return
 
     def _take(self, packet: Packet) -> None:
@@ -287,7 +286,7 @@ class HelicController:
     def _go_on(self) -> None:
         rate_hz, limit_v, watchdog_s = self._facts.rate_hz, self._facts.limit_v, self._facts.watchdog_s
         if self._state is LoopState.PLAYING and self._following - self._talked > watchdog_s * rate_hz:
-            self._end(f"its host said nothing for {watchdog_s:g} s", ENDING_S)
+            self._end(f"its host sent no request for {watchdog_s:g} s", ENDING_S)
         elif self._state is LoopState.PLAYING and self._at_limit > LONGEST_AT_LIMIT_S * rate_hz:
             self._end(f"its output stayed at its limit of {limit_v:g} V", ENDING_S)
         glide = self._glide
@@ -302,7 +301,7 @@ class HelicController:
 
 
 def session(resource: str) -> tuple[str, int]:
-    """Take host and port out of ``TCPIP0::<host>::<port>::SOCKET``."""
+    """Return host and port of ``TCPIP0::<host>::<port>::SOCKET``."""
     found = re.fullmatch(r"TCPIP\d*::(.+)::(\d+)::SOCKET", resource)
     if found is None:
         raise ConfigurationError(
@@ -312,12 +311,12 @@ def session(resource: str) -> tuple[str, int]:
 
 
 def checked(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
-    """Compare a board with its configuration, make it play nothing, and give the sources that are read."""
+    """Check a board against its configuration, clear its program, and return the sources to be read."""
     missing = [each for each in (*GAINS, "ctrl_ki") if each not in link.parameters]
     if missing:
         raise ConfigurationError(
-            f"the firmware at {link.where} has no {', '.join(missing)}. Nothing was played; build it with "
-            "the standard programme and the control PidController"
+            f"the firmware at {link.where} has no {', '.join(missing)}. Nothing was played; build the "
+            "firmware's standard program with the control PidController"
         )
     options = config.options
     read = tuple(str(options.get(name, name)) for name in READ)
@@ -325,13 +324,13 @@ def checked(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
     wrong += [each for each in read[2:] if link.sources.get(each, "V") != "V"]
     if wrong:
         raise ConfigurationError(
-            f"{', '.join(wrong)} is no source in volts at {link.where}: {', '.join(link.sources)} are there. "
-            "Nothing was played; name base and m0 in controller.options"
+            f"{', '.join(wrong)}: no source in volts at {link.where}, which has {', '.join(link.sources)}. "
+            "Nothing was played; name the sources of base and m0 in controller.options"
         )
     if config.pd_of is not LoopInput.M0 or abs(link.rate_hz / config.rate_hz - 1) > 0.01:
         raise ConfigurationError(
-            f"the board at {link.where} takes {link.rate_hz:g} samples a second and laws of m0's velocity "
-            f"alone; the configuration says {config.rate_hz:g} and pd_of = {config.pd_of or 'nothing'}. "
+            f"the board at {link.where} takes {link.rate_hz:g} samples a second and only laws of m0's "
+            f"velocity; the configuration has {config.rate_hz:g} and pd_of = {config.pd_of or 'nothing'}. "
             'Nothing was played; make them agree (pd_of = "m0_velocity")'
         )
     link.set("arm", 0)
@@ -339,18 +338,18 @@ def checked(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
         link.set(name, *[0.0] * link.parameters[name].count)
     for name in (*GAINS, "ctrl_ki", "table_mode", "freq"):
         link.set(name, 0)
-    open_gate(link)  # nothing plays behind it
+    open_gate(link)  # a test of the gate; no signal is set
     return read
 
 
 def open_gate(link: HelicLink) -> None:
-    """Let the board's output through; refused where no gate opens: nothing would silence it."""
+    """Open the board's safety gate; raise InstrumentError if it stays closed, as nothing else silences it."""
     link.set("arm", 1)
     safety, _ = link.get("safety", "arm")
     if safety & (GATE_OPEN | GATE_TRIPPED) != GATE_OPEN:
         link.set("arm", 0)
         why = "has tripped" if safety & GATE_TRIPPED else "does not open"
         raise InstrumentError(
-            f"the safety gate of the board at {link.where} {why}. It is silent; look at its sensors, or "
-            "build its rig with SAFETY_GATED: without a gate nothing silences it when its host is gone"
+            f"the safety gate of the board at {link.where} {why}. The board is silent; check its sensors, or "
+            "build its rig with SAFETY_GATED: without a gate, nothing silences the board if its host is lost"
         )

@@ -1,4 +1,4 @@
-"""The wire protocol of HELIC-DAQ, version 3, by its docs/protocol.md: frames over TCP, samples over UDP."""
+"""Protocol of HELIC-DAQ, version 3, according to its docs/protocol.md: frames over TCP, samples over UDP."""
 
 import binascii
 import socket
@@ -16,7 +16,7 @@ from vibench.acquisition import InstrumentError, InstrumentLost
 VERSION = 3
 MAGIC = 0x4C48
 ANSWER_S = 2.0
-"""How long a reply is waited for [s]."""
+"""Longest wait for a reply [s]."""
 _HEAD = struct.Struct("<HBBH")
 _PACKET = struct.Struct("<HBBIIIHH")
 _ERRORS = {
@@ -31,7 +31,7 @@ _ERRORS = {
 
 
 class Ask(IntEnum):
-    """Types of message."""
+    """Message types."""
 
     PARAMETERS = 1
     SOURCES = 2
@@ -46,7 +46,7 @@ class Ask(IntEnum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """What the board says of one of its parameters."""
+    """Description of one parameter of the board."""
 
     index: int
     layout: struct.Struct
@@ -55,7 +55,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Packet:
-    """Samples of the sources that were requested."""
+    """Consecutive samples of the requested sources."""
 
     number: int
     first: int
@@ -65,12 +65,12 @@ class Packet:
 
     @property
     def following(self) -> int:
-        """Index of the sample after its last."""
+        """Index of the sample after the last one in this packet."""
         return self.first + self.values.shape[1]
 
 
 def frame(ask: int, sequence: int, payload: bytes) -> bytes:
-    """Give what is sent for a message."""
+    """Return the bytes of a message, with header and checksum."""
     body = struct.pack("<BBH", ask, sequence, len(payload)) + payload
     return struct.pack("<H", MAGIC) + body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
 
@@ -87,8 +87,8 @@ class HelicLink:
             self._control = socket.create_connection((host, port), ANSWER_S)
         except OSError as error:
             raise InstrumentLost(
-                f"no HELIC-DAQ board answers at {self.where} ({error}). Nothing was played; look at its "
-                "power, its network, and whether another program holds its only connection"
+                f"no HELIC-DAQ board answers at {self.where} ({error}). Nothing was played; check its "
+                "power, its network, and whether another program uses its only connection"
             ) from error
         self._control.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._samples = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -103,8 +103,8 @@ class HelicLink:
         status = self.request(Ask.STATUS)
         if status[0] != VERSION:
             raise InstrumentError(
-                f"the board at {self.where} speaks version {status[0]} of HELIC-DAQ's protocol, and this "
-                f"driver version {VERSION}. Nothing was played; install firmware of that version"
+                f"the board at {self.where} has version {status[0]} of HELIC-DAQ's protocol, but this driver "
+                f"needs version {VERSION}. Nothing was played; install firmware of that version"
             )
         _, count, _, self.rate_hz, _ = struct.unpack("<BHBfI", status)
         self.parameters: dict[str, Parameter] = {}
@@ -112,7 +112,7 @@ class HelicLink:
             self._take_page(self.request(Ask.PARAMETERS, struct.pack("<H", len(self.parameters))))
         words = self.request(Ask.SOURCES).decode("ascii").split("\0")
         self.sources = dict(zip(words[0::2], words[1::2], strict=False))
-        """Units by name, in the order of their numbers."""
+        """Unit of each source by name, in the order of the source numbers."""
 
     def _take_page(self, page: bytes) -> None:
         first, following = struct.unpack_from("<HH", page)
@@ -120,19 +120,19 @@ class HelicLink:
         for index in range(first, following):
             end = page.index(b"\0", place)
             kind, number = struct.unpack_from("<cH", page, end + 1)
-            # A char array is one text; anything else so many numbers.
+            # An array of characters is one text; other arrays have ``number`` values.
             letter = kind.decode("ascii")
             layout = struct.Struct(f"<{number}{'s' if letter == 'c' else letter}")
             self.parameters[page[place:end].decode("ascii")] = Parameter(index, layout, number)
             place = end + 5
         if following != len(self.parameters) or following == first:
             raise InstrumentError(
-                f"the board at {self.where} tells its parameters out of order ({first} to {following}). "
+                f"the board at {self.where} lists its parameters out of order ({first} to {following}). "
                 "Nothing was played; install firmware of version 3"
             )
 
     def request(self, ask: Ask, payload: bytes = b"", what: str = "") -> bytes:
-        """Send one frame, and give the payload of its answer."""
+        """Send one frame, and return the payload of the reply."""
         with self._turn:
             self._sequence = (self._sequence + 1) % 256
             try:
@@ -143,8 +143,8 @@ class HelicLink:
             except OSError as error:
                 raise InstrumentLost(
                     f"the board at {self.where} does not answer ({error or type(error).__name__}). Its gate "
-                    "closes by itself when it misses the connection, after 10 s at the latest; look at its "
-                    "power and its network"
+                    "closes by itself at most 10 s after the connection was lost; check its power and its "
+                    "network"
                 ) from error
             expected = self._sequence
         answer, (crc,) = rest[:-2], struct.unpack("<H", rest[-2:])
@@ -156,8 +156,8 @@ class HelicLink:
         if kind == Ask.ERROR:
             raise InstrumentError(
                 f"the board at {self.where} refused {what or ask.name.lower()}: "
-                f"{_ERRORS.get(answer[0], f'error {answer[0]}')}. It was silenced; look at what its firmware "
-                "allows"
+                f"{_ERRORS.get(answer[0], f'error {answer[0]}')}. It was silenced; check which values its "
+                "firmware allows"
             )
         return answer
 
@@ -166,12 +166,12 @@ class HelicLink:
         while len(parts) < count:
             part = self._control.recv(count - len(parts))
             if not part:
-                raise ConnectionError("it closed the connection")
+                raise ConnectionError("the board closed the connection")
             parts += part
         return parts
 
     def get(self, *names: str) -> tuple[Any, ...]:
-        """Read scalars: numbers, and bytes of an array of characters."""
+        """Return the values of parameters: numbers, or bytes for an array of characters."""
         wanted = [self.parameters[name] for name in names]
         answer = self.request(Ask.GET, struct.pack(f"<{len(wanted)}H", *(each.index for each in wanted)))
         return tuple(
@@ -183,7 +183,7 @@ class HelicLink:
         )
 
     def set(self, name: str, *values: float) -> None:
-        """Write a parameter, whole."""
+        """Write all values of a parameter."""
         parameter = self.parameters[name]
         self.request(
             Ask.SET,
@@ -192,18 +192,18 @@ class HelicLink:
         )
 
     def stream(self, sources: tuple[str, ...]) -> None:
-        """Have every sample of some sources sent from now on."""
+        """Start streaming every sample of the given sources."""
         names = list(self.sources)
         numbers = bytes(names.index(each) for each in sources)
         self._samples.bind(("", 0))
-        # A firewall then takes what comes back for an answer.
+        # After this datagram, a firewall accepts the samples as a reply.
         self._samples.sendto(b"\0", (self._host, self._stream_port))
         self.request(Ask.STREAM_STOP)
         self.request(Ask.STREAM_SETUP, struct.pack("<HIB", 1, 0, len(numbers)) + numbers)
         self.request(Ask.STREAM_START, struct.pack("<H", self._samples.getsockname()[1]))
 
     def heard(self, timeout_s: float) -> list[Packet]:
-        """Wait for samples, and give all that have come."""
+        """Wait for samples, and return all packets that have arrived."""
         packets: list[Packet] = []
         self._samples.settimeout(timeout_s)
         try:
@@ -223,6 +223,6 @@ class HelicLink:
         return [Packet(number, first, values.T.astype(np.float64))]
 
     def close(self) -> None:
-        """Leave; the board's gate closes at once."""
+        """Close the connection; the board then closes its gate at once."""
         self._control.close()
         self._samples.close()

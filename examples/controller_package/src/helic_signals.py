@@ -1,6 +1,6 @@
-"""What a HELIC-DAQ board plays and hears, in vibench's words: series, laws and coefficients.
+"""Conversions between vibench and a HELIC-DAQ board: Fourier series, laws, measured coefficients.
 
-Nothing here speaks with a board.
+This module does not communicate with the board.
 """
 
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from vibench_fast_loop.protocol import LoopBlock, LoopFeedback, LoopProgram
 
 Volts = NDArray[np.complex128]
 READ = ("phase", "cmd_epoch", "out", "base", "m0")
-"""Sources, by their names in the options; those are their own names where nothing is given."""
+"""Options that name the sources to be read; the default of each is the name of the option."""
 _SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What the board is told to play."""
+    """Signal set on the board: frequency, and coefficient of each harmonic [V]."""
 
     frequency_hz: float
     volts: Volts
 
     def towards(self, other: "Played", share: float) -> "Played":
-        """Give what lies between, along a half cosine."""
+        """Return the signal at a ``share`` of the way to ``other``, along a half cosine."""
         share = 0.5 - 0.5 * float(np.cos(np.pi * min(share, 1.0)))
         frequency_hz = self.frequency_hz + share * (other.frequency_hz - self.frequency_hz)
         return Played(frequency_hz, self.volts + share * (other.volts - self.volts))
@@ -33,27 +33,27 @@ class Played:
 
 @dataclass(frozen=True, eq=False)
 class Glide:
-    """On the way to what is to be played."""
+    """Gradual change from one signal to another."""
 
     start: int
-    """Sample."""
+    """Number of the first sample."""
     samples: float
     begin: Played
     end: Played
     is_last: bool
-    """Whether the gate closes at its end."""
+    """Whether the gate closes at the end of the glide."""
 
 
 def pd_gains(feedback: LoopFeedback | None, step_s: float) -> tuple[float, float, float]:
-    """Give the gains kp, kd and the filter time tau that make the same law of m0.
+    """Return the gains kp and kd and the filter time tau [s] with which the board applies a law of m0.
 
-    ``u = -kp s - kd d``, ``d += a ((s - before) / step - d)``, ``a = step / (tau + step)``: answers to one
-    sample of 1 V are ``-kp - kd a / step``, and then ``kd a^2 / step (1 - a)^(n - 1)``.
+    ``u = -kp s - kd d``, ``d += a ((s - before) / step - d)``, ``a = step / (tau + step)``: the responses to
+    a single sample of 1 V are ``-kp - kd a / step``, and then ``kd a^2 / step (1 - a)^(n - 1)``.
 
     Raises
     ------
     InstrumentError
-        When the law is another one.
+        When the law does not have this form.
 
     """
     if feedback is None:
@@ -69,9 +69,9 @@ def pd_gains(feedback: LoopFeedback | None, step_s: float) -> tuple[float, float
     largest = np.abs(answers).max()
     if np.any(base) or not 0.0 <= kept < 1.0 or np.abs(m0[1:] - expected).max() > _SAME * largest:
         raise InstrumentError(
-            f"a law that remembers {len(feedback.output)} numbers was requested, and HELIC-DAQ's PID takes "
-            "proportional and derivative ones of m0's velocity alone. Nothing was changed; write "
-            'pd_of = "m0_velocity" into [controller], and one is designed'
+            f"a law with {len(feedback.output)} state variables was requested, but HELIC-DAQ's PID accepts "
+            "only proportional-derivative laws of m0's velocity. Nothing was changed; set "
+            'pd_of = "m0_velocity" in [controller], and vibench designs such a law'
         )
     kd = m0[1] * step_s / share**2
     return float(-m0[0] - kd * share / step_s), float(kd), float(step_s * kept / share)
@@ -86,12 +86,12 @@ class Coefficients:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Drop the block that lasts: samples of it are missing."""
+        """Discard the current block, because some of its samples are missing."""
         self._samples = np.empty((len(READ), 0))
         self._is_changed = False
 
     def take(self, samples: NDArray[np.float64], following: int, is_gliding: bool) -> list[LoopBlock]:  # noqa: FBT001
-        """Add samples, shape (read, samples), up to the one that follows; give the blocks that end."""
+        """Add samples, shape (sources, samples), up to number ``following``; return the completed blocks."""
         self._samples = np.hstack([self._samples, samples])
         self._is_changed |= is_gliding
         blocks: list[LoopBlock] = []

@@ -1,8 +1,8 @@
-"""Two instruments for vibench: a generator that is spoken to in plain SCPI, and a charge amplifier.
+"""Two example instruments for vibench: a function generator with plain SCPI, and a charge amplifier.
 
 A generator is a class with `describe` and `open`, and with the methods of
-`vibench.acquisition.instruments.FunctionGenerator`. This one sends what most generators of the AFG family
-understand, and asks for errors after each command. A driver for a laboratory reads settings back as well.
+`vibench.acquisition.instruments.FunctionGenerator`. This one sends commands that most generators of the AFG
+family understand, and reads the error queue after each. A driver for a laboratory also reads settings back.
 """
 
 import time
@@ -37,7 +37,7 @@ class PlainScpiGenerator:
 
     @staticmethod
     def describe(config: GeneratorConfig) -> GeneratorDescription:
-        """Say what it can do."""
+        """Return the capabilities of the generator, without opening it."""
         del config
         return GeneratorDescription(
             "plain SCPI generator", (LOWEST_VPP, HIGHEST_VPP), HIGHEST_HZ, MEMORY_POINTS
@@ -45,7 +45,7 @@ class PlainScpiGenerator:
 
     @classmethod
     def open(cls, config: GeneratorConfig) -> "PlainScpiGenerator":
-        """Open it, its output off, on a sine of the smallest amplitude."""
+        """Open the generator with its output off, set to a sine of the smallest amplitude."""
         generator = cls(config)
         generator._command("OUTP1:STAT OFF")
         generator._command("OUTP1:IMP INF")
@@ -54,19 +54,19 @@ class PlainScpiGenerator:
 
     @property
     def identity(self) -> Identity:
-        """Who it says it is."""
+        """Identity that the generator reports."""
         reply = self._ask("*IDN?") or self._ask("*IDN?")
         maker, model, serial, firmware = (*reply.split(","), "", "", "", "")[:4]
         return Identity(maker, model, serial, firmware, reply)
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Whether it took its load is not asked here: somebody must look."""
+        """The load setting, which this driver does not read back: the operator must confirm it."""
         return (Knob(instrument="generator", setting="output load", value=str(self._config.load_ohm)),)
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
-        """Give its range, and not more than the bench allows [V]."""
+        """Smallest and largest amplitude that generator and bench allow, peak to peak [V]."""
         return LOWEST_VPP, min(HIGHEST_VPP, self._config.amplitude_limit_vpp)
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
@@ -79,13 +79,13 @@ class PlainScpiGenerator:
         self.set_amplitude(amplitude_vpp)
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Fill the memory over its whole range; the amplitude makes up for it."""
+        """Load one period, scaled to the full range of codes; the amplitude setting corrects the scale."""
         fewest, most = MEMORY_POINTS
         swing = np.asarray(waveform, dtype=float) - np.mean(waveform)
         peak = float(np.max(np.abs(swing)))
         if not (fewest <= swing.size <= most and peak > 0 and np.max(np.abs(waveform)) <= 1.0):
             raise LimitExceeded(
-                f"{fewest} to {most} points from -1 to 1 that move are allowed; nothing was sent"
+                f"{fewest} to {most} points from -1 to 1, not constant, are allowed; nothing was sent"
             )
         self._require(amplitude_vpp * peak, repetition_hz)
         self._command(f"SOUR1:VOLT {LOWEST_VPP}VPP")
@@ -97,8 +97,8 @@ class PlainScpiGenerator:
         self.set_amplitude(amplitude_vpp)
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse: sweeps are stepped by the computer, since `describe` promises none."""
-        raise LimitExceeded(f"{sweep} at {amplitude_vpp:g} Vpp: no sweeps of its own; use sine_sweep")
+        """Refuse: `describe` reports no internal sweep, so the computer steps the frequency."""
+        raise LimitExceeded(f"{sweep} at {amplitude_vpp:g} Vpp: no internal sweep; use sine_sweep")
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Change the frequency."""
@@ -112,7 +112,7 @@ class PlainScpiGenerator:
         self._amplitude_vpp = amplitude_vpp
 
     def arm_burst(self, cycles: int) -> None:
-        """Wait for a trigger with so many periods."""
+        """Play ``cycles`` periods at each trigger."""
         self._command("SOUR1:BURS:MODE TRIG")
         self._command(f"SOUR1:BURS:NCYC {cycles}")
         self._command("SOUR1:BURS:STAT ON")
@@ -122,11 +122,11 @@ class PlainScpiGenerator:
         self._command("*TRG")
 
     def end_burst(self) -> None:
-        """Play on."""
+        """Play continuously, without triggers."""
         self._command("SOUR1:BURS:STAT OFF")
 
     def measured_latency_s(self) -> float:
-        """Set again what is set, and look at the clock [s]."""
+        """Set the present amplitude again, and return the time that this takes [s]."""
         began_s = time.perf_counter()
         self.set_amplitude(self._amplitude_vpp)
         return time.perf_counter() - began_s
@@ -141,7 +141,7 @@ class PlainScpiGenerator:
             self._command("OUTP1:STAT OFF")
 
     def close(self) -> None:
-        """Turn the output off, and give the session back."""
+        """Turn the output off, and close the session."""
         if self._is_open:
             try:
                 self.stop()
@@ -180,11 +180,11 @@ class PlainScpiGenerator:
 
 
 def charge_amplifier(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Give the facts of an accelerometer behind a charge amplifier, from the channel's options."""
+    """Return the properties of an accelerometer with charge amplifier, from the channel's options."""
     try:
         sensor_pc, amplifier_mv = config.options["pc_per_m_per_s2"], config.options["mv_per_pc"]
     except KeyError as missing:
-        raise ConfigurationError(f"options of the channel lack {missing}; give it") from missing
+        raise ConfigurationError(f"options of the channel lack {missing}; add this key") from missing
     return SensorFacts(
         "acceleration",
         "m s-2",

@@ -113,7 +113,7 @@ def test_a_pd_law_is_recovered_exactly_and_other_laws_are_refused(installed):
         step=((0.9, 0.0), (0.0, 0.5)), inlet=((0.0, 1.0), (0.0, 1.0)), output=(1.0, 1.0), direct=(0.0, 0.0)
     )
     for other in (of_base, slow, second):
-        with pytest.raises(InstrumentError, match=r'Nothing was changed; write pd_of = "m0_velocity"'):
+        with pytest.raises(InstrumentError, match=r'Nothing was changed; set pd_of = "m0_velocity"'):
             pd_gains(other, 1e-3)
 
 
@@ -130,7 +130,7 @@ def test_an_incompatible_ungated_or_occupied_board_is_refused(found):
     board, rig = found
     board.version = 4
     with pytest.raises(
-        InstrumentError, match=r"speaks version 4 .* this driver version 3\. Nothing was played"
+        InstrumentError, match=r"has version 4 .* this driver needs version 3\. Nothing was played"
     ):
         open_bench(rig, confirm=confirm_simulated)
     board.version, board.is_gated = 3, False
@@ -140,9 +140,9 @@ def test_an_incompatible_ungated_or_occupied_board_is_refused(found):
         open_bench(rig, confirm=confirm_simulated)
     board.is_gated = True
     for wrong, said in (
-        ({"rate_hz": 8000.0}, r"takes 4000 samples a second .* says 8000"),
+        ({"rate_hz": 8000.0}, r"takes 4000 samples a second .* has 8000"),
         ({"pd_of": None}, r'pd_of = nothing.*make them agree \(pd_of = "m0_velocity"\)'),
-        ({"options": {"base": "laser"}}, r"laser, m0 is no source in volts at .*: adc0, adc1"),
+        ({"options": {"base": "laser"}}, r"laser, m0: no source in volts at .*, which has adc0, adc1"),
     ):
         told = rig.model_copy(update={"controller": rig.controller.model_copy(update=wrong)})
         with pytest.raises(ConfigurationError, match=said):
@@ -166,7 +166,7 @@ def test_a_stream_that_ends_is_reported_and_silenced(played):
     board, bench = played
     board.is_mute = True
     bench.digitizer.read(6400)
-    with pytest.raises(InstrumentError, match=r"its samples do not arrive any more\. It was silenced"):
+    with pytest.raises(InstrumentError, match=r"its samples no longer arrive\. It was silenced"):
         bench.controller.report()
     assert not board.is_armed
 
