@@ -50,7 +50,7 @@ class ReasonCode(StrEnum):
     """The point was done, but its recording differs from its seal (checksum). The file is kept, and the point
     is measured again."""
     STOPPED = "stopped"
-    """A stop was requested; the reason names by whom."""
+    """A stop was requested; the reason states who requested it."""
     PROGRAM_ENDED = "program_ended"
     """The program was killed, crashed, or lost power."""
     DATA_LOST = "data_lost"
@@ -159,7 +159,7 @@ class Finished:
 
     point: DonePoint
     done: tuple[DonePoint, ...]
-    """Points done in the order of the campaign, including ``point``; the same after a resume."""
+    """All completed points in the order of the campaign, including ``point``; the same after a resume."""
 
 
 After = Callable[[Finished, Recording], Iterable[Measurement]]
