@@ -37,7 +37,7 @@ _IN_MOMENTS = 0.2
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Bounds on the time in which the generator changes and verifies one setting [s]; a stop takes as long."""
+"""Bounds on the time for one verified change of a generator setting [s]; stopping takes as long."""
 ROOM_H = Bounds(-10.0, -1.0)
 """Bounds on the recording time for which the disk has space [h]; negated, because more is better."""
 

@@ -1,4 +1,4 @@
-"""Loop check with one sine: detection, levels and phases of the channels."""
+"""Check of the whole signal chain with one sine: presence, level and phase in each channel."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
 
 
 DRIVE_DEVIATION = Bounds(0.02, 0.15)
-"""Bounds on the relative deviation of the measured drive from the setting."""
+"""Bounds on the relative deviation of the measured drive voltage from the generator setting."""
 GAIN_DB = Bounds(1.0, 3.0)
 """Bounds on the deviation of the amplifier's gain from the rig's model [dB]."""
 BASE_DB = Bounds(1.5, 3.0)
