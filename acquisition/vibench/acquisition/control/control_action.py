@@ -59,7 +59,7 @@ _DEAD_SHARE = 0.3
 _SURE = 2.0
 """Number of standard uncertainties above which an error is significant."""
 _GAIN = 0.8
-"""Fraction of an error in decibels that is corrected at once; below 1, as the specimen responds slowly."""
+"""Fraction of the base's level error [dB] that one correction removes; the specimen responds slowly."""
 _BATCHES = 8
 """Number of batches for the uncertainty of a mean; successive periods of chaos are not independent."""
 
@@ -101,7 +101,7 @@ class LevelControl:
     """Smallest amplitude setting that the generator accepts [Vpp]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Return the next setting [Vpp]; unchanged if the error is small or may be due to chance."""
+        """Return the next generator setting [Vpp]; unchanged for a level error that is small or by chance."""
         if measured.amplitude <= 0.0:
             return setting_vpp
         error = abs(measured.amplitude / target - 1)

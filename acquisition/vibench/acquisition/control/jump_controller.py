@@ -27,13 +27,13 @@ from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
-"""Factor by which each of `RUNGS` steps lowers the setting, to about 1/9 in total."""
+"""Factor by which each of `RUNGS` steps lowers the generator setting; in total to about 1/9."""
 _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
 
 def decay_motion(loop: SineLoop) -> Controller[None]:
-    """Lower the setting in steps, wait, and raise it again to its earlier value."""
+    """Lower the generator setting in steps, wait, and raise it again to its earlier value."""
     now = loop.setting
     for rung in range(1, RUNGS + 1):
         loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))

@@ -20,7 +20,7 @@ from .sine_loop import SineLoop
 _NEWEST = 0.5
 """Weight of the newest gains in the average with earlier ones; single gains scatter due to impacts."""
 _MOST_CHANGE = 4.0
-"""Largest factor by which a line's squared gain changes from one realisation to the next."""
+"""Largest factor by which the squared gain of a spectral line changes between two realisations."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Equaliser:
         return densities
 
     def require_below_abort(self, densities: MeasuredDensities) -> None:
-        """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at any line."""
+        """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at a spectral line."""
         most = 10 ** (self._plan.abort_db / 10)
         lines = [("base", "(m/s2)2/Hz", densities.base, self._plan.density)]
         if self._plan.response_limits:
@@ -119,7 +119,7 @@ class Equaliser:
         return np.asarray(10 * np.log10(np.maximum(densities.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
-        """Return the density per line, averaged over ``resolution_hz``; whole periods avoid leakage."""
+        """Return the density per spectral line, averaged over ``resolution_hz``, without leakage."""
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count

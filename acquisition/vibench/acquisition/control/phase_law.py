@@ -12,7 +12,7 @@ from .settling_controller import SettledState
 _GAIN = 0.3
 """Fraction of the phase error that the loop corrects after each measurement (look)."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""If more than ``_SLOW`` of an error remains after a look, the gain grows by the factor ``_GROWTH``, up to
+"""If more than ``_SLOW`` of a phase error is left after a look, the gain grows by ``_GROWTH``, up to
 ``_LARGEST_GAIN``.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
@@ -36,9 +36,9 @@ class LearntMode:
     (zero for a super- or subharmonic)."""
     half_width_hz: float
     bend_hz: float = 0.0
-    """Change of the resonance frequency when the level grows by the factor e; 0 if unknown."""
+    """Change of the resonance frequency [Hz] when the base level grows by the factor e; 0 if unknown."""
     steeper_hz: float = 0.0
-    """Expected change of ``bend_hz`` from this level to the next."""
+    """Expected change of ``bend_hz`` from this base level to the next [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ _NEAR_DEG = 35.0
 """Largest phase error on the straight part of the phase curve, which gives the slope [degrees]."""
 _FEWEST = 2
 _NEAREST = 3
-"""Number of tries nearest to the resonance that give the slope if it changes with frequency."""
+"""Number of measurements nearest to the resonance that give the slope if it changes with frequency."""
 _STEEPEST_DEG = 85.0
 """Upper limit on phase errors in the fit, because the tangent of 90 degrees is infinite [degrees]."""
 _BEND = 0.15
@@ -197,7 +197,7 @@ class PhaseSearch:
     """Largest step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
-    """Whether the phase follows a linear mode; if not, only the nearest tries determine its slope."""
+    """Whether the phase follows a linear mode; if not, only the nearest measurements give its slope."""
 
     def next_hz(self) -> float:
         """Return the next frequency to try [Hz]; needs at least one earlier try."""
@@ -215,7 +215,7 @@ class PhaseSearch:
         return self._bounded(self._outwards(last))
 
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
-        """Return the resonance: the zero of a line fitted to the tries near it.
+        """Return the resonance: the zero of a line fitted to the phases measured near it.
 
         ``sensor_phase_deg`` is the standard uncertainty of the phase that all tries share [degrees].
         """

@@ -193,7 +193,7 @@ class SettlingController:
         return measured_level(periods.base[periods.count // 2 :])
 
     def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
-        """Return the next setting towards the level at ``frequency_hz`` [Vpp], ignoring uncertainty."""
+        """Return the generator setting [Vpp] for the base level at ``frequency_hz``, ignoring uncertainty."""
         assert self.level is not None
         control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
@@ -374,7 +374,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Start, extend or end a frequency range with the level outside its tolerance; return the open one."""
+    """Update the frequency range in which the level is outside its tolerance; None outside such a range."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

@@ -68,7 +68,7 @@ class GainEstimator:
 
     @property
     def level(self) -> float:
-        """Mean amplitude of the base over the track, as a fraction of its target."""
+        """Mean amplitude of the base over the averaged steps, as a fraction of its target."""
         if not self._answers:
             return 1.0
         return float(abs(np.mean([each.level for each in self._answers])))
@@ -94,7 +94,7 @@ class GainEstimator:
 
 @dataclass(frozen=True)
 class DriveSetting:
-    """Frequency and amplitude setting of the generator."""
+    """Frequency of the generator, and its amplitude setting (peak to peak)."""
 
     frequency_hz: float
     setting_vpp: float
@@ -142,7 +142,7 @@ class SineLoop:
 
     @property
     def noise(self) -> float:
-        """Upper bound on the rms noise of m0's velocity in the orders of the present frequency [m/s]."""
+        """Upper bound on the rms noise of m0's velocity at the measured orders of the frequency [m/s]."""
         rms = Stroboscope.noise_of(self._silence, self.motion_hz, self.channels.sample_rate_hz)
         return rms * float(np.max(np.abs(self._to_velocity)))
 
@@ -245,7 +245,7 @@ def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz:
 
 
 def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
-    """Change the frequency, and with a level scale the setting as the rig's model predicts."""
+    """Change the frequency; if a base level is held, scale the setting as the rig's model predicts."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
         setting_vpp *= _bare_vpp(loop, level, frequency_hz)
@@ -297,7 +297,7 @@ def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseL
 
 
 _PROMPT = 0.8
-"""Fraction of an error in decibels that is corrected at once."""
+"""Fraction of the deviation of m0's amplitude [dB] that one correction of the drive removes."""
 _IN_A_ROW = 2
 
 
@@ -333,7 +333,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
-    """Return response [m], ratio of m0 to base, and base acceleration [m/s2], from the newer periods."""
+    """Return response [m], ratio m0 / base, base acceleration [m/s2], from the newer half of the periods."""
     periods, frequency_hz = loop.periods, loop.setting.frequency_hz
     newer = slice(periods.count // 2, None)
     base, response = periods.base[newer], periods.response[newer, 1]

@@ -16,7 +16,7 @@ from ..recording import Steadiness
 # estimated from the recorded drive, gives the beginning of each drive period in the converter's time.
 
 _MEMORY = 40
-"""Number of blocks whose phases give the frequency; enough for an accurate straight-line fit."""
+"""Number of blocks to whose phases a line is fitted; its slope gives the frequency accurately enough."""
 
 
 class DriveClock:
@@ -143,7 +143,7 @@ class Stroboscope:
 
     @staticmethod
     def noise_of(signal: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-        """Return the rms noise of a silent channel, shape (samples,), in the orders of ``frequency_hz``."""
+        """Return the rms noise of a silent channel, shape (samples,), at the `ORDERS` of ``frequency_hz``."""
         turns = frequency_hz / sample_rate_hz
         count = int((len(signal) - 1) * turns)
         if count < 1:
@@ -221,7 +221,7 @@ class Judgement:
     period: int
     """Number of drive periods after which the motion repeats; 0 if it does not."""
     scatter: float
-    """Rms distance of the points from the means of their ``period`` clusters; of one cluster if it is 0."""
+    """Rms distance of samples from the means of ``period`` clusters; of one cluster if ``period`` is 0."""
     scatter_u: float
     """Standard uncertainty of the scatter."""
     noise: float
