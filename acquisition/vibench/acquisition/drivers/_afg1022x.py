@@ -99,7 +99,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def playing(self) -> Shape:
-        """Shape that is set; raises InstrumentError after a failed change."""
+        """Shape of the signal that is set up; raises InstrumentError after a failed change."""
         _ = self.panel_vpp
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
@@ -298,7 +298,7 @@ class AFG1022X(ScpiInstrument):
         """Set a sine of the smallest amplitude, without modes and offset, from any state."""
         # *RST is not used: its effect on the output of this model is not documented.
         self._end_modes()
-        self.offset_v = 0.0  # first: it lowers the peak at any amplitude
+        self.offset_v = 0.0  # the offset first, because this lowers every peak
         self._mute()
         self._select(None)
         self._set_frequency(_QUIET_FREQUENCY_HZ)

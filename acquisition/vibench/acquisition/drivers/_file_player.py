@@ -75,7 +75,7 @@ class FilePlayer:
 
     @property
     def identity(self) -> Identity:
-        """Id of the recording, and whether it was measured or simulated."""
+        """Identifier of the recording, and whether it was measured or simulated."""
         made = self._recording
         reply = f"{made.path.name}, recorded {made.started_utc}, {made.origin.value}"
         return Identity("", "recording", made.recording_id, "", reply, origin=made.origin.value)

@@ -46,7 +46,7 @@ class GeneratorModel:
     highest_hz: dict[Shape, float]
     memory_points: tuple[int, int]
     top_code: int
-    """Codes of the memory run from 0 to this."""
+    """Largest code in the waveform memory; the smallest code is 0."""
     burst_cycles: tuple[int, int]
     usb_ids: tuple[tuple[int, int], ...] = ()
     longest_sweep_s: float = 0.0
