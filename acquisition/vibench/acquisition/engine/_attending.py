@@ -18,13 +18,13 @@ from ._wire import ANSWERS, Message, receive, send
 BEAT_S = 0.04
 """Interval between heartbeats to the engine [s]."""
 STOPPED = ("T", "t", "Z", "X")
-"""States of a Linux process that is stopped or dead."""
+"""Letters in ``/proc`` for the state of a process that is suspended or dead (Linux)."""
 LEAST_OWN = 0.25
-"""Smallest fraction of the time without an input byte that counts; the rest may be waits for a processor."""
+"""Fraction of the time without an input byte that always counts; the rest may be waits for a processor."""
 
 
 class _Program:
-    """State of the parent program as seen from this process; ``/proc`` gives more details."""
+    """State of the parent program, from its bytes on the standard input and from ``/proc``."""
 
     def __init__(self) -> None:
         self._folder = Path(f"/proc/{os.getppid()}")
@@ -37,7 +37,7 @@ class _Program:
 
         While it can run (state R), only its processor time counts: Linux reports a wait only after its end.
         """
-        lived_s = self._lived_s  # read before the clock: the next byte may come in between
+        lived_s = self._lived_s  # read before the clock, because a byte may arrive in between
         now_s, worked_s = monotonic(), self._worked_s
         seen_s, lived_then_s, worked_then_s = self._seen_s
         self._seen_s = (now_s, lived_s, worked_s)
@@ -68,7 +68,7 @@ class _Program:
     def _follow(self) -> None:
         while os.read(sys.stdin.fileno(), 65536):
             self._lived_s = monotonic()
-        os._exit(0)  # even while the other thread waits
+        os._exit(0)  # ends the process even while the other thread waits
 
 
 def main() -> None:

@@ -52,14 +52,14 @@ REFUSAL_S = 0.2
 
 
 class Announcement(Program):
-    """An engine of this user on this computer: a program that accepts requests, not only stops."""
+    """An engine of this user on this computer; it accepts all requests, not only requests to stop."""
 
     address: EngineAddress
 
 
 @contextmanager
 def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
-    """Let `announced_engines` find this engine within the context; files that request a stop call ``press``.
+    """Let `announced_engines` find this engine within the context; ``press`` is called for each stop file.
 
     Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """

@@ -280,14 +280,14 @@ class JobQueue:
             while (job := self._jobs.get()) is not None:
                 self._do(job)
         finally:
-            with suppress(AcquisitionError):  # the engine has published it
+            with suppress(AcquisitionError):  # the engine has published the error
                 self._engine.close()
 
     def _do(self, job: Job) -> None:
         try:
             job()
         except AcquisitionError:
-            pass  # the engine has published it
+            pass  # the engine has published the error
         except Exception as error:  # noqa: BLE001 - any error must silence the bench and be published
             self._engine.fault(error)
         request = self._engine.switch.request

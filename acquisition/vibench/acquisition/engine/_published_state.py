@@ -237,7 +237,7 @@ class PublishedState:
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         """Update the status after a block."""
         run = progress.run
-        if progress.path != self._file:  # another attempt at one point is another recording
+        if progress.path != self._file:  # each attempt at a point is a new recording
             self._begin(progress, bench)
         self.sample_buffer.add(run.block)
         self._overloads += len(run.block.overloads)
@@ -263,7 +263,7 @@ class PublishedState:
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Publish the result of a recording; one kept from before counts as done for its planned time."""
+        """Publish the result of a recording; a recording kept from before counts with its planned time."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:

@@ -111,7 +111,7 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
 STALL_S = 0.2
 """A longer interval between two checks of the viewers shows that this process was stalled [s]."""
 LATE_FACTOR = 4.0
-"""The time allowed without requests grows by this times this process's delay: viewers share the computer."""
+"""Factor on this process's own delay, which extends the time allowed without requests (same computer)."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995

@@ -199,7 +199,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Most viewers (20 MB each if frozen); one more disconnects the viewer with the oldest request."""
+"""Most viewers (20 MB each if they do not read); one more disconnects the one with the oldest request."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 

@@ -170,7 +170,7 @@ def stop_engine(
     )
     if not _runs(engine):
         raise ended
-    reason = reason.encode(errors="replace").decode()  # a terminal's text may contain surrogates
+    reason = reason.encode(errors="replace").decode()  # text from a terminal may contain surrogates
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
             raise EngineError(
@@ -204,7 +204,7 @@ def stop_engine(
 
 
 def _runs(engine: Program) -> bool:
-    """Whether the process runs now; a function, because the answer changes during a stop."""
+    """Whether the process runs now; called again and again, because the answer changes during a stop."""
     return engine.is_alive
 
 

@@ -106,7 +106,7 @@ class ArmedPlan(FrozenModel):
     campaign: str
     folder: str
     lines: tuple[str, ...]
-    """Signal, level, limits, duration, and folder."""
+    """Lines of text on signal, level, limits, duration and folder."""
     expires_in_s: float
     """The engine disarms itself after this time."""
     attendance: Supervision
@@ -179,7 +179,7 @@ class EngineMessage(FrozenModel):
 
 
 class TwinStatus(FrozenModel):
-    """The live twin's last report: motion of m1 between its stops, numbers, and delay."""
+    """The live twin's last report: motion of m1 between its stops, estimated parameters, and delay."""
 
     pid: int = 0
     """Process number of the twin; 0 before its first report."""
