@@ -17,7 +17,7 @@ CREST_FACTOR = 4.5
 exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Number of random values per seed. Few make it cheap to start at any sample; many are faster to draw."""
+"""Number of random values per seed: a small number starts faster at any sample, a large one draws faster."""
 TRANSITION_WIDTH = 0.5
 """Transition width of the filter divided by the band's lower edge; the edges are its -6 dB points."""
 HAMMING_WIDTH = 3.3
