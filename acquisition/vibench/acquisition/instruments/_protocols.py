@@ -62,7 +62,7 @@ class Overload:
     """Role of the channel, ``"m0_velocity"`` for example."""
     first_sample: int
     last_sample: int
-    """Inclusive; counted from the first sample of the run."""
+    """Number of the last sample in the range; the first sample of the run is 0."""
 
 
 @dataclass(frozen=True)
