@@ -89,7 +89,7 @@ class SpecimenTracker:
 
 
 RMS_S = 1.0
-"""Averaging time of the rms current [s]; its limit is thermal."""
+"""Averaging time of the rms current [s], whose limit is due to heating."""
 REACTION = 1.1
 """Allowed force on the table, over the coil's force limit; above 1, because the specimen reacts too."""
 SETTLING_S = 0.5

@@ -229,7 +229,7 @@ class PhaseRunner:
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
             self._planned_hz = self._glided_hz
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
-            yield from self._catch_up()  # the first sample must be at the trigger
+            yield from self._catch_up()  # the segment must start at the trigger
         if phase.segment != self.loop.segment:
             self.loop.enter(None)  # exclude the time of the next command
         waits = self._drive.perform(commanded)
@@ -376,7 +376,7 @@ class PhaseRunner:
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
                 self._silence.note_heard()
-                with suppress(AcquisitionError):  # the measurement decides
+                with suppress(AcquisitionError):  # the measured drive decides, not this call
                     self._drive.silence()
                 self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
                 self.loop.cut()
