@@ -73,7 +73,7 @@ class KeptStops:
         for level, path in self._paths.items():
             try:
                 found = path.stat()
-            except OSError:  # no such stop, or no folder
+            except OSError:  # no stop of this level, or no folder
                 continue
             mark = (found.st_ino, found.st_mtime_ns)
             if self._obeyed.get(path) == mark:
@@ -83,7 +83,7 @@ class KeptStops:
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             self._taken.add(path)
             with suppress(OSError):
-                _answer(path, "silent").unlink(missing_ok=True)  # of an earlier stop
+                _answer(path, "silent").unlink(missing_ok=True)  # answer to an earlier stop
                 rename(path, _answer(path, "taken"))
         self.confirm()
 
@@ -453,7 +453,7 @@ def _sweep() -> None:
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
         start, _, rest = rest.rpartition(".")
-        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps by another computer
+        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps announced by another computer
         is_here = place_of(start) is Place.HERE
         if rest.startswith("silent-"):
             with suppress(OSError):
