@@ -1,9 +1,9 @@
-"""Amplifier, coil, table and specimen under sines: exact without contact, otherwise to first order.
+"""Amplifier, coil, table and specimen under sine voltages: exact without contact, else to first order.
 
 While collisions limit abs(p) to the gap, the fundamental of the stop force equals the force of a spring
-between m1 and m2 that reduces p to the gap. This is a first-order harmonic balance (as in Gong et al. 2025,
-eq. 5) with rigid stops without loss. The stop force acts along one coordinate, so the motion has a closed
-form: the sum of the motion without stops and the response to this force.
+between m1 and m2 that reduces abs(p) to the gap. This is a first-order harmonic balance (as in Gong et al.
+2025, eq. 5) with rigid stops without loss. The stop force acts along p only, so the motion has a closed form:
+the sum of the motion without stops and the response to this force.
 """
 
 from dataclasses import dataclass
@@ -16,18 +16,18 @@ from .loaded_shaker import Amplifier, FloatArray, Shaker
 
 ComplexArray = NDArray[np.complex128]
 SINE_COLUMNS = ("voltage", "current", "base", "m0", "p")
-"""Phasors at the coil [V, A] and of displacements [m], absolute except p, for the factor exp(+i w t)."""
+"""Voltage and current at the coil [V, A], displacements [m] (absolute, except p): phasors for exp(+i w t)."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """Response to voltage and stop force at n frequencies; the columns are SINE_COLUMNS."""
+    """Response to voltage and to stop force at n frequencies; columns as in `SINE_COLUMNS`."""
 
     per_volt: ComplexArray
-    """Motion without contact per volt at the amplifier's input, shape (n, 5)."""
+    """Motion without contact, per volt at the amplifier's input, shape (n, 5)."""
     per_newton: ComplexArray
-    """Motion per newton of stop force, positive on m1 and negative on m2, shape (n, 5)."""
+    """Motion per newton of stop force, which acts on m1 and oppositely on m2, shape (n, 5)."""
 
     @property
     def lever(self) -> ComplexArray:
@@ -40,14 +40,14 @@ class LinearMotion:
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
 
     def under(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
-        """Return the motion under sines of given amplitudes, shape (n, 5).
+        """Return the motion under sine voltages of given amplitudes, shape (n, 5).
 
         Parameters
         ----------
         volts
-            Amplitude at the amplifier's input for each frequency, shape (n,), or for all [V].
+            Amplitude at the amplifier's input [V], one for each frequency, shape (n,), or one for all.
         gap_m
-            Gap, to which the stops limit abs(p) [m]; infinite without stops.
+            Gap, the largest abs(p) that the stops allow [m]; infinite without stops.
         """
         free = (
             self.per_volt * np.broadcast_to(np.asarray(volts, dtype=np.float64), len(self.per_volt))[:, None]
@@ -56,10 +56,10 @@ class LinearMotion:
         return np.asarray(free + self.per_newton * push[:, None])
 
     def volts_for(self, base_m: ArrayLike, gap_m: float) -> FloatArray:
-        """Return the amplitudes at the amplifier's input for base amplitudes ``base_m``, shape (n,) [V]."""
+        """Return the amplitudes at the amplifier's input that give base amplitudes ``base_m``, (n,) [V]."""
         free, by_push = self.per_volt, self.per_newton
         per_base = free[:, _P] / free[:, _BASE]
-        # Response of p to the stop force while the voltage is adjusted to keep the base motion unchanged.
+        # Response of p to the stop force while the voltage keeps the base motion constant.
         on_held_base = by_push[:, _P] - per_base * by_push[:, _BASE]
         held_m = np.asarray(base_m, dtype=np.float64)
         push = _push(per_base * held_m, on_held_base, gap_m)
@@ -69,7 +69,7 @@ class LinearMotion:
 def linear_motion(
     amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: ArrayLike
 ) -> LinearMotion:
-    """Return the response to sines of the equations in `LoadedShaker`, without impacts and limits.
+    """Return the response of the equations in `LoadedShaker` to sine voltages, without impacts and limits.
 
     With the coil impedance Z and the force constant G, the equation of coil and table is (m s^2 + d s + k +
     s G^2/Z) x = (G/Z) u + k0 (x0 - x) + c0 s (x0 - x) (Beranek, Acoustics, ch. 3; Gong et al. 2025, eq. 1).
@@ -79,7 +79,7 @@ def linear_motion(
     amplifier, shaker
         Amplifier and shaker; limits of voltage, current and stroke are ignored.
     specimen
-        Specimen on the table; None for a bare table, with m0 and p zero.
+        Specimen on the table; None for a bare table, for which m0 and p are zero.
     frequency_hz
         Frequencies, zero or positive, shape (n,) [Hz].
     """
@@ -91,7 +91,7 @@ def linear_motion(
         + (shaker.suspension_damping_ns_per_m + shaker.force_constant_n_per_a * per_volt_n) * s
         + shaker.suspension_stiffness_n_per_m
     )
-    # Output voltage over input voltage, shape of ``s``.
+    # Output over input voltage of the amplifier, shape of ``s``.
     low_cut = 2 * np.pi * amplifier.low_cut_hz
     below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
     voltage = np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))

@@ -1,8 +1,8 @@
 """Amplifier, coil, table and specimen under a voltage, with the specimen's force on the table.
 
-All quantities are means over a step: the voltage is constant in a step, and the integrals of base
-acceleration and m0 velocity are known at both ends. Means over a step do not alias impacts. They refer to the
-centre of the step, so that all channels agree in phase.
+All results are means over a time step. They are exact, because the voltage is constant in a step and the
+integrals of base acceleration and m0 velocity are known at both ends. Such means do not alias impacts. They
+refer to the centre of the step, so that all channels agree in phase.
 """
 
 import math
@@ -20,17 +20,17 @@ from ..specimen.specimen import Specimen
 FloatArray = NDArray[np.float64]
 
 STOP_STIFFNESS_N_PER_M = 2e5
-"""Assumed stiffness of the rubber stops at the ends of the stroke: 45 N compress them by 0.23 mm."""
+"""Assumed stiffness of the rubber stops at the ends of the table's stroke: 45 N compress them by 0.23 mm."""
 STOP_DAMPING_NS_PER_M = 50.0
-"""Assumed damping of the rubber stops: the table rebounds with about half its energy."""
+"""Assumed damping of these rubber stops: the table rebounds with about half its energy."""
 
 
 @dataclass(frozen=True)
 class Amplifier:
-    """Amplifier with a gain, two first-order band edges, and limits of voltage and current.
+    """Amplifier: gain, two first-order band limits, and limits of voltage and current.
 
-    The default amplifier passes all voltages unchanged, for a voltage recorded at the coil. Raises ValueError
-    when a number is not allowed.
+    The default amplifier does not change the voltage; use it for a voltage recorded at the coil. Raises
+    ValueError when a number is not allowed.
     """
 
     gain: float = 1.0
@@ -42,7 +42,7 @@ class Amplifier:
     clip_v: float = math.inf
     """Largest output voltage, peak [V]."""
     current_limit_a: float = math.inf
-    """Largest current, peak [A]; the amplifier limits its voltage accordingly."""
+    """Largest current, peak [A]; the amplifier reduces its voltage to keep it."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
@@ -81,7 +81,7 @@ class Shaker:
     suspension_stiffness_n_per_m: float
     suspension_damping_ns_per_m: float
     force_constant_n_per_a: float
-    """Force per current [N/A], equal to voltage per table velocity [V s/m] (Beranek, Acoustics, ch. 3)."""
+    """Force per current [N/A], equal to induced voltage per table velocity [V s/m] (Beranek, ch. 3)."""
     coil_resistance_ohm: float
     """Resistance of coil and cable [ohm]."""
     coil_inductance_h: float
@@ -119,14 +119,14 @@ class Shaker:
 
 
 MOTION_COLUMNS = ("base_displacement", "base_velocity", "current", "x", "y", "z", "vx", "vy", "vz")
-"""State of shaker and specimen at the end of a step, in SI units; x, y and z are absolute."""
+"""States of shaker and specimen at the end of a step, in SI units; x, y and z are absolute."""
 _SHAKER_SIZE = 3
 _CONTACT_TOLERANCE = Accuracy.STANDARD.tolerance
 
 
 @dataclass(frozen=True)
 class ShakenMotion:
-    """Motion in consecutive steps; values are means over a step, shape (steps,)."""
+    """Motion in consecutive time steps; values are means over a step, shape (steps,)."""
 
     amplifier_voltage: FloatArray
     """Voltage at the coil [V]."""
@@ -135,13 +135,13 @@ class ShakenMotion:
     m0_velocity: FloatArray
     """Absolute velocity of m0 [m/s]."""
     ends: FloatArray
-    """States at the ends of the first steps, columns MOTION_COLUMNS, shape (rows, 9); empty by default."""
+    """States at the ends of the first ``rows`` steps, columns MOTION_COLUMNS, shape (rows, 9)."""
     begun: FloatArray
-    """Number of contacts up to the end of each block of steps, shape (blocks,); empty by default."""
+    """Number of contacts up to the end of each block of steps, shape (blocks,); may be empty."""
 
     @classmethod
     def of(cls, count: int, end_rows: int, block: int = 0) -> Self:
-        """Return arrays for ``count`` steps, ``end_rows`` states, and contacts in blocks of steps."""
+        """Return arrays for ``count`` steps, ``end_rows`` states, and a contact count per ``block`` steps."""
         ends, begun = (
             np.empty((end_rows, len(MOTION_COLUMNS))),
             np.empty(math.ceil(count / block) if block else 0),
@@ -150,16 +150,16 @@ class ShakenMotion:
 
 
 class MotionFailed(ArithmeticError):
-    """Error: the motion is no longer finite, or a contact makes no progress; the shaker cannot continue."""
+    """Error: the motion is not finite, or a contact makes no progress; this shaker cannot be used further."""
 
 
 class LoadedShaker:
     """Amplifier, shaker and specimen, driven by the voltage at the amplifier's input.
 
-    Coil and table are solved exactly for a voltage and a force that are constant in a step. The specimen is
-    solved exactly between impacts, which are integrated within a step (native/cubic.hpp). The specimen's
-    force on the table is extrapolated and constant in a step, which causes a relative error of about (omega
-    h)^2 / 12 in the motion due to it (docs/decisions/0006-virtual-rig.md). Use in one thread at a time.
+    Coil and table are solved exactly for a voltage and a force that are constant in a time step. The specimen
+    is solved exactly between impacts; impacts are integrated within a step (native/cubic.hpp). Its force on
+    the table is extrapolated and constant in a step, which causes a relative error of (omega h)^2 / 12 in the
+    motion due to this force (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class LoadedShaker:
         step_s: float,
         start: ArrayLike = (0.0,) * 6,
     ) -> None:
-        """Start with the table at rest.
+        """Begin with the table at rest.
 
         Raises ValueError when the step is not positive and finite, or the start is not allowed.
 
@@ -185,7 +185,7 @@ class LoadedShaker:
         """
         engine = native_engine()
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
-        """Structure of native/structures.hpp that the engine advances."""
+        """The `LoadedShaker` of native/structures.hpp that the engine advances."""
         self.step_s = step_s
         """Length of a step [s]."""
         self._place(specimen, start)
@@ -213,7 +213,7 @@ class LoadedShaker:
 
     @property
     def impacts(self) -> int:
-        """Number of contacts since the start."""
+        """Number of contacts since the beginning."""
         return int(self.structure["impacts"])
 
     @property
@@ -226,9 +226,9 @@ class LoadedShaker:
         self.structure["gain"] = gain
 
     def change_specimen(self, specimen: Specimen) -> None:
-        """Continue with another specimen, from the state of the present specimen.
+        """Replace the specimen by another, which continues from the current state.
 
-        Raises ValueError when this state is not allowed for the new specimen.
+        Raises ValueError when the new specimen cannot have this state.
         """
         self._place(specimen, np.array(self.structure["specimen"]["motion"]))
 
@@ -243,7 +243,7 @@ class LoadedShaker:
     ) -> ShakenMotion:
         """Advance by one step for each value of ``drive_v``, and return the motion.
 
-        Raises MotionFailed when the motion is no longer finite; the shaker cannot continue.
+        Raises MotionFailed when the motion is not finite; this shaker cannot be used further.
 
         Parameters
         ----------
@@ -252,9 +252,9 @@ class LoadedShaker:
         noise_v
             Voltage that is added at the amplifier's output [V], shape (steps,).
         end_rows
-            Number of first steps for which the state at the end is stored.
+            Number of first steps for which the state at the end of the step is stored.
         block
-            Number of steps in a block for counting contacts; 0 for no counts.
+            Number of steps after each of which contacts are counted; 0 for no counts.
         """
         drive = np.ascontiguousarray(drive_v, np.float64)
         motion = ShakenMotion.of(len(drive_v), end_rows, block)
@@ -264,12 +264,12 @@ class LoadedShaker:
         return motion
 
     def move_into(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
-        """Advance as `move` does, and write the motion into given arrays."""
+        """Advance as `move` does, but write the motion into given arrays."""
         self.prepare(motion, drive_v, noise_v)
         self.account(native_engine().call("move_shaker", self.structure), len(drive_v))
 
     def prepare(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
-        """Set the arrays that the engine reads and fills in the next steps."""
+        """Set the arrays that the engine reads and writes in the next steps."""
         native_engine().fill(
             self.structure,
             drive=drive_v,
@@ -282,7 +282,7 @@ class LoadedShaker:
         )
 
     def account(self, good: int, count: int) -> None:
-        """Raise MotionFailed if only ``good`` of ``count`` steps were completed."""
+        """Raise MotionFailed if only the first ``good`` of ``count`` steps were completed."""
         if good < count:
             raise MotionFailed(
                 f"The specimen's motion was lost after {good} of {count} steps: it is not finite, or a "
@@ -291,5 +291,5 @@ class LoadedShaker:
 
 
 def _mean_of_decay(steps_per_time_constant: float) -> float:
-    """Return the mean of exp(-t) over t from zero to the argument; 1 for an argument of zero."""
+    """Return the mean of exp(-t) for t from zero to the argument; 1 if the argument is zero."""
     return -math.expm1(-steps_per_time_constant) / steps_per_time_constant if steps_per_time_constant else 1.0

@@ -1,7 +1,7 @@
 """Motion of shaker and specimen under a sampled voltage, at the times of its samples.
 
-The voltage is resampled to the steps of a `LoadedShaker`, and the motion is resampled to the samples of the
-voltage, as band-limited signals (Shannon). Recordings are processed piece by piece to limit memory. SI units.
+The voltage is resampled to the time steps of a `LoadedShaker`, and the motion is resampled to the samples of
+the voltage, both as band-limited signals. Recordings are processed in pieces to limit memory. SI units.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,18 +19,18 @@ from .loaded_shaker import Amplifier, FloatArray, LoadedShaker, Shaker
 ComplexArray = NDArray[np.complex128]
 Singles = NDArray[np.float32]
 Gain = Callable[[FloatArray], ComplexArray]
-"""Function that returns the complex gain of a sensor at frequencies [Hz], of the same shape."""
+"""Function that returns a sensor's complex gain at frequencies [Hz], shape of its argument."""
 
 FINEST_STEP_HZ = 5e4
-"""Smallest step rate; the specimen's force on the table then has an error of 5e-4 at 600 Hz."""
+"""Lowest step rate [Hz]; the specimen's force on the table then has a relative error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
-"""End of the pass band over the sample rate; a cosine edge to half the rate follows, as in a converter."""
+"""End of the pass band over the sample rate. A cosine edge to half the rate follows, as in a converter."""
 _MARGIN = 2048
-"""Samples on each side of a piece that are also filtered; the impulse responses beyond are below 1e-8."""
+"""Samples on each side of a piece that are filtered too; farther impulse responses are below 1e-8."""
 _PIECE = 1 << 15
-"""Number of samples that are filtered together."""
+"""Number of samples in a piece, which is filtered at once."""
 _BLOCK_S = 0.02
-"""Length of the blocks in which impacts are counted [s]."""
+"""Length of the blocks after which impacts are counted [s]."""
 
 
 def identity(frequency_hz: FloatArray) -> ComplexArray:
@@ -40,23 +40,23 @@ def identity(frequency_hz: FloatArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class DrivenTable:
-    """Amplifier, shaker, specimen and sensors."""
+    """Model of a test bench: amplifier, shaker, specimen and sensors."""
 
     amplifier: Amplifier
-    """Amplifier; use the default for a voltage at the coil."""
+    """Amplifier; the default one if the voltage is that at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
-    """Gain of the sensor of the base acceleration."""
+    """Complex gain of the sensor of the base acceleration."""
     m0_sensor: Gain = identity
-    """Gain of the sensor of the m0 velocity; a delay is a falling phase."""
+    """Complex gain of the sensor of the m0 velocity; a delay is a falling phase."""
     base_low_cut_hz: float = 0.0
     """-3 dB frequency of the first-order AC coupling of the base channel [Hz]; 0 for DC coupling."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """Outputs of the sensors, shape (samples,), in single precision, far below converter noise."""
+    """Outputs of the sensors, shape (samples,); single precision is far finer than converter noise."""
 
     base_acceleration: Singles
     """Base acceleration [m/s2]."""
@@ -84,8 +84,8 @@ def follow_voltage(
     table
         Amplifier, shaker, specimen and sensors.
     volts
-        Voltage at the amplifier's input, or at the coil with the default amplifier, finite, shape
-        (samples,) [V]. It should be zero at both ends.
+        Voltage at the amplifier's input (at the coil with the default amplifier), shape (samples,) [V];
+        finite, and zero at both ends.
     start
         Initial x, y, z, vx, vy, vz of the specimen in the inertial frame, shape (6,) [m, m/s].
     """
@@ -106,7 +106,7 @@ def follow_voltage(
         motion = shaken.move(fine, block=block)
         impacts.append(motion.begun)
         tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
-        # Filtering the last samples requires the motion after them, except at the end of the record.
+        # The last samples can be filtered only with the motion after them, except at the end of the record.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         seen = resampling.samples(tail, gains)[:, done - held : upto - held]
@@ -121,20 +121,20 @@ def follow_voltage(
 
 
 class _Resampling:
-    """Resampling of samples to steps, and of means over steps to samples after a sensor and a converter.
+    """Resampling of a voltage to time steps, and of means over steps to samples after sensor and converter.
 
-    Means over steps refer to half a step after the resampled voltage. Both shifts cancel.
+    A mean over a step refers to a time half a step after the resampled voltage. The two shifts cancel.
     """
 
     def __init__(self, sample_rate_hz: float, ratio: int, shaker: Shaker) -> None:
         self._sample_rate_hz = sample_rate_hz
         self._ratio = ratio
         self._shaker = shaker
-        # Weights are reused, because all pieces of a record except the last have the same length.
+        # Filter weights are stored, because all pieces of a record except the last have the same length.
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
     def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the end of each piece of samples, and the mean voltage of its steps."""
+        """Yield the last sample of each piece, and the mean voltages of its steps."""
         ratio = self._ratio
         block = max(1, round(_BLOCK_S * self._sample_rate_hz))
         length = ceil(_PIECE / block) * block
@@ -159,7 +159,7 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Return factors for the spectral lines of ``size`` samples: to steps, or from steps via a sensor."""
+        """Return factors for spectral lines of ``size`` samples: to steps, or from steps through a sensor."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
@@ -175,7 +175,7 @@ class _Resampling:
         return known
 
     def _held(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the mean coil current for a stepped over a continuous voltage, 1 - (omega h)^2 / 12."""
+        """Return the coil current under a stepped over that under a continuous voltage: 1 - (w h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s
         turns = self._sample_rate_hz * self._ratio * time_constant_s
