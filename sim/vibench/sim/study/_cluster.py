@@ -22,7 +22,7 @@ from ._software import software
 CONNECT_PATIENCE_S = 30.0
 """Longest wait for the scheduler, and then for its first worker [s]."""
 LOOK_AGAIN_S = 1.0
-"""Interval between queries of the number of workers [s]."""
+"""Shortest interval between two queries of the number of workers [s]."""
 RUNNING, CONNECTING = "running", "connecting"
 FINISHED, ERROR = "finished", "error"
 

@@ -23,10 +23,10 @@ from ._errors import InvalidStudy
 
 @dataclass(frozen=True)
 class Bundle:
-    """Scenes sent to a worker together, to reduce the overhead of short scenes."""
+    """Scenes that are sent to a worker together, because sending short scenes one by one is slow."""
 
     numbers: tuple[int, ...]
-    """Number of the study's point for each scene."""
+    """Number of the point in the study, for each scene."""
     scenes: tuple[Scene, ...]
 
 
@@ -36,21 +36,21 @@ class Reply:
 
     bundle: Bundle
     solved: tuple[Solved, ...]
-    """Results in the order of the scenes; incomplete after a cancellation or an error."""
+    """Results in the order of the scenes; fewer after a cancellation or an error."""
     error: BaseException | None = None
-    """Error that prevented the remaining results."""
+    """Error that prevented the results that are absent."""
 
 
 class Executor(Protocol):
-    """Executor of bundles. Every bundle gets a reply even if workers are lost; replies come in any order."""
+    """Executor of bundles. Every bundle gets a reply, in any order, even if workers are lost."""
 
     @property
     def description(self) -> str:
-        """Description of the executor for the file."""
+        """Description of the executor, for the file."""
 
     @property
     def slots(self) -> int:
-        """Number of bundles computed at the same time; it may change, even to 0."""
+        """Number of bundles that can be computed at the same time; it may change, even to 0."""
 
     def submit(self, bundle: Bundle) -> None:
         """Add a bundle to the queue."""
@@ -62,7 +62,7 @@ class Executor(Protocol):
         """
 
     def cancel(self) -> Sequence[Reply]:
-        """Start no further scenes, and return the remaining replies. May be called at any time."""
+        """Start no more scenes, and return the replies still due. May be called at any time."""
 
     def close(self) -> None:
         """Release all workers. May be called at any time."""
@@ -77,7 +77,7 @@ _solved_before: set[Kind] = set()
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
     """Solve scenes, in batches or one by one; yield each result with its processor time.
 
-    Times are recorded for later estimates, except for the first scene of a kind, which may load modules.
+    Times are recorded for later estimates, except for the first scene of each kind, which may load modules.
     """
     for group in [scenes] if isinstance(solver, InBatches) else [[scene] for scene in scenes]:
         kinds: list[Kind] = [
@@ -122,7 +122,7 @@ class ThreadExecutor:
 
     @property
     def description(self) -> str:
-        """Description of the executor for the file."""
+        """Description of the executor, for the file."""
         return f"{self._workers} thread(s)"
 
     @property
@@ -141,7 +141,7 @@ class ThreadExecutor:
         return empty_queue(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:
-        """Start no further scene, even within a bundle; wait for running scenes and return their replies."""
+        """Start no more scenes, not even of a started bundle; return replies when running scenes end."""
         self._is_cancelled.set()
         self._pool.shutdown(wait=True, cancel_futures=True)
         return self.replies(0.0)
@@ -164,7 +164,7 @@ class ThreadExecutor:
 
 
 def empty_queue(arrivals: queue.SimpleQueue[Item], timeout_s: float) -> list[Item]:
-    """Return all items of a queue; wait at most ``timeout_s`` for the first."""
+    """Return all items now in a queue; wait at most ``timeout_s`` for the first one."""
     items: list[Item] = []
     try:
         items.append(arrivals.get(timeout=timeout_s))

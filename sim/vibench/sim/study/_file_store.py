@@ -1,10 +1,10 @@
-"""File of a running study, which remains valid if the process is killed.
+"""File of a running study, which stays valid if the process is killed.
 
-Results are written in the order cells, sync, states, sync. If the process or the power fails at any time,
-every point with the state DONE has all its cells.
+Results are written in this order: numbers, flush, states, flush. If the process or the power fails at any
+time, every point with the state DONE has all its numbers.
 
-HDF5 creates the file with all metadata and space for all results, and closes it. After that only bytes at
-known offsets are written, so that no crash can leave the file inconsistent.
+HDF5 creates the file with all metadata and with space for all results, and closes it. Afterwards only bytes
+at known offsets are written, so that no crash can leave the file inconsistent.
 """
 
 import shutil
@@ -27,14 +27,14 @@ from ._software import software
 from ._store import Arrays, PointAnswer, put
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
-"""Longest wait for a reader to close the file, and time between attempts [s]; a writer keeps it longer."""
+"""Longest wait for a reader to close the file, and time between attempts to lock it [s]."""
 
 
 def sole_writer(path: Path) -> OpenFile:
     """Open a file for writing, with a lock while it is open.
 
-    Readers open the file only briefly. Raises StudyError when another process keeps the file open longer, as
-    a writer does, or when the file cannot be opened.
+    Readers keep the file open only briefly. Raises StudyError when another process keeps it open longer, as a
+    writer does, or when the file cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -69,18 +69,18 @@ _COMPONENTS = {
         ),
     )
 }
-"""Axes for columns with several components, by name."""
+"""Additional axes of columns with several components, by name."""
 HEAD_BYTES = 2_000_000
-"""Upper bound on the size of sessions, axes and attributes [bytes]."""
+"""Upper bound on the size of everything in the file except the columns [bytes]."""
 
 
 def make_file(path: Path, plan: layout.GridPlan) -> None:
-    """Create the file of a plan with all points missing; after an error, leave no file.
+    """Create the file of a plan, with all points missing; if that fails, leave no file.
 
     Raises StudyError when the file exists, the folder does not exist, or the disk is too full.
     """
     try:
-        path.open("xb").close()  # only one of two runs can create the file
+        path.open("xb").close()  # of two runs at the same time, only one can create the file
     except FileExistsError:
         raise StudyError(
             f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."
@@ -161,7 +161,7 @@ def _scale(file: h5py.File, axis: layout.StudyAxis) -> h5py.Dataset:
 
 
 def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h5py.Dataset:
-    """Create a contiguous dataset for a column, filled with its missing value."""
+    """Create a contiguous dataset for a column, in which all values are missing."""
     whole = shape if column.components == 1 else (*shape, column.components)
     kind = np.dtype(column.dtype)
     stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
@@ -179,7 +179,7 @@ def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h
 
 
 def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
-    """Set attributes; text is UTF-8 of fixed length, because old readers require it."""
+    """Set attributes; text is stored as UTF-8 of fixed length, as old readers require."""
     for name, value in values.items():
         match value:
             case str():
@@ -191,10 +191,10 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 
 
 class FileStore:
-    """Store in the file of a study; as a context manager, it closes the file.
+    """Store in the file of a study; as a context manager it closes the file.
 
-    Raises StudyError when the file belongs to another study, is being written by another run, or is not the
-    file of a study.
+    Raises StudyError when the file is not that of a study, contains another study, or is being written by
+    another run.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class FileStore:
             _require_same(path, read_plan(path, type(plan)), plan)
             self._places = places_of(path, plan)
             self.arrays = read_arrays(path, plan)
-            """Results stored so far."""
+            """All results in the file."""
         except BaseException:
             self._disk.close()
             raise
@@ -220,7 +220,7 @@ class FileStore:
         return cls(path, plan)
 
     def begin(self, executor: str) -> None:
-        """Write time, software and executor into the next row of the sessions."""
+        """Record a session: time, software and executor."""
         self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
         for (name, width), text in zip(layout.SESSION_COLUMNS.items(), texts, strict=True):
@@ -232,9 +232,9 @@ class FileStore:
         self._sync()
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Write results: first their cells, then their states.
+        """Write the results of points: first their numbers, then their states.
 
-        Raises StudyError after a write error; earlier results are kept.
+        Raises StudyError after a write error; results written before are safe.
         """
         for answer in answers:
             cells = {**answer.cells, layout.SESSION: self._session}
@@ -248,7 +248,7 @@ class FileStore:
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Write filled-in points, as whole columns: first cells, then states."""
+        """Write filled-in points, as whole columns: first numbers, then states."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
             self._write(self._places.columns[name], self.arrays[name].tobytes())
@@ -297,11 +297,11 @@ def _require_same(path: Path, kept: layout.GridPlan, requested: layout.GridPlan)
 
 
 SHOWN = 60
-"""Largest number of characters of a value in a message."""
+"""Largest number of characters of a value that a message shows."""
 
 
 def _difference(name: str, kept: layout.GridPlan, requested: layout.GridPlan) -> str:
-    """Return text that states how a field of two plans differs; for lists, the first difference."""
+    """Return text that says how a field differs between two plans; for lists, the first difference."""
     there, here = (plan.model_dump(mode="json")[name] for plan in (kept, requested))
     match there, here:
         case [*some], [*others]:

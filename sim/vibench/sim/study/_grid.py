@@ -1,4 +1,4 @@
-"""Content of the file of a study: a grid of points over named axes, columns with units, and the layout.
+"""Content of the file of a study: points on a grid over named axes, columns with units, and the layout.
 
 ``docs/studies.md`` describes the file for users of h5py, xarray or MATLAB.
 """
@@ -19,10 +19,10 @@ from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2
-"""Version of the format, incremented when older readers would misread the file."""
+"""Version of the file format; it increases if older readers would misread the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""HDF5 versions that give superblock 0, which all readers since HDF5 1.8 support, including MATLAB."""
+"""HDF5 versions for which HDF5 writes superblock 0; all readers since HDF5 1.8 support it, also MATLAB."""
 
 STUDY = "study_json"
 STATE = "state"
@@ -33,7 +33,7 @@ COUNTER_DTYPE = "<i8"
 
 
 class PointState(IntEnum):
-    """State of a point, which is written after its results."""
+    """State of a point, which is written after its numbers."""
 
     MISSING = 0
     """The point has not been computed."""
@@ -44,28 +44,28 @@ class PointState(IntEnum):
     FAILED = 3
     """The scene could not be computed; ``message`` contains the reason. Numbers are NaN."""
     FILLED = 4
-    """The point of a map was not computed but interpolated, because its neighbours agree."""
+    """The point of a map was interpolated, not computed, because its neighbours agree."""
 
 
 SESSION_COLUMNS = {"started_utc": 32, "software_json": 512, "executor": 160}
-"""Columns of the sessions and their sizes [bytes]; a session is the first run of a study or a resumption."""
+"""Columns of the table of sessions, with sizes [bytes]. A session is a run or a resumption of the study."""
 MOST_SESSIONS = 1024
-"""Number of rows for sessions; all further sessions use the last row."""
+"""Number of rows of this table; all further sessions use the last row."""
 
 
 Cell = float | int | bytes | tuple[float, ...]
 
 REAL, WHOLE = "<f8", "<i4"
 MISSING_WHOLE = -1
-"""Value of a missing whole number or flag; ``_FillValue`` of the CF conventions."""
+"""Value of a missing integer or flag; ``_FillValue`` in the CF conventions."""
 COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
 MOST_FOUND = 8
-"""Number of stored motions of an ensemble, in the order of decreasing share."""
+"""Largest number of stored motions of an ensemble, the most frequent first."""
 IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
-"""Longest stored text [bytes]; longer texts are cut."""
+"""Longest stored text [bytes]; longer text is cut off."""
 
 TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
 CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
@@ -75,7 +75,7 @@ MEMORY, STARTS = "start_memory", "starts_followed"
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity of all points."""
+    """One stored quantity of all points."""
 
     name: str
     dtype: str
@@ -85,13 +85,13 @@ class Column:
     meanings: tuple[str, ...] = ()
     """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """Number of components; if more than one, the array has an additional last axis."""
+    """Number of components; if there are several, the array has an additional last axis."""
     along: str = COORDINATE
     """Name of the additional axis."""
 
     @property
     def missing(self) -> float | int | bytes:
-        """Return the value that marks a missing result."""
+        """Value that marks a missing result."""
         match self.dtype[:2]:
             case "<f":
                 return math.nan
@@ -104,7 +104,7 @@ class Column:
 
 
 def _meanings(kind: type[Enum]) -> tuple[str, ...]:
-    """Return one word for each member of an enum, as the CF conventions require for flags."""
+    """Return one word per member of an enum, as the CF conventions require for flags."""
     return tuple(member.name.lower() for member in kind)
 
 
@@ -135,7 +135,7 @@ NUMBERS = {
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
 }
-"""Columns by the field of `ScenePrediction` that they store."""
+"""Columns by the field of `ScenePrediction` whose value they store."""
 
 
 def _of_motion(name: str, dtype: str, long_name: str, meanings: tuple[str, ...] = ()) -> Column:
@@ -152,13 +152,13 @@ FOUND_NUMBERS = {
     "error_estimate": _of_motion("found_error", REAL, "relative error of its responses, estimated"),
     "starts": _of_motion("found_starts", WHOLE, "number of starts that reach this motion"),
 }
-"""Columns by the field of `FoundMotion` that they store."""
+"""Columns by the field of `FoundMotion` whose value they store."""
 FOUND_SHARE = {
     "share": _of_motion("found_share", REAL, "share of starts that reach this motion"),
     "low": _of_motion("found_share_low", REAL, "lower end of its interval"),
     "high": _of_motion("found_share_high", REAL, "upper end of its interval"),
 }
-"""Columns by the field of `Share` that they store."""
+"""Columns by the field of `Share` whose value they store."""
 ENSEMBLE_NUMBERS = {
     "starts": Column(STARTS, WHOLE, "1", "number of starts with sensitive dependence on the start"),
     "requested_motion": Column("found_asked", WHOLE, "1", "index of the motion from the requested start"),
@@ -166,7 +166,7 @@ ENSEMBLE_NUMBERS = {
     "scatter": Column("scatter_of_starts", REAL, "1", "relative deviation of Response I over starts"),
     "followed_s": Column("followed_in_all", REAL, "s", "total simulated time of all starts"),
 }
-"""Columns by the field of `Ensemble` that they store."""
+"""Columns by the field of `Ensemble` whose value they store."""
 ESCAPE_NUMBERS = {
     "rate_per_s": Column("escape_rate", REAL, "s-1", "rate at which chaos dies out"),
     "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
@@ -174,7 +174,7 @@ ESCAPE_NUMBERS = {
     "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
     "chaotic_s": Column("chaotic_time", REAL, "s", "total time of chaos of all starts"),
 }
-"""Columns by the field of `EscapeRate` that they store."""
+"""Columns by the field of `EscapeRate` whose value they store."""
 OTHERS = (
     Column(MOTION, WHOLE, "", "kind of the final motion", _meanings(MotionKind)),
     Column(MEMORY, WHOLE, "", "whether the start decides which motion is reached", _meanings(StartMemory)),
@@ -203,11 +203,11 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Grid:
-    """Grid of points, numbered in C order: the index of the last axis changes fastest."""
+    """Grid of points, numbered in C order: the index along the last axis changes fastest."""
 
     shape: tuple[int, ...]
     is_ordered: tuple[bool, ...]
-    """Whether neighbouring points along each axis are similar: True for frequencies, False for models."""
+    """Whether neighbours along each axis are similar: True for frequencies, False for models."""
 
     @property
     def size(self) -> int:
@@ -215,7 +215,7 @@ class Grid:
         return math.prod(self.shape)
 
     def place(self, number: int) -> tuple[int, ...]:
-        """Return the index of a point along each axis."""
+        """Return the index of a point along each axis, from its number."""
         place = []
         for length in reversed(self.shape):
             number, index = divmod(number, length)
@@ -223,7 +223,7 @@ class Grid:
         return tuple(reversed(place))
 
     def neighbours(self, number: int) -> Iterator[int]:
-        """Yield the neighbouring points along the ordered axes."""
+        """Yield the numbers of the neighbouring points along the ordered axes."""
         stride, rest = 1, number
         for length, is_ordered in zip(reversed(self.shape), reversed(self.is_ordered), strict=True):
             rest, index = divmod(rest, length)
@@ -242,7 +242,7 @@ MODEL = "model"
 
 @dataclass(frozen=True)
 class StudyAxis:
-    """One dimension of the arrays of a study."""
+    """One axis of the arrays of a study."""
 
     name: str
     values: tuple[float | str, ...]
@@ -253,12 +253,12 @@ class StudyAxis:
 
     @property
     def is_ordered(self) -> bool:
-        """Whether the values are numbers, so that neighbouring points are similar."""
+        """Whether the values are numbers, so that neighbours along the axis are similar."""
         return bool(self.units)
 
 
 class GridPlan(FrozenModel, ABC):
-    """Complete plan of a grid of points; equal plans have equal results."""
+    """Complete plan of a grid of points; equal plans give equal results."""
 
     called: ClassVar[str]
     """Name of this kind of plan in messages."""
@@ -268,7 +268,7 @@ class GridPlan(FrozenModel, ABC):
     @property
     @abstractmethod
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Dimensions of the results, in order."""
+        """Axes of the results, in order."""
 
     @property
     @abstractmethod
@@ -287,7 +287,7 @@ class GridPlan(FrozenModel, ABC):
         """Return the drive frequency at a position of the grid [Hz]."""
 
     def phase_after(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> float:
-        """Return the drive phase at the end of a computed point, for a run that continues from it [rad]."""
+        """Return the drive phase [rad] at the end of a point, from which another point continues."""
         frequency_hz = self.frequency_at(self.grid.place(number))
         turns = math.fmod(frequency_hz * float(arrays[DURATION][number]), 1.0)
         return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][number]), 2.0 * math.pi)

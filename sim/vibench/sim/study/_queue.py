@@ -1,4 +1,4 @@
-"""Run a study with a queue of points, on any executor; results are stored as they arrive."""
+"""Solve the points of a study from a queue, on any executor; store results as they arrive."""
 
 import heapq
 import math
@@ -21,16 +21,16 @@ from ._grid import FINAL_STATE, MESSAGE, TAKEN, Grid, PointState
 from ._store import Arrays, PointAnswer, Store, cut_text, is_failed, states
 from ._study import Start
 
-# A point is ready when the point that it continues is done. The longest ready point is started first.
+# A point that continues another one is ready when that one is done. The longest ready point is started first.
 #
-# The time of a point is first estimated from its plan, later from the times of its neighbours.
+# The time of a point is estimated from its plan, and from its neighbours once these are done.
 
 SHORTEST_S = 1e-6
-"""Shortest assumed time of a point [s], to keep ratios finite."""
+"""Shortest assumed time of a point [s]; avoids division by zero."""
 
 
 class Costs:
-    """Estimated times of points, improved as points finish.
+    """Estimated computing times of points, which improve as neighbouring points are done.
 
     A run takes about 4 us per impact, and neighbouring points have similar numbers of impacts. The time of a
     neighbour is therefore a better estimate than the plan.
@@ -44,11 +44,11 @@ class Costs:
         self._is_informed = np.zeros(grid.size, dtype=np.bool_)
 
     def estimate_s(self, number: int) -> float:
-        """Return the expected time of a point on one worker [s]."""
+        """Return the expected computing time of a point on one worker [s]."""
         return float(self._estimate_s[number])
 
     def learn(self, number: int, taken_s: float) -> Iterator[int]:
-        """Record the time of a point; yield the neighbours whose estimates change."""
+        """Record the computing time of a point; yield the neighbours whose estimates change."""
         self._taken_s[number] = max(taken_s, SHORTEST_S)
         for each in self._grid.neighbours(number):
             if np.isnan(self._taken_s[each]):
@@ -58,9 +58,9 @@ class Costs:
                 yield each
 
     def left_s(self, is_missing: NDArray[np.bool_]) -> float:
-        """Return the total worker time of the points marked in ``is_missing``, shape (points,) [s].
+        """Return the total computing time of the points marked in ``is_missing``, shape (points,) [s].
 
-        Planned times of points without a finished neighbour are scaled by actual over planned time so far.
+        For points without a finished neighbour it is the planned time, times actual over planned time so far.
         """
         known = ~np.isnan(self._taken_s)
         off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0
@@ -70,14 +70,14 @@ class Costs:
 
 
 NOBODY = -1
-"""Value in place of a predecessor, for a point that does not continue another."""
+"""Number in place of a predecessor, for a point that continues no other point."""
 
 
 class PointScheduler:
-    """Remaining points in the order in which they are started.
+    """Points still to be computed, in the order in which they are started.
 
-    The longest point is started first, which keeps all workers busy to the end. The time of a point includes
-    all points that wait for it. Each point is taken once, unless it is put back.
+    The longest point is started first, which keeps all workers busy to the end. Its time includes all points
+    that continue it. Each point is taken once, unless it is put back.
     """
 
     def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
@@ -86,7 +86,7 @@ class PointScheduler:
         self._is_done = is_done.copy()
         self._is_released = np.zeros(len(after), dtype=np.bool_)
         self.left = 0
-        """Number of released points without a result."""
+        """Number of released points that have no result yet."""
         self._is_out = np.zeros(len(after), dtype=np.bool_)
         self._is_alone = np.zeros(len(after), dtype=np.bool_)
         self._next = np.full(len(after), NOBODY, dtype=np.int64)
@@ -96,7 +96,7 @@ class PointScheduler:
         self._queue: list[tuple[float, int]] = []
 
     def release(self, numbers: NDArray[np.int64]) -> None:
-        """Allow these points to be started, unless they have a result."""
+        """Allow these points to be started, except those that have a result."""
         new = numbers[~self._is_released[numbers]]
         self._is_released[new] = True
         self.left += int(np.count_nonzero(~self._is_done[new]))
@@ -106,16 +106,16 @@ class PointScheduler:
 
     @property
     def released(self) -> int:
-        """Number of released points, including those with a result."""
+        """Number of released points, also of those with a result."""
         return int(np.count_nonzero(self._is_released))
 
     @property
     def is_missing(self) -> NDArray[np.bool_]:
-        """Whether a point is released and has no result, shape (points,); includes running points."""
+        """Whether each point is released and has no result (perhaps it is running), shape (points,)."""
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Return the longest ready point, and more up to a total of ``worth_s`` or ``most`` points."""
+        """Return the longest ready point, and more points up to ``worth_s`` in total and ``most``."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:
@@ -133,13 +133,13 @@ class PointScheduler:
         return tuple(taken)
 
     def learn(self, number: int, taken_s: float) -> None:
-        """Record the time of a point, which improves the estimates of its neighbours."""
+        """Record the computing time of a point, which improves the estimates of its neighbours."""
         for changed in self._costs.learn(number, taken_s):
             if self._is_ready(changed):
                 self._push(changed)
 
     def finish(self, number: int) -> None:
-        """Mark a point as done, so that a point that continues it may start."""
+        """Mark a point as done, so that the point that continues it may start."""
         self._is_done[number] = True
         self.left -= 1
         self._is_out[number] = False
@@ -148,12 +148,12 @@ class PointScheduler:
             self._push(follower)
 
     def put_back(self, number: int) -> None:
-        """Put a taken point back into the queue."""
+        """Put a point that was taken back into the queue."""
         self._is_out[number] = False
         self._push(number)
 
     def put_back_alone(self, number: int) -> None:
-        """Put a point whose bundle failed back into the queue, to be run in a bundle of its own."""
+        """Put a point back whose bundle failed, to be run in a bundle of its own."""
         self._is_alone[number] = True
         self.put_back(number)
 
@@ -171,7 +171,7 @@ class PointScheduler:
         heapq.heappush(self._queue, (-self._weight(number), number))
 
     def _pop(self) -> int | None:
-        """Return the longest ready point; drop entries with a result or an outdated estimate."""
+        """Return the longest ready point; drop entries that are done or have an outdated estimate."""
         while self._queue:
             weight, number = heapq.heappop(self._queue)
             if self._is_ready(number) and -weight == self._weight(number):
@@ -179,7 +179,7 @@ class PointScheduler:
         return None
 
     def _times_behind(self) -> NDArray[np.float64]:
-        """Return the planned time of all points that wait for each point, shape (points,) [s]."""
+        """Return the planned time of all points that must wait for each point, shape (points,) [s]."""
         behind = np.zeros(len(self._after))
         for last in np.flatnonzero(self._next == NOBODY):
             number, sum_s = int(last), 0.0
@@ -192,39 +192,39 @@ class PointScheduler:
 
 
 MOST_IN_BUNDLE = 64
-"""Most points in a bundle, because all their results are lost if a worker is lost."""
+"""Largest number of points in a bundle; limits the results that are lost with a worker."""
 SHARE = 8
-"""Remaining work per worker over the largest bundle; lets all workers end at about the same time."""
+"""Remaining work per worker over the largest bundle; so all workers end at about the same time."""
 QUEUED_PER_SLOT = 2
-"""Bundles per worker: a running one and a waiting one, so that no worker is idle."""
+"""Number of bundles per worker: one runs and one waits, so that no worker is idle."""
 LOOK_S = 0.2
-"""Interval between checks for a cancellation [s]."""
+"""Interval between two checks for cancellation [s]."""
 
 
 class StudyEnd(StrEnum):
-    """Reason for the end of a session."""
+    """Reason why a session ended."""
 
     COMPLETE = "complete"
     CANCELLED = "cancelled"
 
 
 PLANNED = 2000
-"""Most points whose time is planned individually; in a larger grid, every n-th point stands for the next n
-points."""
+"""Largest number of points whose time is planned one by one; in a larger grid, one point stands for several
+neighbours."""
 
 
 class Points(ABC):
-    """The points of a plan as scenes, which are created on demand, and the choice of points to compute."""
+    """Points of a plan: their scenes, which are created on demand, and which of them to compute."""
 
     bundle_s: float
-    """Largest worker time of a bundle [s]."""
+    """Largest computing time of a bundle [s]."""
 
     def __init__(self, grid: Grid, starts: Sequence[object], solver: Solver) -> None:
         self.grid, self._starts, self._solver = grid, starts, solver
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """Number of the point that each point continues, or NOBODY, shape (points,)."""
+        """Number of the point that each point continues, or `NOBODY`, shape (points,)."""
         blocks = np.full(self.grid.shape, NOBODY)
         numbers = np.arange(self.grid.size).reshape(self.grid.shape)
         for index, start in enumerate(self._starts):
@@ -243,7 +243,7 @@ class Points(ABC):
         return self.times_s()
 
     def times_s(self, *, may_repeat: bool = True) -> Floats:
-        """Return the expected time of each point, shape (points,) [s]; 0 for scenes that are not allowed."""
+        """Return the expected computing time of each point, (points,) [s]; 0 for a forbidden scene."""
 
         def time_s(number: int) -> float:
             try:
@@ -256,7 +256,7 @@ class Points(ABC):
         return np.repeat(some, every)[: self.grid.size]
 
     def predecessor(self, number: int, arrays: Arrays) -> int:
-        """Return the point that a point continues; NOBODY if none, or if its final state is not finite."""
+        """Return the number of the point to continue; `NOBODY` if none, or if its state is not finite."""
         before = int(self.after[number])
         if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
             return NOBODY
@@ -265,24 +265,24 @@ class Points(ABC):
     def scene(self, number: int, arrays: Arrays) -> Scene:
         """Return the scene of a point; the point that it continues, if any, must be done.
 
-        If that point has no finite final state, the scene starts without it. Raises ValueError when a scene
-        with these values is not allowed.
+        If that point has no finite final state, the scene has the plan's start instead. Raises ValueError
+        when a scene with these values is not allowed.
         """
         before = self.predecessor(number, arrays)
         return self.unchained(number) if before == NOBODY else self.continued(number, before, arrays)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Return the result that is stored for a scene that failed with an error."""
+        """Return what is stored for a scene that raised an error."""
         message = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
         return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(message)})
 
     @abstractmethod
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points to compute next, from the results so far; called whenever all are done."""
+        """Return the points to compute next, given the results so far; called whenever all are done."""
 
     @abstractmethod
     def unchained(self, number: int) -> Scene:
-        """Return the scene of a point that does not continue another."""
+        """Return the scene of a point that continues no other point."""
 
     @abstractmethod
     def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
@@ -290,7 +290,7 @@ class Points(ABC):
 
     @abstractmethod
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the values to store for a prediction."""
+        """Return what is stored for the solution of a point."""
 
 
 def run_points(
@@ -300,7 +300,7 @@ def run_points(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the requested points that are missing in the store, until ``cancelled``; see `run_study`."""
+    """Compute the wanted points that are missing in the store, until ``cancelled``; as `run_study`."""
     session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)
@@ -317,7 +317,7 @@ def run_points(
 
 
 class _Session:
-    """One session of a study: the first run or a resumption."""
+    """One session of a study: its first run, or a resumption."""
 
     def __init__(self, points: Points, executor: Executor, store: Store) -> None:
         self._executor = executor
@@ -339,7 +339,7 @@ class _Session:
 
     @property
     def is_unfinished(self) -> bool:
-        """Whether any requested point is missing."""
+        """Whether any wanted point is missing."""
         return self._scheduler.left > 0
 
     def feed(self) -> None:
@@ -371,17 +371,17 @@ class _Session:
         if answers and not self.is_unfinished:
             self._scheduler.release(self._points.wanted(self._store.arrays))
         if answers and math.isnan(self._first_s):
-            # Measure the speed of the workers after the first results, because workers need time to start.
+            # Measure the speed of the workers from the first results on, because workers need time to start.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> Progress:
-        """Return the number of done and of all points, the remaining time, and the failures."""
+        """Return the number of done points and of all points, the remaining time, and the failures."""
         released = self._scheduler.released
         note = f"{self._failed} failed" if self._failed else ""
         return Progress(released - self._scheduler.left, released, self._left_s(), note)
 
     def _left_s(self) -> float | None:
-        """Return the remaining time from the speed of the workers so far [s]; None before it is known."""
+        """Return the remaining time [s], from the speed of the workers so far; None if unknown."""
         if not self.is_unfinished:
             return 0.0
         if self._taken_s == 0.0:
@@ -389,14 +389,14 @@ class _Session:
         return self._work_left_s * (time.monotonic() - self._first_s) / self._taken_s
 
     def _look(self) -> None:
-        """Update the remaining work at most every `LOOK_S`, because there may be millions of points."""
+        """Update the remaining work, at most every `LOOK_S`, because there may be millions of points."""
         now_s = time.monotonic()
         if now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s
             self._work_left_s = self._costs.left_s(self._scheduler.is_missing)
 
     def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
-        """Yield the results of a reply; put points without a result back into the queue."""
+        """Yield the results in a reply; put points without a result back into the queue."""
         self._out -= 1
         numbers = reply.bundle.numbers
         for number, scene, solved in zip(numbers, reply.bundle.scenes, reply.solved, strict=False):

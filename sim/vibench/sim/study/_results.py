@@ -1,4 +1,4 @@
-"""Results of a study so far: arrays over its axes, with NaN for unknown values, and states."""
+"""Results of a study so far: arrays over its axes, in which unknown numbers are NaN, and states."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -26,18 +26,18 @@ Plan = TypeVar("Plan", bound=GridPlan)
 
 @dataclass(frozen=True)
 class Places:
-    """Byte offsets of the datasets that are written during a run."""
+    """Byte offsets, in the file, of the datasets that are written during a run."""
 
     columns: Mapping[str, int]
     session_columns: Mapping[str, int]
     n_sessions: int
     sessions: int
-    """Number of recorded sessions."""
+    """Number of sessions that are already recorded."""
 
 
 @dataclass(frozen=True)
 class Session:
-    """One session: the first run of a study, or a resumption."""
+    """One session of a study: its first run, or a resumption."""
 
     started_utc: str
     software_json: str
@@ -51,7 +51,7 @@ def read_plan(path: Path, kind: type[Plan]) -> Plan:
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
-    """Return all columns of a file, shape (points, ...) each; points being computed are missing.
+    """Return all columns of a file, shape (points, ...) each; points without a result are missing.
 
     Raises StudyError when the file cannot be read, or contains another kind of plan.
     """
@@ -69,7 +69,7 @@ def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
 
 
 def places_of(path: Path, plan: GridPlan) -> Places:
-    """Return the byte offsets of the datasets that are written during a run."""
+    """Return the byte offsets, in the file, of the datasets that are written during a run."""
     with _open_store(path, type(plan)) as file:
         group = file[layout.SESSIONS]
         return Places(
@@ -81,7 +81,7 @@ def places_of(path: Path, plan: GridPlan) -> Places:
 
 
 def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
-    # Read the states first, so that results that arrive during reading are ignored in all columns.
+    # Read the states first: results that arrive while reading are then ignored in all columns.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
     arrays: Arrays = {layout.STATE: state}
@@ -100,7 +100,7 @@ def _offset(dataset: "h5py.Dataset") -> int:
 
 @contextmanager
 def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
-    # Import here, because results in memory do not need h5py.
+    # Imported here, because results in memory do not need h5py.
     from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     wanted = f"give the path of a {kind.called}'s file"
@@ -108,8 +108,8 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
         what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
         raise StudyError(f"{path} {what}; {wanted}.")
     try:
-        # Use HDF5's default lock, which is compatible with the writer's lock. HDF5 does not allow another
-        # kind of lock if this process has already opened the file, for example in xarray.
+        # Use HDF5's default lock, which is compatible with the writer's. HDF5 refuses another kind of lock if
+        # this process has already opened the file, for example through xarray.
         file = open_hdf5(path)
     except UnsafeHdf5 as error:
         raise StudyError(f"{path} was not read: {error}") from error
@@ -150,9 +150,9 @@ def _plan(path: Path, file: "h5py.File", kind: type[Plan]) -> Plan:
 
 Value = float | str
 SHOWN_VALUES = 8
-"""Largest number of values of an axis in a message."""
+"""Largest number of values of an axis that a message lists."""
 SAME = 1e-9
-"""Relative tolerance within which a number equals a value of an axis."""
+"""Relative tolerance within which a given number is a value of an axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,13 +161,13 @@ class GridResults(Generic[Plan]):
 
     plan: Plan
     arrays: Mapping[str, NDArray[np.generic]]
-    """Arrays by the name of their column, with one row per point, as in the file."""
+    """Columns by name, with one row per point, as in the file."""
     sessions: tuple[Session, ...] = ()
-    """Sessions in which the results were computed; empty for a study in memory."""
+    """Sessions in which the results were computed; empty if the study is only in memory."""
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Dimensions of the arrays."""
+        """Axes of the arrays."""
         return self.plan.axes
 
     @property
@@ -186,16 +186,16 @@ class GridResults(Generic[Plan]):
         return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
 
     def values(self, name: str, **fixed: Value) -> Floats:
-        """Return one quantity over the axes that are not fixed; unknown values are NaN.
+        """Return one quantity over the axes that are not fixed; unknown numbers are NaN.
 
         Raises InvalidStudy when there is no such column, axis or value.
 
         Parameters
         ----------
         name
-            Name of a column that contains numbers, such as ``"response_i"``.
+            Name of a numeric column, such as ``"response_i"``.
         **fixed
-            Fixed values of axes, which are removed from the result: ``amplitude=5e-6, model="hertz"``.
+            Values of axes, which then are no axes of the result: ``amplitude=5e-6, model="hertz"``.
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"
@@ -213,7 +213,7 @@ class GridResults(Generic[Plan]):
         return np.asarray(whole[self._place(fixed)])
 
     def failures(self) -> Iterator[tuple[dict[str, Value], str]]:
-        """Yield coordinates and reason of each failure: a scene that is not allowed, or a lost run."""
+        """Yield coordinates and reason of each failure: a forbidden scene, or a run that did not finish."""
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.STOPPED) | (state == PointState.FAILED)):
             why = ENDED if state[number] == PointState.STOPPED and ENDED in self.arrays else MESSAGE
@@ -237,7 +237,7 @@ class StudyResults(GridResults[Study]):
 
     @property
     def study(self) -> Study:
-        """Study whose results these are."""
+        """The study that was computed."""
         return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:
@@ -271,7 +271,7 @@ class StudyResults(GridResults[Study]):
 def open_study(path: Path | str) -> StudyResults:
     """Return the results in the file of a study, complete or still being computed.
 
-    Raises StudyError if the file is not that of a study, or has another format version.
+    Raises StudyError if the file does not contain a study, or has another format version.
     """
     path = Path(path)
     study = read_plan(path, Study)

@@ -1,4 +1,4 @@
-"""Software versions, to check whether two machines compute the same results."""
+"""Versions of the software, which show whether two machines compute the same results."""
 
 import json
 import platform

@@ -1,4 +1,4 @@
-"""Solve a study with its workers and its store in one call."""
+"""Solve a study, with executor and store, in one call."""
 
 import hashlib
 import json
@@ -37,9 +37,9 @@ from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
 from ._study import GivenStart, Study, continued_from, study_solver
 
-# Scenes of the points of a study, and the results that are stored.
+# Points of a study: their scenes, and what is stored.
 #
-# The identity of a scene is a digest of its content, which is the same in every process and on every machine.
+# The identity of a scene is a digest of its content, the same in every process and on every machine.
 
 _scenes = TypeAdapter(Scene)
 
@@ -52,8 +52,8 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     scene
         Scene. The digest depends on every bit of its numbers, but not on the order of its fields.
     continued
-        Identity of the scene that this scene continues, if any. It replaces the initial state and phase,
-        which are results of that scene.
+        Identity of the scene that this scene continues, if any. It replaces initial state and phase in the
+        digest, because these are results of that scene.
     """
     content = _scenes.dump_python(scene, mode="python")
     # The name of the start does not change the motion.
@@ -70,12 +70,12 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
 
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Worker time of a bundle [s], which is long compared with a transfer of a few milliseconds on a cluster; and
-worker time of a bundle that is solved in SIMD batches [s]."""
+"""Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; the same
+for bundles that are solved in SIMD batches [s]."""
 
 
 class Expansion(Points):
-    """The points of a study as scenes."""
+    """Points of a study: their scenes, and what is stored."""
 
     def __init__(self, study: Study) -> None:
         super().__init__(study.grid, study.starts, study_solver(study))
@@ -87,7 +87,7 @@ class Expansion(Points):
         return np.arange(len(arrays[FINAL_STATE]))
 
     def unchained(self, number: int) -> Scene:
-        """Return the scene of a point that does not start from another point's final state."""
+        """Return the scene of a point that continues no other point."""
         place = self.grid.place(number)
         start = self._study.starts[place[-2]]
         match start:
@@ -103,7 +103,7 @@ class Expansion(Points):
         return self._study.scene(self.grid.place(number), start, self._study.phase_after(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return the values to store for a prediction, with the start and the identity of its scene."""
+        """Return what is stored for a solved point, with the start and the identity of its scene."""
         before = self.predecessor(number, arrays)
         known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
         cells: dict[str, Cell] = {
@@ -119,7 +119,7 @@ class Expansion(Points):
 
 
 def planned_work_s(study: Study) -> float:
-    """Return the planned time of all points of a study on one core [s].
+    """Return the expected computing time of all points of a study on one core [s].
 
     No point is computed, except in pilot runs of about a second if points have a target.
 
@@ -135,7 +135,7 @@ def planned_work_s(study: Study) -> float:
 
 
 class ExistingStudy(StrEnum):
-    """Treatment of a file that already exists."""
+    """What to do with a file that already exists."""
 
     REFUSE = "refuse"
     RESUME = "resume"
@@ -155,7 +155,7 @@ def solve_study(
 ) -> StudyResults:
     """Compute a study, or the missing points of its file, and return the results.
 
-    Raises StudyError, for example for a file of another study, a full disk or a cluster that does not answer.
+    Raises StudyError, for example if the file has another study, the disk is full or a cluster is silent.
 
     Parameters
     ----------
@@ -164,8 +164,8 @@ def solve_study(
     out
         File for the results, ``NAME.h5``; None to keep them in memory.
     existing
-        Whether an existing file raises an error or is resumed. Resuming computes its missing points; a
-        missing file is created.
+        Whether to refuse an existing file, or to resume it, which computes its missing points and creates a
+        file that does not exist.
     workers
         Number of threads; None for one per processor.
     cluster
@@ -187,7 +187,7 @@ def solve_study(
 
 @contextmanager
 def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | ExistingWord) -> Iterator[Store]:
-    """Open the store of a plan: a new file, an existing file to resume, or memory."""
+    """Open the store of a plan: a new file, a file to be resumed, or memory."""
     existing = chosen(ExistingStudy, existing)
     if out is None:
         yield MemoryStore(plan)
@@ -227,17 +227,17 @@ def run_study(
 ) -> StudyEnd:
     """Compute every point that is missing in the store, the longest first.
 
-    Results do not depend on the executor or the order, because scenes are independent; a point that continues
-    another point waits for it. An error in a scene becomes the result of its point. Raises StudyError when
-    the store or the executor fails; results stored before are kept.
+    Results do not depend on the executor or the order of computation. A point that continues another point
+    waits for it. An error in a scene is stored as the result of its point. Raises StudyError when the store
+    or the executor fails; results stored before are safe.
 
     Parameters
     ----------
     study, executor, store
         Study, executor of its scenes, and store of the results.
     observer
-        Function called after every batch of results.
+        Function that is called after each group of results.
     cancelled
-        Function called between results; True ends the run.
+        Function that is called between results and returns True to end the run.
     """
     return run_points(Expansion(study), executor, store, observer, cancelled)

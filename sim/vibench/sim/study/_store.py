@@ -1,4 +1,4 @@
-"""Interface of the stores for results of a running study, and the store in memory."""
+"""Interface of the stores that receive the results of a running study, and the store in memory."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,18 +20,18 @@ Arrays = dict[str, NDArray[np.generic]]
 
 @dataclass(frozen=True)
 class PointAnswer:
-    """Results of one point, as they are stored."""
+    """Result of one point, as it is stored."""
 
     number: int
     state: layout.PointState
     cells: dict[str, layout.Cell]
-    """Values by the name of their column; other columns remain missing."""
+    """Values by column name; columns without a value stay missing."""
     taken_s: float = math.nan
     """Processor time [s]; NaN if unknown."""
 
 
 def empty_arrays(plan: layout.GridPlan) -> Arrays:
-    """Return arrays in which every point is missing, shape (points,) or (points, components)."""
+    """Return arrays in which every value is missing, shape (points,) or (points, components)."""
     return {
         column.name: np.full(_shape(column, plan.grid), column.missing, column.dtype)
         for column in plan.columns
@@ -41,15 +41,15 @@ def empty_arrays(plan: layout.GridPlan) -> Arrays:
 def put(
     arrays: Arrays, columns: Sequence[layout.Column], answer: PointAnswer
 ) -> Iterator[tuple[layout.Column, bytes]]:
-    """Write the cells of a result into the arrays; yield each column with its bytes for the file.
+    """Write a result into the arrays; yield each changed column with its bytes for the file.
 
-    The state is not included, because it is written after the cells.
+    The state is left out, because it must be written after all other values.
     """
     for column in columns:
         if column.name in answer.cells:
             values = arrays[column.name]
             values[answer.number] = answer.cells[column.name]
-            # Use a slice, because numpy removes the padding of a single text.
+            # A slice keeps the padding of text, which numpy removes from a single value.
             yield column, values[answer.number : answer.number + 1].tobytes()
 
 
@@ -58,7 +58,7 @@ def _shape(column: layout.Column, grid: layout.Grid) -> tuple[int, ...]:
 
 
 def is_failed(state: NDArray[np.uint8] | layout.PointState) -> NDArray[np.bool_]:
-    """Return whether a scene had an error or its run did not reach its end, shape of ``state``."""
+    """Return whether a scene raised an error or its run did not finish, shape of ``state``."""
     return np.isin(state, (layout.PointState.STOPPED, layout.PointState.FAILED))
 
 
@@ -68,20 +68,20 @@ def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:
 
 
 class Store(Protocol):
-    """Store of results. Points that already have a result are not computed."""
+    """Store of results; points that already have a result are not computed again."""
 
     @property
     def arrays(self) -> Arrays:
         """Results stored so far; do not change them."""
 
     def begin(self, executor: str) -> None:
-        """Record the start of a session and its executor."""
+        """Record that a session begins, and its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results; return when they are stored safely."""
+        """Store results; return when they are safe."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store interpolated points, by column, with the state FILLED."""
+        """Store interpolated points, given by column, with the state FILLED."""
 
 
 class MemoryStore:
@@ -101,14 +101,14 @@ class MemoryStore:
             self.arrays[layout.STATE][answer.number] = answer.state
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store interpolated points, by column, with the state FILLED."""
+        """Store interpolated points, given by column, with the state FILLED."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
         self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, layout.Cell]:
-    """Return the cells of a prediction, without values that were not requested or not found."""
+    """Return the values to store for a prediction, without those not requested or not known."""
     return {
         **_cells_of(prediction, layout.NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),
@@ -127,7 +127,7 @@ def _cells_of(value: object, columns: Mapping[str, layout.Column]) -> dict[str, 
 
 
 def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
-    """Return the cells of an ensemble; cells for its motions have one component per motion."""
+    """Return the values to store for an ensemble; columns of motions have one component per motion."""
     if ensemble is None:
         return {}
     kept = ensemble.motions[: layout.MOST_FOUND]
@@ -145,13 +145,13 @@ def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
 
 
 def _fill_places(column: layout.Column, values: list[float | None]) -> layout.Cell:
-    """Return the components of a column; unknown values and absent motions have the missing value."""
+    """Return the components of a column, with the missing value for unknown or absent motions."""
     filled = [column.missing if value is None else value for value in values]
     return tuple(filled + [column.missing] * (layout.MOST_FOUND - len(filled)))  # type: ignore[arg-type]
 
 
 def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
-    """Return the ensemble of a point from its cells; None if the point has no ensemble."""
+    """Return the ensemble of a point from the stored values; None if the point has none."""
     if _number(arrays[layout.STARTS][number]) is None:
         return None
     escape = _numbers_at(arrays, layout.ESCAPE_NUMBERS, number)
@@ -179,7 +179,7 @@ def prediction_at(
     accuracy: Accuracy | AccuracyWord,
     start: str,
 ) -> ScenePrediction:
-    """Return the prediction of a point from its cells and from the study.
+    """Return the prediction of a point, from the stored values and the study.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def prediction_at(
     number
         Number of the point.
     frequency_hz, amplitude_m, accuracy, start
-        Values of the study at this point.
+        Parameters of this point in the study.
     """
     x, y, z, vx, vy, vz = (float(value) for value in arrays[layout.FINAL_STATE][number].astype(np.float64))
     return ScenePrediction(
@@ -215,7 +215,7 @@ def cut_text(text: str) -> bytes:
 def _numbers_at(
     arrays: Arrays, columns: Mapping[str, layout.Column], at: int | tuple[int, int]
 ) -> dict[str, Any]:
-    """Return the numbers of a point, or of one of its motions, by field; None if missing."""
+    """Return the numbers of a point, or of one of its motions, by field name; None if missing."""
     return {field: _number(arrays[column.name][at]) for field, column in columns.items()}
 
 

@@ -26,13 +26,13 @@ from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_sp
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
-"""Most values of all ranges together; a larger number is probably a mistake."""
+"""Largest number of values of all ranges together; more are probably a mistake."""
 WHOLE = 1e-9
-"""Relative tolerance within which a range has a whole number of steps and includes its stop."""
+"""Relative tolerance within which a range has a whole number of steps and so includes its stop."""
 
 
 def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]:
-    """Return `start`, `start` + `step`, ... up to `stop`, which is included if it is reached exactly [Hz].
+    """Return `start`, `start` + `step`, ... up to `stop`, which is included if a step reaches it [Hz].
 
     Raises ValueError when the range is empty or too long.
     """
@@ -48,7 +48,7 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
 
 
 def expand_ranges(given: object) -> object:
-    """Return the value with tables of start, stop and step, also in lists, replaced by their numbers."""
+    """Replace each table of start, stop and step, also in lists, by its numbers; return the result."""
     match given:
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
             # Do not use isinstance, because true is also an int.
@@ -82,9 +82,9 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 
 
 MOST_POINTS = 10_000_000
-"""Most points of a study; the file then has 2 GB."""
+"""Largest number of points of a study; the file then has 2 GB."""
 AS_DESCRIBED = "as described"
-"""Label of an axis whose value is given by the specimen only."""
+"""Label of an axis on which no values were given, so that the specimen's value is used."""
 
 
 class Start(StrEnum):
@@ -98,7 +98,7 @@ class Start(StrEnum):
 
 
 class GivenStart(FrozenModel):
-    """Given initial state, which is the same for every point."""
+    """Given initial state, the same for every point."""
 
     label: Annotated[str, Field(min_length=1, max_length=60)]
     """Name of the start in the file and in results."""
@@ -146,17 +146,17 @@ def _own_gap(values: dict[str, Any]) -> tuple[float, ...] | None:
 
 
 def _described_specimen(values: dict[str, Any]) -> SpecimenTable:
-    """Return the specimen of a study that is being validated; the default specimen if it was not valid."""
+    """Return the specimen of a study being validated; the default specimen if the given one is not valid."""
     found: SpecimenTable = values.get("specimen") or usual_specimen()
     return found
 
 
 AXES_OF_SPECIMEN = 3
-"""Number of the first axes of a study, which define the specimen: contact law, damping, gap."""
+"""Number of leading axes of a study that define the specimen: contact law, damping, gap."""
 
 
 class Study(GridPlan):
-    """Complete request for predictions; equal studies have equal results."""
+    """Plan of a study; equal studies give equal results."""
 
     called: ClassVar[str] = "study"
     format: ClassVar[str] = FORMAT
@@ -164,35 +164,35 @@ class Study(GridPlan):
     specimen: SpecimenTable = Field(
         default_factory=usual_specimen, validation_alias=AliasChoices("specimen", "structure")
     )
-    """Name or path of a specimen, or a table that may start from one (``model``); by default the paper's."""
+    """Name or path of a specimen, or a table that may name one in ``model``; by default the paper's."""
     frequencies_hz: Frequencies
-    """Drive frequencies: a list of numbers and of tables with start, stop and step, or one such table."""
+    """Drive frequencies [Hz]: numbers, and tables of start, stop and step; or one such table."""
     amplitudes_m: Positive
-    """Amplitudes of the base displacement."""
+    """Amplitudes of the base displacement [m]."""
     models: Annotated[tuple[ContactWord, ...], Field(min_length=1, default_factory=_own_law)]
     """Contact laws, by their names in `vibench.sim.specimen`; by default that of the specimen."""
     damping_times_s: Annotated[NotNegative | None, Field(default_factory=_own_damping)]
-    """Ratios of damping to stiffness, c_i / k_i; by default that of the specimen."""
+    """Ratios of damping to stiffness, c_i / k_i [s]; by default that of the specimen."""
     gaps_m: Annotated[Positive | None, Field(default_factory=_own_gap)]
-    """Clearances at both stops; by default those of the specimen."""
+    """Clearances at both stops [m]; by default that of the specimen."""
     starts: Annotated[tuple[Start | GivenStart, ...], Field(min_length=1)] = (Start.REST,)
-    """Initial states of each point; the motion that is reached may depend on the initial state."""
+    """Initial states of each point, which may lead to different motions: rest, up, down, or given ones."""
     observe: tuple[StudyObservable, ...] = (Observable.RESPONSE,)
-    """Observed quantities. Sections and spectra, whose lengths differ, are available only for single
-    scenes."""
+    """Quantities to compute. Sections and spectra are available only for single scenes, because their lengths
+    differ."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Accuracy of every point."""
+    """Accuracy level of every point."""
     duration_s: PositiveFloat | Literal["auto"] = 30.0
-    """Length of each run; "auto" runs until the motion has settled."""
+    """Length of each run [s]; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
-    """Length of the observed window at the end of the run."""
+    """Length of the window at the end of the run, from which responses are taken [s]."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Processor time per point for following chaos further and, with sensitive dependence on the start, for
-    other starts."""
+    """Processor time per point [s] for integrating chaos further and, with sensitive dependence on the start,
+    for other starts."""
     error: TargetError | None = None
     """Requested relative error of each point, 0.01 or "1 %"; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
-    """Time limit per point, 2 or "2 s"; with only an error, one minute."""
+    """Limit of the computing time per point, 2 or "2 s"; one minute if only an error is given."""
 
     @model_validator(mode="after")
     def _target_stands_alone(self) -> Self:
@@ -213,7 +213,7 @@ class Study(GridPlan):
         """Raise ValueError for an unknown model or a window that is too short, before any computation."""
         for model in range(len(self.models)):
             for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
-                for end in (0, -1):  # the least and the greatest drive
+                for end in (0, -1):  # lowest and highest amplitude and frequency
                     self.scene((model, 0, gap, end, 0, end), Rest())
         return self
 
@@ -230,7 +230,7 @@ class Study(GridPlan):
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Dimensions of the results, in order."""
+        """Axes of the results, in order."""
         return (
             StudyAxis(MODEL, self.models, "", "contact law"),
             _axis("damping_time", self.damping_times_s, "s", "damping over stiffness of every link"),
@@ -277,7 +277,7 @@ class Study(GridPlan):
 
     @property
     def duration(self) -> FixedDuration | AutomaticDuration:
-        """Duration of every point."""
+        """Duration of the run of every point."""
         match "auto" if self.target is not None else self.duration_s:
             case "auto":
                 return AutomaticDuration(window_s=self.window_s)
@@ -286,7 +286,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Return an axis of numbers, or of one label if the value is given by the specimen."""
+    """Return an axis of numbers, or of the label `AS_DESCRIBED` if there are no numbers."""
     return (
         StudyAxis(name, (AS_DESCRIBED,), "", long_name)
         if values is None
@@ -295,18 +295,18 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
 
 
 def continued_from(frequency_hz: float) -> str:
-    """Return the name of a start that is the final state of the point at this frequency."""
+    """Return the name of a start that is the final state at this frequency [Hz]."""
     return f"end at {frequency_hz:g} Hz"
 
 
 OTHER_STARTS = 8
-"""Assumed number of runs for a point whose motion may depend sensitively on its start."""
+"""Assumed number of runs per point if the motion may depend sensitively on its start."""
 
 
 def study_solver(study: Study) -> Solver:
-    """Return the solver of a study: in batches, or one point after the other.
+    """Return the solver of a study: in batches, or one by one.
 
-    Batches require independent motions, a processor with wide registers and enough simulated time per
+    Batches need points that do not continue others, wide processor registers, and enough simulated time per
     specimen. Even then, stops other than Hertz contacts and the accuracy *reference* are solved one by one.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
@@ -317,15 +317,15 @@ def study_solver(study: Study) -> Solver:
 
 
 MOST_GAPS = 1000.0
-"""Ratio of base amplitude to gap above which a warning is given. At the paper's gap it means 45 mm, more than
-the stroke of any shaker."""
+"""Ratio of base amplitude to gap above which a warning is given; with the paper's gap it is an amplitude of
+45 mm, more than the stroke of any shaker."""
 WIDEST_M = 0.1
 """Gap above which a warning is given [m], because a specimen on a shaker is hardly larger."""
 _MICRO = 1e-6
 
 
 def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]) -> Iterator[str]:
-    """Yield warnings about implausible base amplitudes [m] and gaps [m]; a gap without a stop is infinite."""
+    """Yield warnings about implausible base amplitudes [m] and gaps [m] (infinite without a stop)."""
     gaps_m = tuple(gaps_m)
     largest_m, narrowest_m = max(amplitudes_m, default=0.0), min(gaps_m)
     if largest_m > MOST_GAPS * narrowest_m:
