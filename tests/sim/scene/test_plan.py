@@ -39,8 +39,8 @@ def test_a_contact_force_at_every_p_is_always_integrated():
     ("observable", "said"),
     [
         (Observable.LYAPUNOV, "A tangent vector is computed for the exponent."),
-        (Observable.SPECTRUM, "Samples are kept over the window"),
-        (Observable.SCATTER, "for their scatter"),
+        (Observable.SPECTRUM, "Samples are stored over the window"),
+        (Observable.SCATTER, "show the scatter"),
     ],
 )
 def test_only_requested_quantities_are_computed(observable, said):

@@ -139,8 +139,8 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return a number for each cell, shape (rows, columns), equal in cells that reach the same motions.
-    The motion of the first initial state and the set of all motions must agree. ``label`` is the number of
-    the motion of each point, shape (rows, initial states, columns).
+
+    ``label`` has the shape (rows, initial states, columns). The motion from the first must be the same too.
     """
     rows, starts, columns = label.shape
     if starts == 1:

@@ -1,7 +1,7 @@
 """Solve a scene with an error estimate.
 
-`Scene` contains specimen, drive, start, duration, observables and accuracy. `plan_scene` decides in advance
-whether a closed form suffices. `solve_scene` simulates the scene, measures the integration error by a
-stricter run, and estimates the scatter between windows of chaos (docs/accuracy.md). It returns a
-`ScenePrediction`, a flat, immutable record. Use `study` for many scenes.
+A `Scene` contains specimen, drive, start (initial state), duration, observables and accuracy. `plan_scene`
+decides beforehand whether a closed form suffices. `solve_scene` simulates the scene, measures the integration
+error by a second run with a smaller tolerance, and estimates how much chaotic responses scatter between
+windows (docs/accuracy.md). It returns a `ScenePrediction`, a flat record. Use `study` for many scenes.
 """

@@ -1,6 +1,6 @@
-"""Expected run times on this machine, from previous runs or, for scenes with a target, from a pilot run.
+"""Expected computing times on this machine, from previous runs or, for scenes with a target, a pilot run.
 
-A ledger stores the mean and scatter of the ratio of actual to planned time for every kind of run.
+A ledger stores, for every kind of run, mean and scatter of the logarithm of actual over planned time.
 """
 
 import atexit
@@ -28,16 +28,16 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Memory of the moving average: after this number of later runs, a run has a third of its weight."""
+"""Memory of the moving average, in runs; after that many later runs, a run has a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Largest logarithmic deviation used from one run, because the reached motion may be random."""
+"""Largest logarithmic deviation that one run may contribute, as its final motion may be an unusual one."""
 FEWEST = 3
 """Fewest runs of a kind for an estimate of its scatter."""
 UNKNOWN_FACTOR = 10.0
-"""Uncertainty factor of the estimate before any runs are known."""
+"""Uncertainty factor of an expected time without known runs of its kind."""
 LEAST_FACTOR = 1.5
 SURE, FEW = 2.0, 1.6
-"""Coefficients of an approximation to Student's t for 19 of 20 runs: t = SURE (1 + FEW / (runs - 1))."""
+"""Coefficients of an approximation to Student's t for 95 % of runs: t = SURE (1 + FEW / (runs - 1))."""
 SAVED_EVERY_S = 5.0
 
 
@@ -50,12 +50,12 @@ class _Kind:
     variance: float = 0.0
 
     def off(self, ratio: float) -> float:
-        """Return the logarithmic deviation of one run; it is limited once enough runs are known."""
+        """Return a run's logarithmic deviation from the mean, limited once enough runs are known."""
         off = math.log(ratio) - self.mean
         return off if self.runs < FEWEST else max(-SURPRISE, min(SURPRISE, off))
 
     def after(self, ratio: float) -> Self:
-        """Return the statistics after one more run, with fading memory (West, Comm. ACM 22 (1979) 532)."""
+        """Return the statistics with one more run; old runs fade (West, Comm. ACM 22 (1979) 532)."""
         runs = min(self.runs + 1, MEMORY)
         off, share = math.log(ratio) - self.mean, 1.0 / runs
         spread = (1.0 - share) * (self.variance + share * off * off)
@@ -63,32 +63,32 @@ class _Kind:
 
 
 MOST_FACTOR = 10.0
-"""Uncertainty factor above which an estimate is stated as a range only."""
+"""Uncertainty factor above which only a range of times is stated."""
 
 
 @dataclass(frozen=True)
 class Expected:
-    """Expected time of a job."""
+    """Expected computing time with its uncertainty."""
 
     time_s: float
     """Expected time on one core of this machine [s]."""
     factor: float
-    """Uncertainty factor: 19 of 20 such runs take between ``time_s / factor`` and ``time_s * factor``."""
+    """Uncertainty factor: 95 % of such runs take from ``time_s / factor`` to ``time_s * factor``."""
     runs: int
-    """Number of runs on which the estimate is based."""
+    """Number of known runs on which this is based."""
 
     def __str__(self) -> str:
         """Return the estimate as text."""
         time_s, factor = self.time_s, self.factor
         learnt = f"{self.runs} such runs" if self.runs >= FEWEST else "too few such runs"
         text = f"{time_s:.1g} s within a factor of {factor:.2g}"
-        if factor > 10.0:  # its centre would mislead
+        if factor > 10.0:  # a central value would mislead
             text = f"between {time_s / factor:.1g} and {time_s * factor:.1g} s"
         return f"Estimated time on one core: {text}, from {learnt} on this machine."
 
 
 class CostLedger:
-    """Run times by kind of run, shared by all threads of a process."""
+    """Computing times by kind of run, shared by all threads of a process."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -97,21 +97,21 @@ class CostLedger:
         self._saved_s = time.monotonic()
         self._is_new = False
         self._lately = deque[float](maxlen=MEMORY)
-        """Recent logarithmic deviations of all kinds of run, to detect a slower machine."""
+        """Logarithmic deviations of the latest runs of any kind, to detect that the machine became slower."""
 
     def expected(self, kind: str, planned_s: float) -> Expected:
-        """Return the expected time of a run; a new kind uses the statistics of a prefix of its name."""
+        """Return the expected time of a run; a new kind uses the statistics of a more general kind."""
         with self._lock:
             known, drift = self._known(kind), self._drift
         factor = UNKNOWN_FACTOR
         if known.runs >= FEWEST:
-            # Variance of a new run about the estimated mean: scatter of runs plus uncertainty of the mean.
+            # Variance of the next run about the estimated mean: scatter of runs plus uncertainty of the mean.
             spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
         return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
-        """Record the time of a run, which must not include loading of modules."""
+        """Record the computing time of a run [s], without the loading of modules."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
@@ -125,13 +125,13 @@ class CostLedger:
             self.save()
 
     def _known(self, kind: str) -> _Kind:
-        """Return the statistics of a kind, or of the longest prefix of its name with enough runs."""
+        """Return the statistics of a kind or, with too few runs, of the next more general kind."""
         enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
         return next((each for each in enough if each.runs >= FEWEST), _Kind())
 
     @property
     def _drift(self) -> float:
-        """Return the mean of the recent deviations of all kinds; 0 unless it is significant."""
+        """Return the mean deviation of the latest runs of any kind; 0 unless it is significant."""
         if len(self._lately) < MEMORY:
             return 0.0
         mean = math.fsum(self._lately) / MEMORY
@@ -139,7 +139,7 @@ class CostLedger:
         return mean if mean * mean * MEMORY > SURE * SURE * variance else 0.0
 
     def save(self) -> None:
-        """Write new statistics to the file, if its folder is writable."""
+        """Write new statistics to the file, if possible."""
         with self._lock:
             self._saved_s = time.monotonic()
             if not self._is_new:
@@ -153,13 +153,13 @@ class CostLedger:
 
 
 def _names(kind: str) -> list[str]:
-    """Return a kind, ``a/b/c``, and all its prefixes."""
+    """Return a kind, ``a/b/c``, then the more general kinds ``a/b`` and ``a``."""
     parts = kind.split("/")
     return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
 
 
 def _read(path: Path) -> dict[str, _Kind]:
-    """Return the saved statistics by kind; empty without a valid file."""
+    """Return the statistics by kind in a file; empty if there is no valid file."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         known = {
@@ -184,7 +184,7 @@ def cost_ledger() -> CostLedger:
         physics_digest(),
     )
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
-    with contextlib.suppress(OSError):  # without this folder nothing is saved
+    with contextlib.suppress(OSError):  # without this folder, statistics are not saved
         state_folder()
     ledger = CostLedger(state_place() / "costs" / f"{name}.json")
     atexit.register(ledger.save)
@@ -192,29 +192,29 @@ def cost_ledger() -> CostLedger:
 
 
 PILOTS, PILOT_S, PILOT_SHARE = 16, 1.0, 0.25
-"""Pilot runs of scenes with a target: most scenes, total time [s], and share of the remaining time for each
-scene."""
+"""Pilot runs of scenes with a target: largest number of scenes, total time [s], and share of the remaining
+time that each scene may use."""
 UNDECIDED = 3.0
-"""Assumed ratio of the time of a scene to the time of an inconclusive pilot run."""
+"""Assumed time of a scene over the time of its pilot run, if this run did not reach the target."""
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",
     InBatches(Question.MOTION): "settled in lanes",
     InBatches(Question.ANSWER): "in lanes",
 }
-"""Prefix of the kind in the ledger, for solvers other than `solve_scene`."""
+"""First part of the kind in the ledger, for solvers other than `solve_scene`."""
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
-    """Record the processor time of a scene, which must not include loading of modules and tables."""
+    """Record the processor time of a scene [s], without the loading of modules and tables."""
     plan = plan_scene(scene)
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 
 
 def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: bool = True) -> float:
-    """Return the expected time of a solver for a scene [s], from its recent runs or those of `solve_scene`.
+    """Return the expected computing time [s], from recent runs of this solver, else of `solve_scene`.
 
-    Raises ValueError when the specimen cannot be simulated.
+    ``may_repeat`` is False for an upper bound. Raises ValueError when the specimen cannot be simulated.
     """
     plan = plan_scene(scene)
     planned_s = plan.planned_s if may_repeat else plan.longest_planned_s
@@ -223,10 +223,10 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: b
 
 
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
-    """Return the mean time of ``count`` scenes with a target [s], from pilot runs of some of them.
+    """Return the mean computing time of ``count`` scenes with a target [s], from pilot runs of some.
 
-    Pilot runs are needed because the time depends on whether the motion is sensitive to its start, which is
-    not known in advance. The time of an invalid scene is zero.
+    Pilot runs are needed because the time depends on whether the motion depends sensitively on its start,
+    which is not known beforehand. An invalid scene counts as zero time.
     """
     ends_s, costs = time.monotonic() + PILOT_S, list[float]()
     for number in np.random.default_rng(count).permutation(count)[:PILOTS]:
@@ -252,7 +252,7 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
         return taken_s
     if report.needed_s is not None:
         return min(limit_s, report.needed_s[0])
-    # Without a requested error, all the time is used.
+    # Without a requested error, the whole time limit is used.
     return limit_s if scene.target.error is None else min(limit_s, UNDECIDED * taken_s)
 
 

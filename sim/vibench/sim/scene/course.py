@@ -1,8 +1,8 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
-Both have three steps, so that many scenes can be batched. `way` is the motion to follow first. `watch`
-classifies the motion and returns it if it must be followed further. `seen` observes the end. Between the
-steps, the caller follows one motion (`StatesAlone.follow`) or many scenes (`in_batches`). SI units.
+Both have three steps, so that many scenes can be batched. `way` returns the motion to integrate first.
+`watch` classifies it and returns it if it must be integrated further. `seen` observes the end. Between these
+steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
 """
 
 import math
@@ -36,7 +36,7 @@ from .states_alone import StatesAlone
 
 @dataclass(frozen=True, eq=False)
 class SceneRun:
-    """Observed window of a run, and the classification of its motion."""
+    """Observed window of a run, and kind of its motion."""
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
@@ -46,26 +46,26 @@ class SceneRun:
     motion: MotionKind
     repeats: Repetition | None
     settled_s: float | None
-    """Time at which the motion was found to be settled; None if not checked or not found."""
+    """Time at which the motion was found to be settled [s]; None if not checked or not settled."""
     ended: str
     """Reason for the end of the run."""
     path: tuple[Stretch, ...]
-    """Stretches from the start until the motion settled or was certainly chaotic."""
+    """Stretches from the start until the motion settled or was proved chaotic."""
     grew: bool
     """Whether a small perturbation grew enough to prove chaos."""
     wandered_until_s: float
-    """Last time at which the motion changed from period to period."""
+    """Last time at which the motion still changed from one of its periods to the next [s]."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
-    """Relative effect of leakage if lines were taken over the whole window, shape (4,). Zero unless the
-    repetition was detected only within the window."""
+    """Relative change of the responses by leakage if lines are taken over the whole window, shape (4,). Zero
+    unless the motion was found to repeat only within the window."""
 
 
 class FixedCourse:
     """Run of a motion for a given time, observed at its end.
 
-    The motion is checked once per drive period. If it does not repeat after the expected transient, a tangent
-    vector is propagated and the peaks of blocks are kept: a motion that never repeats is described only by
-    the growth of perturbations and by statistics.
+    The state is checked once per drive period. If the motion does not repeat after the expected transient, a
+    tangent vector is propagated and the peaks of blocks are stored: a motion that never repeats is described
+    by the growth of perturbations and by statistics.
     """
 
     def __init__(self, run: FollowedRun, pace: Pace, duration: FixedDuration) -> None:
@@ -74,11 +74,11 @@ class FixedCourse:
 
     @property
     def way(self) -> StatesAlone | None:
-        """Return the motion up to the expected settling; None if it is advanced without checks."""
+        """Motion to integrate up to the expected settling time; None if it is integrated without checks."""
         return self._lead.states
 
     def watch(self) -> None:
-        """Return None, because the motion of a fixed duration is never followed further."""
+        """Return None: with a fixed duration the motion is not integrated further."""
 
     def seen(self) -> SceneRun:
         """Observe the end of the motion and classify it."""
@@ -93,7 +93,7 @@ class FixedCourse:
         seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s requested have passed")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
-            # The period became known in the window: observe the window again, for lines without leakage.
+            # The period became known only in the window: observe it again over whole periods (no leakage).
             begins = window.begins.apart()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)
@@ -101,7 +101,7 @@ class FixedCourse:
             seen = replace(seen, window=whole, leaked=leaked)
         has_settled = self.way is not None and self.way.repeats is not None
         path = lead if has_settled else (*lead, last, *window.stretches)
-        # The time at which the motion settled was not determined.
+        # The settling time was not determined.
         return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
@@ -115,9 +115,9 @@ def classify(
 ) -> SceneRun:
     """Return the kind of a motion from its window and the stretches before it.
 
-    The stretches before the window are as long as its blocks. A repeating motion is periodic only if Newton's
-    iteration finds a stable periodic motion nearby: chaos also comes close to unstable periodic motions, and
-    stays long where a periodic motion has just vanished in a fold.
+    The stretches before the window have the length of its blocks. A motion that repeats counts as periodic
+    only if Newton's iteration finds a stable periodic motion nearby, because chaos also comes close to
+    unstable periodic motions and stays long where a periodic motion has just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
@@ -148,7 +148,7 @@ def classify(
 
 
 MOST_LOOKS = 4096
-"""Most states kept before the window: enough to detect that other starts diverge."""
+"""Most states stored before the window: enough to detect that neighbouring motions diverge."""
 LOOKS = 16
 """Fewest checks for repetition before the window."""
 LONGEST_SLICE = 1 << 16
@@ -156,10 +156,10 @@ LONGEST_SLICE = 1 << 16
 
 
 class Lead:
-    """The part of a run before its window, with some of its states.
+    """Part of a run before its window, with some of its states.
 
-    Once the motion repeats to rounding, its remaining whole periods are skipped. A motion that is integrated
-    in time steps never repeats to rounding.
+    Once the motion repeats to rounding error, the remaining whole periods are skipped. This is impossible
+    for contacts that are integrated in time steps.
     """
 
     def __init__(self, run: FollowedRun, until_s: float, pace: Pace) -> None:
@@ -167,7 +167,7 @@ class Lead:
         periods = whole_periods(self._until_s, pace.frequency_hz)
         self._every = every = max(1, math.ceil(periods / MOST_LOOKS))
         self.states: StatesAlone | None = None
-        """Motion to follow; None if it is advanced without checks."""
+        """Motion to integrate with checks; None if it is integrated without."""
         if pace.sharpness.noise < EXACTLY:
             exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
             slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
@@ -176,7 +176,7 @@ class Lead:
             self.states = states.aim(self._until_s)
 
     def end(self) -> tuple[Stretch, ...]:
-        """Advance the motion to the end of this part; return its stretches."""
+        """Integrate to the end of this part and return its stretches."""
         run, states = self._run, self.states
         if states is None:
             rate_hz = self._frequency_hz / self._every
@@ -189,31 +189,31 @@ class Lead:
 
 
 SLICE_S, SLICE_PERIODS = 0.25, 4
-"""Least time [s] and drive periods between two checks; at most one window."""
+"""Shortest interval between two checks [s] and [drive periods]; at most one window."""
 WINDOWS = 2
-"""Number of windows for which a non-repeating motion is watched; the last window gives the responses."""
+"""Number of windows over which a non-repeating motion is watched; the last one gives the responses."""
 DRIFT_SHARE = 0.25
-"""Share of the budget for following a slow drift; its error estimate repeats the run three times."""
+"""Share of the budget for integrating a slow drift further; the error estimate takes three times as long."""
 
 
 class SettlingCourse:
-    """Run of a motion until it repeats or certainly never will; then the motion is observed.
+    """Run of a motion until it repeats, or will certainly never repeat; then it is observed.
 
-    A repeating motion is observed over one of its periods, any other motion over a window. Because chaos can
-    die out, a chaotic motion is followed further without a tangent vector, as far as a budget allows.
+    A repeating motion is observed over one of its periods, any other motion over a window. Because chaos may
+    end, a chaotic motion is integrated further, without a tangent vector, as far as a budget allows.
 
     Parameters
     ----------
     run, pace
         The motion, and its time scales and tolerances.
     window_s
-        Length of the window for a non-repeating motion; rounded to equal parts of whole drive periods.
+        Length of the window for a non-repeating motion [s]; rounded to equal parts of whole drive periods.
     longest_s
-        Longest time to follow the motion, at least a window; then an unclear motion is undecided.
+        Longest simulated time [s], at least a window; a motion still unclear then is undecided.
     alone_s
-        Nominal cost for following chaos further; zero disables this.
+        Nominal cost for integrating chaos further [s]; zero for not at all.
     by_itself_s
-        Time after which the motion may join a batch; see `StatesAlone`.
+        Time after which the motion may join a batch [s]; see `StatesAlone`.
     """
 
     def __init__(
@@ -242,7 +242,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Follow the motion until it repeats or never will; return the motion to follow further, if any."""
+        """Integrate until the motion repeats or never will; return it if it must be integrated further."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:
@@ -278,7 +278,7 @@ class SettlingCourse:
         return None
 
     def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
-        """Return the motion to follow further; the last ``watched`` stretches of its path have a tangent."""
+        """Return the motion to integrate further; the last ``watched`` stretches have a tangent vector."""
         run, frequency_hz = self._run, self._pace.frequency_hz
         self._path, self._watched = path, watched
         until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
@@ -286,7 +286,7 @@ class SettlingCourse:
         return self._on
 
     def seen(self) -> SceneRun:
-        """Return window and classification; observe a new window if the motion was followed further."""
+        """Return window and kind; observe a new window if the motion was integrated further."""
         if self._on is not None:
             return self._after(self._on)
         assert self._seen is not None
@@ -297,7 +297,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have become quasi-periodic, which does not repeat either: only its growth rate differs.
+        # Chaos may have become quasi-periodic motion. This does not repeat either, but its growth is zero.
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [
@@ -320,14 +320,14 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the drive periods between two checks, and the number of these slices in a window."""
+    """Return the drive periods between two checks (a slice), and the number of slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))
 
 
 def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretch], pace: Pace) -> SceneRun:
-    """Observe one period of a repeating motion and find when it settled."""
+    """Observe one period of a repeating motion, and find the time at which it settled."""
     settled_s, begins = run.time_s, run.apart()
     section = states_of(path)
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
@@ -355,7 +355,7 @@ def _observe_last(
     pace: Pace,
     ended: str,
 ) -> SceneRun:
-    """Return the findings for a run whose window is formed by its last ``in_window`` stretches."""
+    """Classify a run whose window consists of its last ``in_window`` stretches."""
     last = stretches[-in_window:]
     begins = starts[-len(last)] if starts else run
     window = window_of(begins, last)

@@ -1,4 +1,4 @@
-"""Newton's iteration for the periodic motion near a run. SI units."""
+"""Newton's iteration for the stable periodic motion near a run. SI units."""
 
 from dataclasses import dataclass
 
@@ -8,22 +8,22 @@ from ..specimen.state import Floats
 from .followed_run import FollowedRun
 
 TOLERANCE = 1e-10
-"""Integration tolerance of the period map: far below the distance that counts as settled."""
+"""Integration tolerance of the period map, far below the distance at which a motion counts as settled."""
 RETURNED = 1e-10
-"""Largest distance from the state a period earlier, over the size of the motion, of a periodic motion."""
+"""Largest change over one period, relative to the size of the motion, for a periodic motion."""
 ITERATIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class FixedPoint:
-    """A stable periodic motion."""
+    """Stable periodic motion found near a run."""
 
     run: FollowedRun
-    """Run on this motion."""
+    """Run whose state is on this motion."""
     away: Floats
-    """Inverse of the identity minus the scaled Jacobian of the period map, shape (6, 6)."""
+    """Inverse of (identity - Jacobian of the period map), scaled, shape (6, 6)."""
     distance: float
-    """Distance between the given run and this motion, over the size of the motion."""
+    """Distance of the given run from this motion, over the size of the motion."""
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:

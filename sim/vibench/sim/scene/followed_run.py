@@ -1,4 +1,4 @@
-"""Motion under a harmonic drive, integrated stretch by stretch with different observations. SI units."""
+"""Motion under a harmonic drive, integrated in stretches with different observations. SI units."""
 
 import math
 import sys
@@ -29,21 +29,21 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen, energy_metric, state_scales
 from ..specimen.state import Floats
 
-# Nominal cost of integrating a motion: the processor time on the machine of docs/accuracy.md [s]. Budgets use
-# it instead of measured time, so that a scene with a budget has the same result on every machine.
+# Nominal cost of integrating a motion: its processor time on the machine of docs/accuracy.md [s]. Budgets use
+# this instead of measured time, so that a scene with a budget has the same result on every machine.
 
 FLIGHT, STEPS = 5e-5, 3.5e-4
 """Cost of one second of motion without contact, and of motion under a force that acts at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
 """Cost of an impact on a Hertz or rigid stop, and on a linear gap [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""Factors on the cost of contacts with a tangent vector, because collisions then need time steps."""
+"""Factors on the cost of contacts with a tangent vector, which requires time steps in collisions."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 """Tolerance below which contacts cost more, and the factor."""
 STEP = 1e-9
-"""Smallest cost of a step without contact [s]; dominates if a mode is far faster than those of the paper."""
+"""Smallest cost of a step without contact [s]; it matters if a mode is far faster than the paper's."""
 TANGENT_STEPS = 4
-"""Where steps are limited, one step with a tangent vector counts as this number of steps."""
+"""Number of steps that one step with a tangent vector counts as, where the number of steps is limited."""
 
 
 def nominal_cost_s(
@@ -64,7 +64,7 @@ def nominal_cost_s(
 
 @dataclass(frozen=True)
 class Samples:
-    """Sample times of stored states: time of the first sample, sample rate, and number."""
+    """Times at which states are stored: first time, sample rate, and number."""
 
     first_s: float
     rate_hz: float
@@ -73,7 +73,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Observations of a motion between two instants."""
+    """Observations of a motion between two times."""
 
     start_s: float
     end_s: float
@@ -81,11 +81,11 @@ class Stretch:
     impacts: int
     """Number of contacts that began."""
     samples: Samples
-    """Sample times of the stored states."""
+    """Times of the stored states."""
     states: Floats
     """Stored states, shape (n, 6)."""
     peak_x_m: float = 0.0
-    """Largest abs(x); zero if not observed."""
+    """Largest abs(x) [m]; zero if not observed."""
     peak_p_m: float = 0.0
     area_x: complex = 0j
     """Integral of x exp(-i (omega t + phase)) [m s]; zero if not observed."""
@@ -99,16 +99,16 @@ class Stretch:
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
-        """Return the stretch with every n-th state only."""
+        """Return the stretch with only every n-th stored state."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
 
 
 class FollowedRun:
-    """A motion of a specimen that is advanced in place.
+    """Motion of a specimen from a start (initial state), which is integrated step by step.
 
-    Raises ValueError when the specimen cannot be simulated, or not from this start.
+    Raises ValueError when the specimen cannot be simulated from this start.
     """
 
     def __init__(
@@ -147,29 +147,29 @@ class FollowedRun:
         return twin
 
     def pass_over(self, drive_periods: int) -> None:
-        """Skip drive periods of a repeating motion: add them to the time and keep the state."""
+        """Skip drive periods of a repeating motion: increase the time and keep the state."""
         self._run.pass_over(drive_periods / self.drive.frequency_hz)
 
     @property
     def periods(self) -> int | None:
-        """Return the number of drive periods since time zero; None within a period."""
+        """Number of drive periods since time zero; None between two whole periods."""
         whole = round(self.time_s * self.drive.frequency_hz)
         return whole if whole / self.drive.frequency_hz == self.time_s else None
 
     @property
     def is_in_flight(self) -> bool:
-        """Return whether no stop is in contact."""
+        """Whether no stop is in contact."""
         return self._run.is_in_flight
 
     def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
-        """Return the stretch that a batch has followed, from ``start_s`` until now."""
+        """Return the stretch, from ``start_s`` until now, that was integrated in a batch."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
         self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
         samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, count)
         return Stretch(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states)
 
     def follow_tangent(self) -> None:
-        """Propagate a tangent vector in a generic direction from now on."""
+        """Propagate a tangent vector, in a direction without symmetry, from now on."""
         self._run.carry((self._scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
 
     def drop_tangent(self) -> None:
@@ -177,7 +177,7 @@ class FollowedRun:
         self._run.carry(np.empty((0, DIRECTIONS)))
 
     def pushed(self, push: Floats) -> Self:
-        """Return a copy of the motion whose present state is changed by ``push``, shape (6,)."""
+        """Return a copy of the motion whose current state is changed by ``push``, shape (6,)."""
         twin, run = self.apart(), self._run.apart()
         run.place(start_motion(self.state + push))
         twin.__dict__.update(_run=run)
@@ -189,7 +189,7 @@ class FollowedRun:
         observe: Watch = Watch.NOTHING,
         samples: Samples | None = None,
     ) -> Stretch:
-        """Advance to a time and return the stretch; a run that has failed stays where it is."""
+        """Integrate to a time [s] and return the stretch; a run that has failed does not move."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
         counts_as = TANGENT_STEPS if len(self._run.growth) else 1
@@ -224,13 +224,13 @@ class FollowedRun:
             area_x=record.area_x,
             area_p=record.area_p,
             samples=kept,
-            # Rounding may place samples just after the end.
+            # Rounding may place the last samples just after the end.
             states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )
 
     def image(self, drive_periods: int) -> tuple[Floats, Floats]:
-        """Return the state `drive_periods` later and its Jacobian, shapes (6,) and (6, 6); NaN if lost."""
+        """Return the state `drive_periods` later and its Jacobian, (6,) and (6, 6); NaN if the run fails."""
         run, frequency_hz = self._run.apart(), self.drive.frequency_hz
         made = self.time_s * frequency_hz if self.periods is None else self.periods
         until_s = (made + drive_periods) / frequency_hz
@@ -246,21 +246,21 @@ class FollowedRun:
     def _size(self) -> float:
         """Return the natural logarithm of the norm of the tangent vector; NaN without one.
 
-        The norm is the square root of its energy in the linear system, which only contact can increase. In
-        this norm, oscillation between displacement and velocity does not count as growth.
+        The norm is the square root of its energy in the linear system, which only contact can increase. An
+        exchange between displacement and velocity therefore does not count as growth.
         """
         if len(self._run.growth) == 0:
             return math.nan
         change = self._run.changes[0]
-        # Strong damping may shrink the energy below the smallest float.
+        # Strong damping may reduce the energy below the smallest float.
         energy = max(change @ self._metric @ change, sys.float_info.min)
         return 0.5 * math.log(energy) + float(self._run.growth[0])
 
 
 def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list[Stretch | None]:
-    """Follow motions of one specimen in a batch, each for whole drive periods, without a tangent vector.
+    """Integrate motions of one specimen in a batch, each over whole drive periods, without tangent vector.
 
-    The result for a motion that the batch cannot follow is None; its state does not change.
+    The result is None for a motion that the batch cannot integrate; its state does not change.
     """
     starts_s = [run.time_s for run in runs]
     found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
@@ -271,27 +271,27 @@ def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list
 
 
 BLOCKS = 10
-"""Number of parts of a window; the scatter is estimated from them."""
+"""Number of blocks of a window, from which the scatter is estimated."""
 FIRST, LAST = 2, 3
-"""Number of first and last parts of a window in which growth is measured to prove lasting chaos. About half
-of them are late, with or without a stretch before the window."""
+"""Number of first and last blocks of a window in which growth is measured, to prove that chaos lasts. They
+cover both halves of the observed time, with or without a stretch before the window."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Peaks and lines of a part of a motion that contains whole drive periods."""
+    """Peaks and spectral lines of a part of a motion with whole drive periods."""
 
     peak_x_m: float
     """Largest abs(x)."""
     peak_p_m: float
     line_x_m: complex
-    """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
+    """Phasor at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase)))."""
     line_p_m: complex
 
 
 @dataclass(frozen=True, eq=False)
 class ObservedWindow:
-    """Observations in a window. SI units."""
+    """Observations of a motion in a window. SI units."""
 
     begins: FollowedRun
     """Run at the start of the window."""
@@ -300,15 +300,15 @@ class ObservedWindow:
     blocks: tuple[Block, ...]
     """Blocks of the window; their lengths differ by at most one drive period."""
     line_periods: int
-    """Number of drive periods at the end of the window over which lines are taken: the largest multiple of
-    the motion's period."""
+    """Number of drive periods at the end of the window over which the lines are taken: as many whole periods
+    of the motion as fit."""
     line_x_m: complex
-    """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
+    """Phasor at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase)))."""
     line_p_m: complex
 
     @property
     def length_s(self) -> float:
-        """Length from start to end."""
+        """Length of the window [s]."""
         return self.stretches[-1].end_s - self.stretches[0].start_s
 
     @property
@@ -323,7 +323,7 @@ class ObservedWindow:
 
     @property
     def responses_m(self) -> Floats:
-        """Largest abs(x), drive-frequency amplitude of x, and the same for p, shape (4,)."""
+        """Largest abs(x), amplitude of x at the drive frequency, and the same for p, shape (4,) [m]."""
         return np.array([self.largest_x_m, abs(self.line_x_m), self.largest_p_m, abs(self.line_p_m)])
 
     @property
@@ -344,7 +344,7 @@ def samples_between(rate_hz: float, start_s: float, end_s: float) -> Samples:
 
 
 def follow_with_section(run: FollowedRun, until_s: float, observe: Watch = Watch.NOTHING) -> Stretch:
-    """Follow a motion until a time, and store its state once per drive period."""
+    """Integrate a motion to a time [s], and store its state once per drive period."""
     end_s = max(until_s, run.time_s)
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
@@ -355,11 +355,11 @@ def observe_window(
     cycle: int = 1,
     is_chaos: Callable[[Sequence[Stretch]], bool] | None = None,
 ) -> ObservedWindow:
-    """Observe a motion through a window that begins now and contains at least one drive period.
+    """Observe a motion in a window that begins now and contains at least one drive period.
 
-    For a motion that repeats after ``cycle`` drive periods, lines are taken over a multiple of ``cycle`` if
-    the window contains one; this avoids leakage from other lines. If ``is_chaos`` returns True for the first
-    parts, the tangent vector is propagated only at both ends of the window.
+    If the motion repeats after ``cycle`` drive periods, lines are taken over a multiple of ``cycle``, if the
+    window is long enough; this avoids leakage. If ``is_chaos`` returns True for the first parts, the tangent
+    vector is propagated only at both ends of the window.
     """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
@@ -381,7 +381,7 @@ def observe_window(
 
 
 def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stretch] = ()) -> ObservedWindow:
-    """Return a window of ``parts`` with whole drive periods; ``head`` before them contributes only peaks."""
+    """Return a window of ``parts`` with whole drive periods; ``head`` before them only adds peaks."""
     frequency = begins.drive.frequency_hz
     periods = round(sum(part.length_s for part in parts) * frequency)
     scale = 2.0 * frequency / max(periods, 1)
@@ -396,7 +396,7 @@ def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stre
 
 
 def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
-    """Return peaks and lines of each observed part; a line is 2 / T times the integral in `Stretch`."""
+    """Return peaks and lines of each observed part; a line is 2 / T times the area of the `Stretch`."""
     return tuple(
         Block(
             part.peak_x_m,
@@ -415,14 +415,14 @@ def states_of(stretches: Sequence[Stretch]) -> Floats:
 
 
 LEAST_RATE_HZ = 20_000.0
-"""Lowest sample rate [1/s]: ten times faster than contacts, to which m0 hardly responds."""
+"""Lowest sample rate [1/s]; ten times faster than contacts, to which m0 hardly responds."""
 HIGHEST = 0.25
-"""Highest frequency of the spectrum over the sample rate; aliases below it are attenuated by m0."""
+"""Highest frequency of the spectrum over the sample rate; m0 attenuates aliases below it."""
 
 
 @dataclass(frozen=True, eq=False)
 class LineSpectrum:
-    """Amplitude spectrum of x with a rectangular window, exact at multiples of the drive frequency."""
+    """Amplitude spectrum of x without taper, exact at multiples of the drive frequency."""
 
     frequency_hz: Floats
     """Frequencies [Hz], shape (lines,)."""
@@ -431,7 +431,7 @@ class LineSpectrum:
 
 
 def spectrum_of(window: ObservedWindow) -> LineSpectrum:
-    """Integrate a window again with samples, and return the spectrum over its whole periods.
+    """Integrate a window again, with samples, and return the spectrum over its whole periods.
 
     Sampling does not change the motion: both runs agree to the last digit, even in chaos.
     """

@@ -1,4 +1,4 @@
-"""Mean responses over nearly equal starts: their error, and how to reduce it. SI units."""
+"""Mean responses over several nearly equal starts (initial states), and its error. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -14,40 +14,40 @@ from .shares import student_quantile, wilson_share
 from .stated_error import ROUNDING
 
 ALIKE = 1e-2
-"""Largest relative difference of responses for starts on one motion; some starts are still settling."""
+"""Largest relative difference of responses on the same motion, because some runs are still settling."""
 OTHER_DIFFERS = 1.0
-"""Assumed relative difference of an undetected motion, such as chaos beside a motion without impacts."""
+"""Assumed relative difference of a motion that no start has reached, such as chaos beside rest."""
 FEWEST_STARTS = 16
 MOST_FREEDOM = 200
-"""Degrees of freedom above which Student's quantile hardly changes."""
+"""Degrees of freedom above which Student's t hardly changes."""
 
 
 @dataclass(eq=False)
 class Start:
-    """One of several nearly equal starts, with the results of its windows."""
+    """One of several nearly equal starts, with the responses in its windows."""
 
     run: FollowedRun
     windows: list[Floats]
-    """Responses of each window, shape (4,); a periodic motion needs one window."""
+    """Responses in each window, shape (4,); a periodic motion needs only one window."""
     repeats: Repetition | None
-    """Period of a nearly periodic motion, whose windows are all alike; otherwise None."""
+    """Period of a nearly periodic motion, whose windows are alike; None for other motions."""
     impacts: int
     """Number of impacts in the first window."""
     section: Floats
     """States once per drive period in the first window, shape (n, 6)."""
 
     def mean(self, windows: int) -> Floats:
-        """Return the mean of the responses over the first windows, shape (4,)."""
+        """Return the mean responses over the first ``windows`` windows, shape (4,)."""
         return np.asarray(np.mean(self.windows[:windows], axis=0))
 
 
 def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
-    """Return the relative error of the mean over starts, shape (4,).
+    """Return the relative error of the mean responses over starts, shape (4,).
 
-    The error is the larger of two estimates. The first is Student's 95 % interval with the smallest and the
-    largest value counted twice (Agresti and Coull, Am. Stat. 52 (1998) 119), which gives weight to a rare
-    motion. The second applies if most starts reached one repeating motion and ``others`` starts did not: it
-    allows the share of the others to be at the upper end of Wilson's interval.
+    It is the larger of two estimates. The first is Student's 95 % interval with the smallest and the largest
+    value counted twice (Agresti and Coull, Am. Stat. 52 (1998) 119), which allows for a rare motion. The
+    second applies if most starts reached one repeating motion and ``others`` starts did not. It assumes that
+    the share of other motions is at the upper end of Wilson's interval.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
@@ -74,7 +74,7 @@ def windows_of(starts: Sequence[Start]) -> int:
 
 
 def others_of(starts: Sequence[Start]) -> int | None:
-    """Return how many starts missed the repeating motion that most starts reached; None without one."""
+    """Return the number of starts that missed the repeating motion of most starts; None without one."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None
@@ -84,7 +84,7 @@ def others_of(starts: Sequence[Start]) -> int | None:
 
 
 def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tuple[int, int]:
-    """Return the next number of starts and of windows; the work at most doubles."""
+    """Return the next number of starts and of windows per start; the work at most doubles."""
     windows = windows_of(starts)
     if len(starts) < FEWEST_STARTS:
         return FEWEST_STARTS, windows
@@ -95,10 +95,10 @@ def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tupl
 
 
 def windows_help(starts: Sequence[Start], lead: float) -> bool:
-    """Return whether more windows per start should be added instead of more starts.
+    """Return whether to add windows per start rather than starts.
 
     More starts also find rare motions. Windows are therefore added only if the variance within starts exceeds
-    half the variance between starts. ``lead`` is the time before the first window, in windows.
+    half the variance between starts. ``lead`` is the time before the first window, over the window length.
     """
     windows = windows_of(starts)
     if lead < 1.0 or any(each.repeats is not None for each in starts):

@@ -1,4 +1,4 @@
-"""Plan of a scene before its run: method, with reasons, and cost. SI units."""
+"""Plan of a scene before it is solved: method with reasons, and cost. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .cost import Expected
 
 # Without contact a displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0. Its
-# magnitude is at most abs(S) + sum abs(m_j). If this bound on p is below the gap, no stop is ever touched.
+# magnitude is at most abs(S) + sum abs(m_j). If this bound on abs(p) is below the gap, no stop is touched.
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,31 +50,31 @@ class LinearMotion:
 
     @property
     def largest_p_m(self) -> float:
-        """Return an upper bound on abs(p) at all times [m]."""
+        """Upper bound on abs(p) at all times [m]."""
         return abs(self.steady_p) + float(np.abs(self.modes[:, Y] - self.modes[:, Z]).sum())
 
     @property
     def slowest_rate(self) -> float:
-        """Return the largest real part of the eigenvalues [1/s]: the decay rate of the transient."""
+        """Largest real part of the eigenvalues [1/s], zero or negative; decay rate of the transient."""
         return float(self.rates.real.max())
 
     def state(self, time_s: float) -> Floats:
         """Return x, y, z, vx, vy, vz at a time, shape (6,)."""
-        # Subtract whole cycles exactly; otherwise their rounding shifts the phase at late times.
+        # Subtract whole cycles exactly; their rounding error would shift the phase at late times.
         part = float(Fraction(time_s) * Fraction(self.drive.frequency_hz) % 1)
         turn = 2.0 * math.pi * part + self.drive.phase_rad
         free = (self.modes * np.exp(self.rates * time_s)[:, None]).sum(axis=0)
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def share_left(self, time_s: float) -> float:
-        """Return the transient that remains at a time over the steady part; the larger of x and p."""
+        """Return the remaining transient at a time over the steady motion; the larger of x and p."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
         )
 
     def died_away_s(self, share: float) -> float:
-        """Return the time at which the transient falls below a share of the steady part [s]; may be inf."""
+        """Return the time at which the transient falls below ``share`` of the steady motion [s], or inf."""
         latest = 0.0
         for part, whole in self._parts:
             size = np.abs(part) * len(part) / (share * abs(whole))
@@ -90,7 +90,7 @@ class LinearMotion:
 
 
 def linear_motion(specimen: Specimen, drive: Harmonic, start: ArrayLike) -> LinearMotion:
-    """Return the linear motion from a start, shape (6,); it is valid until a stop is touched.
+    """Return the linear motion from a start, shape (6,); valid until a stop is touched.
 
     Raises ValueError when two modes coincide (critical damping) or numbers overflow.
     """
@@ -121,61 +121,61 @@ def never_touches(specimen: Specimen, motion: LinearMotion) -> bool:
 
 
 DECAYED_SHARE = 1e-9
-"""Largest transient that the closed form neglects, over the steady motion."""
+"""Largest transient, over the steady motion, that the closed form may neglect."""
 
 CLOSED_FORM_S = 5e-4
-"""Planned time for a closed form [s]. Measured run times correct the planned times for each machine
-(`vibench.sim.scene.cost`)."""
+"""Planned computing time of a closed form [s]. The ledger of `vibench.sim.scene.cost` corrects planned times
+for each machine."""
 FLIGHT_S, PERIOD_S, IMPACT_S = 5e-5, 1e-7, 1e-6
-"""Planned time per second and per drive period of motion without contact, and per impact [s]."""
+"""Planned time [s] per second of motion without contact, per drive period of it, and per impact."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
-"""Planned time per second and per drive period of motion under a force that acts at every p [s]."""
+"""Planned time [s] per second and per drive period of motion under a force that acts at every p."""
 TANGENT = 1.5
-"""Additional time for a tangent vector, over the time of the run without one."""
+"""Additional computing time for a tangent vector, over the time without one."""
 SETTLING_S = 10.0
 """Planned length of an automatic duration [s]."""
 TOUCHING = 0.6
 """Ratio of the steady p without stops to the gap above which most motions depend sensitively on the start:
-84 of 93 random scenes above it, 3 of 49 below (`benchmarks/planned_costs.py`)."""
+84 of 93 random scenes above this ratio, 3 of 49 below it (`benchmarks/planned_costs.py`)."""
 SLOW = 0.9
-"""Ratio of the drive frequency to the lowest natural frequency below which a motion counts as slow."""
+"""Ratio of drive frequency to lowest natural frequency below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if the linear p equals the gap; grows with the cube root of p over the gap."""
+"""Impacts per drive period if the linear p equals the gap; proportional to the cube root of p over gap."""
 MICROMETRES = 1e6
 
 
 @dataclass(frozen=True)
 class ScenePlan:
-    """Method and cost of a scene."""
+    """Method and expected computing time of a scene."""
 
     method: Method
     sentences: tuple[str, ...]
-    """Sentences that explain what is computed, what is not, and why."""
+    """Sentences that state what is computed, what is not, and why."""
     planned_s: float
-    """Estimated work [s] on a nominal reference machine."""
+    """Estimated computing time on a nominal reference machine [s]."""
     longest_planned_s: float
-    """Estimated work [s] if the motion never repeats and an automatic duration has its full length."""
+    """The same if the motion never repeats and an automatic duration has its full length [s]."""
     kind: str
-    """Kind of run in the cost ledger, ``a/b/c`` from general to special."""
+    """Kind of run in the cost ledger, ``a/b/c``, from general to special."""
     largest_p_m: float
     """Upper bound on abs(p) without contact [m]."""
 
     @property
     def alike(self) -> tuple[str, ...]:
-        """Key that is equal for scenes solved in the same way, whatever their parameters."""
+        """Key that is the same for scenes solved in the same way, whatever their parameters."""
         return (self.method.value, *self.sentences[1:])
 
     @property
     def cost(self) -> "Expected":
         """Expected time on one core of this machine, from previous runs."""
-        from .cost import cost_ledger  # noqa: PLC0415 - few plans are priced, and it reads a file
+        from .cost import cost_ledger  # noqa: PLC0415 - reads a file, and few plans need it
 
         return cost_ledger().expected(self.kind, self.planned_s)
 
     @property
     def cost_s(self) -> float:
-        """Expected time without its uncertainty [s]."""
+        """Expected time on one core of this machine, without its uncertainty [s]."""
         return self.cost.time_s
 
     def explain(self) -> str:
@@ -184,7 +184,7 @@ class ScenePlan:
 
 
 def plan_scene(scene: Scene) -> ScenePlan:
-    """Return the plan of a scene without running it.
+    """Return the plan of a scene; nothing is simulated.
 
     Raises ValueError when the specimen cannot be simulated.
     """
@@ -258,12 +258,12 @@ def _reason_to_integrate(specimen: Specimen, motion: LinearMotion, method: Metho
     if never_touches(specimen, motion):
         return (
             "No stop is touched, but the transient has not decayed before the window: "
-            "the exact motion without contact is computed."
+            "the exact linear motion is computed."
         )
     return (
         f"A stop may be touched: without stops abs(p) might reach {largest:.3g} um, "
         f"and the gap is {gap:.3g} um. "
-        "Motion between contacts is exact; contacts are resolved to the tolerance of the accuracy."
+        "Motion between contacts is exact; contacts are integrated to the tolerance of the accuracy level."
     )
 
 
@@ -274,23 +274,23 @@ def _carried_quantities(observe: tuple[Observable, ...]) -> list[str]:
         else "A tangent vector is computed only if the motion does not repeat, to classify it."
     ]
     if Observable.SPECTRUM in observe:
-        sentences.append("Samples are kept over the window for the spectrum.")
+        sentences.append("Samples are stored over the window for the spectrum.")
     else:
-        sentences.append("Only the states once per drive period are kept.")
+        sentences.append("Only the states once per drive period are stored.")
     if Observable.SCATTER in observe:
         sentences.append(
-            f"{FEWEST - 1} further starts, a millionth of the gap apart, are computed for their scatter."
+            f"{FEWEST - 1} more runs, whose starts differ by a millionth of the gap, show the scatter."
         )
     return sentences
 
 
 def _refined(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
     return (
-        "A second start, a millionth of the gap away, is computed with a stricter tolerance.",
-        "If the motion approaches a stable periodic motion, Newton's iteration completes it.",
-        f"Otherwise, both motions are observed over {duration.window_s:g} s and compared.",
-        "If both diverge, the motion depends sensitively on its start: the result is a mean over starts.",
-        "Starts are added until the error or the time is reached.",
+        "A second run, whose start differs by a millionth of the gap, has a smaller tolerance.",
+        "If the motion approaches a stable periodic motion, Newton's iteration finds that motion exactly.",
+        f"Otherwise, both runs are observed over {duration.window_s:g} s and compared.",
+        "If they separate, the motion depends sensitively on its start; the result is a mean over starts.",
+        "Starts are added until the requested error or time is reached.",
     )
 
 
@@ -298,9 +298,9 @@ def _other_starts(budget_s: float) -> str:
     if budget_s == 0.0:
         return "Other starts are not computed, because there is no budget."
     return (
-        "Another start, a millionth of the gap away, is computed too. If both diverge, or if the motion is "
-        f"chaotic, the final motion is random: then {CLEAR} to {MOST} starts are computed and chaos is "
-        f"continued, for at most {budget_s:g} s of processor time."
+        "A second run starts a millionth of the gap away. If the two runs separate, or the motion is "
+        f"chaotic, the final motion is random. Then {CLEAR} to {MOST} starts are computed and chaos is "
+        f"integrated further, for at most {budget_s:g} s of processor time."
     )
 
 
@@ -318,7 +318,7 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
 
 
 def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
-    """Return the kind of a run; runs of one kind have similar ratios of actual to planned time."""
+    """Return the kind of a run; runs of one kind have a similar ratio of actual to planned time."""
     contact = "free"
     if _share(scene, motion) > TOUCHING:
         contact = "slow" if _is_slow(scene, motion) else "touching"
@@ -332,14 +332,14 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     return "/".join(
         (
             *(method.value, scene.specimen.contact.kind, contact, scene.accuracy.value, duration, observed),
-            # With sensitive dependence on the start, the other starts use the whole budget.
+            # With sensitive dependence on the start, other starts use the whole budget.
             f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target),
         )
     )
 
 
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
-    """Return the planned time for one second of motion [s]."""
+    """Return the planned computing time for one second of motion [s]."""
     share, frequency_hz = _share(scene, motion), scene.drive.frequency_hz
     per_period = IMPACTS_PER_PERIOD * math.cbrt(share) if share > TOUCHING else 0.0
     per_s = FLIGHT_S + (PERIOD_S + IMPACT_S * per_period) * frequency_hz
@@ -358,11 +358,11 @@ def _share(scene: Scene, motion: LinearMotion) -> float:
 
 
 def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
-    """Return the planned time for other starts [s]; zero unless sensitive dependence is probable."""
+    """Return the planned computing time for other starts [s]; zero unless they are probably needed."""
     is_forgotten = _share(scene, motion) > TOUCHING and not _is_slow(scene, motion)
     return min(scene.budget_s, (FEWEST - 1) * run_s) if is_forgotten else 0.0
 
 
 def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
-    """Return whether the drive frequency is below all natural frequencies; no other starts are planned."""
+    """Return whether the drive is below all natural frequencies, so that other starts are not needed."""
     return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))

@@ -20,57 +20,57 @@ def state_of(values: Floats) -> State:
 
 
 class MotionKind(StrEnum):
-    """Kind of a motion, from its states once per drive period."""
+    """Kind of a motion, decided from its states once per drive period."""
 
     PERIODIC = "periodic"
     """The motion repeats after `ScenePrediction.period` drive periods."""
     QUASI_PERIODIC = "quasi-periodic"
-    """The motion neither repeats nor depends sensitively on its start."""
+    """The motion does not repeat, but a small change of the start does not grow."""
     CHAOTIC = "chaotic"
-    """The motion does not repeat and depends sensitively on its start."""
+    """The motion does not repeat, and a small change of the start grows."""
     UNDECIDED = "undecided"
     """The simulated time is too short to classify the motion."""
     CHAOTIC_SO_FAR = "chaotic so far"
-    """Chaotic during the simulated time, but possibly not for ever: chaos from other starts died out, or all
-    runs were too short. `Ensemble.escape` contains its lifetime."""
+    """Chaotic during the simulated time, but possibly not for ever: chaos ended in runs from other starts, or
+    all runs were too short. `Ensemble.escape` contains its lifetime."""
 
 
 class StartMemory(StrEnum):
-    """Whether the start determines which motion is reached."""
+    """Whether the start (initial state) determines the final motion."""
 
     KEPT = "kept"
-    """A start that differs by a millionth of the gap follows the same motion."""
+    """A start that differs by a millionth of the gap leads to the same motion at the same time."""
     LOST = "lost"
     """A small perturbation of the start grew to the size of the motion. A repeated run, on another machine or
     at another accuracy, may therefore reach another motion."""
     UNKNOWN = "unknown"
-    """Not determined, because there was no budget."""
+    """Not determined, because there was no budget or the run failed."""
 
 
 @dataclass(frozen=True)
 class FoundMotion:
     """One of the motions reached from nearly equal starts.
 
-    Two motions are the same if their kinds and periods are equal and their responses agree to 0.1 %, or for
-    chaos within its scatter. Symmetric partners, whose responses are equal, count as one motion.
+    Two motions count as the same if kind and period are equal and responses agree to 0.1 %, for chaos within
+    its scatter. A motion and its mirror image have the same responses and count as one.
     """
 
     motion: MotionKind
     period: int | None
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude: from one start if the motion repeats, else the mean over its
-    starts. The next three responses are found in the same way."""
+    """Largest abs(x) over the drive amplitude: from one start if the motion repeats, otherwise the mean over
+    the starts that reached it. The next three responses are computed in the same way."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None
     error_estimate: float | None
-    """Expected relative difference of Response I in another run that reaches this motion."""
+    """Expected relative change of Response I in another run that reaches this motion."""
     starts: int
     """Number of starts that reached this motion."""
     share: Share
-    """Share of all starts, with simultaneous 95 % intervals for all motions. They allow for longer runs, in
-    which starts that were undecided, chaotic, or on one of several chaotic motions may end elsewhere."""
+    """Share of all starts; the 95 % intervals of all motions hold together. They allow for longer runs, in
+    which starts that are undecided, chaotic, or on one of several chaotic motions may end elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -80,44 +80,44 @@ class Ensemble:
     starts: int
     """Number of starts, including the requested one."""
     motions: tuple[FoundMotion, ...]
-    """Motions found, in the order of decreasing share."""
+    """Motions found, the most frequent first."""
     requested_motion: int
     """Index of the motion reached from the requested start; key ``asked`` in JSON."""
     unseen_share: float
-    """Upper 97.5 % confidence limit of the share of a motion that was not found. It includes longer runs, in
-    which chaotic or undecided starts may reach such a motion."""
+    """Upper 97.5 % confidence limit of the share of a motion that was not found. It allows for longer runs,
+    in which chaotic or undecided starts may reach such a motion."""
     escape: EscapeRate | None
-    """Rate at which chaos died out; None without chaos."""
+    """Rate at which chaos ends; None without chaos."""
     scatter: float | None
-    """Relative standard deviation of Response I over all starts."""
+    """Relative standard deviation of Response I between all starts."""
     followed_s: float
-    """Total simulated time of all starts [s]."""
+    """Sum of the simulated times of all starts [s]."""
 
 
 @dataclass(frozen=True)
 class TargetReport:
-    """Requested and reached error and time."""
+    """Requested and reached error and computing time."""
 
     wanted_error: float | None
-    """Requested relative error; None if not requested, as ``wanted_time_s``."""
+    """Requested relative error; None if not requested. The same holds for ``wanted_time_s``."""
     wanted_time_s: float | None
     error: float | None
-    """Largest of the four stated errors."""
+    """Largest of the stated errors of the four responses; None if unknown."""
     time_s: float
-    """Time since the request [s]."""
+    """Computing time since the request [s]."""
     starts: int
-    """Number of starts in the average; 1 without sensitive dependence on the start."""
+    """Number of starts in the mean; 1 without sensitive dependence on the start."""
     windows: int
-    """Number of consecutive windows of each start in the average."""
+    """Number of consecutive windows per start in the mean."""
     is_met: bool
-    """Whether the error is at most the requested one."""
+    """Whether the reached error is at most the requested one."""
     needed_s: tuple[float, float, float] | None
-    """Time needed for the requested error [s]: estimate, lower and upper limit. None if unknown, or if more
-    time does not reduce the error."""
+    """Computing time for the requested error [s]: estimate, lower and upper limit. None if unknown, or if
+    more time does not reduce the error."""
 
     @property
     def text(self) -> str:
-        """Return the report as a sentence."""
+        """Return the report as a phrase."""
         if self.error is None:
             return f"no error is known after {_seconds(self.time_s)}"
         reached = _percent(self.error)
@@ -145,21 +145,21 @@ def _short(value: float) -> str:
 
 
 class Method(StrEnum):
-    """Method of solving a scene."""
+    """Method by which a scene is solved."""
 
     CLOSED_FORM = "closed form"
-    """Exact linear solution, where a bound proves that no stop is ever touched."""
+    """Exact linear solution; only if a bound proves that no stop is ever touched."""
     EVENT_DRIVEN = "event driven"
-    """Exact linear solution between contacts; time integration to the tolerance in contact."""
+    """Exact linear solution between contacts; time integration during contacts."""
     POLYNOMIAL = "polynomial"
-    """Time integration throughout, with eight Gauss points per step, for a force that acts at every p."""
+    """Time integration with eight Gauss points per step, for a force that acts at every p."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ScenePrediction:
-    """Responses of one scene, with errors and details. A field is None if not requested or not found.
+    """Responses of one scene, with errors and details; a field is None if not requested or not known.
 
-    Responses are divided by the drive amplitude. ``relative_i`` and ``relative_ii`` are those of p = y - z.
+    Responses are divided by the drive amplitude. ``relative_i`` and ``relative_ii`` are the responses of p.
     """
 
     frequency_hz: float
@@ -184,46 +184,46 @@ class ScenePrediction:
     window_s: float
     """Length of the window at the end of the simulated time [s]."""
     settled_s: float | None = None
-    """Time at which the motion was found to be settled [s]; None if the duration was given."""
+    """Time at which the motion was found to be settled [s]; None if it was not, or a duration was given."""
     ended: str
     """Reason for the end of the run."""
     integration_error: float | None = None
-    """Part of the error due to integration, which a stricter accuracy would reduce."""
+    """Error of the responses due to integration, which a stricter accuracy would reduce."""
     scatter: float | None = None
-    """Relative standard deviation of Response I between windows, if the motion never repeats."""
+    """Relative standard deviation of Response I between windows of a motion that never repeats."""
     lyapunov_per_s: float | None = None
     """Largest Lyapunov exponent [1/s]."""
     lyapunov_error_per_s: float | None = None
     """Standard error of the exponent [1/s]."""
     start: str
-    """Name of the initial state: "rest", or the scene's name."""
+    """Name of the start: "rest", or the name given in the scene."""
     final_state: State
     outcome: Outcome
     method: Method
     accuracy: str
     response_i_error: float | None = None
-    """Relative error of ``response_i``; see `vibench.sim.scene.solve.solve_scene` for all four errors."""
+    """Relative error of ``response_i``; `vibench.sim.scene.solve.solve_scene` defines all four errors."""
     response_ii_error: float | None = None
     relative_i_error: float | None = None
     relative_ii_error: float | None = None
     error_estimate: float | None = None
     """Largest of the four errors."""
     section: Floats | None = None
-    """States once per drive period within the window, if a Poincaré section was requested, shape (n, 6)."""
+    """States once per drive period in the window, shape (n, 6), if a Poincaré section was requested."""
     spectrum_hz: Floats | None = None
-    """Frequencies of the lines, if a spectrum was requested, shape (lines,)."""
+    """Frequencies of the spectrum, shape (lines,) [Hz], if a spectrum was requested."""
     spectrum: Floats | None = None
     """Amplitude of x at each frequency over the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
-    """Whether the start determines which motion is reached."""
+    """Whether the start determines the final motion."""
     ensemble: Ensemble | None = None
-    """Motions from other starts; None if the start determined the motion, or without a budget."""
+    """Motions reached from other starts; None if the start determines the motion, or without a budget."""
     target: TargetReport | None = None
-    """Requested and reached error and time; None if neither was requested."""
+    """Requested and reached error and computing time; None if neither was requested."""
 
     @property
     def is_one_of_several(self) -> bool:
-        """Return whether other starts reached other motions."""
+        """Whether other starts reached other motions."""
         return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:
@@ -238,7 +238,7 @@ def _fields_of(
     return {key.get(each.name, each.name): _plain(getattr(value, each.name)) for each in fields(value)}
 
 
-def _plain(value: object) -> object:  # noqa: PLR0911 - a row for each kind of value
+def _plain(value: object) -> object:  # noqa: PLR0911 - one case for each kind of value
     match value:
         case Outcome():
             return value.text

@@ -1,8 +1,8 @@
 """Solve a scene to a requested error or within a requested time. SI units.
 
-Results with errors follow each other until the target is met. The methods, from cheap to expensive: a closed
-form; Newton's iteration for a periodic motion that the run approaches; the responses in a stated window,
-checked by a stricter run; with sensitive dependence on the start, their mean over several starts.
+Ever better results with errors are computed until the target is met. The methods, from cheap to expensive: a
+closed form; Newton's iteration for a periodic motion that the run approaches; responses in a stated window,
+checked by a stricter run; with sensitive dependence on the start, the mean of these over several starts.
 """
 
 import math
@@ -48,35 +48,35 @@ from .solve import Question, in_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
 LONGEST_S = 60.0
-"""Default time limit of refinement [s]."""
+"""Default limit of the computing time [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
-"""Time at which a first result is due, and nominal cost that it may use even if time has run out [s]."""
+"""Time after which a first result is due [s]; nominal cost that it may use even after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
-"""Nominal cost and largest processor time between two checks of the clock [s]."""
+"""Nominal cost, and largest processor time, between two checks of the time limit [s]."""
 FIRST_CYCLES = 1e4
-"""Most cycles of the fastest mode before the clock is first checked."""
+"""Largest number of cycles of the fastest mode before the first check of the time limit."""
 CLOSE = 3e-3
-"""Relative change from one period to the next below which Newton's iteration is tried."""
+"""Relative change of the state from one period to the next below which Newton's iteration is tried."""
 KNOWN = 0.03
-"""Relative distance from a known periodic motion below which it is assumed to be approached."""
+"""Relative distance from a known periodic motion below which the run may be approaching it."""
 MOST_PUSH = 1000.0
-"""Largest gap, over the drive amplitude, to which the differences of other starts are scaled."""
+"""Largest length, over the drive amplitude, that replaces the gap as the scale of other starts."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
-"""Intervals between checks of the motion: at least LOOK_PERIODS drive periods; first as long as the time so
-far, up to LOOK_S; later LOOK_SHARE of the time so far."""
+"""Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
+up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
 LOOKS = 8
 """Number of checks of another start before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
-"""Largest relative difference of states for a motion that repeats."""
+"""Largest relative change of the state after a period for a motion that repeats."""
 FIRST_STARTS, MOST_STARTS = 6, 1_000_000
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
-"""Cost of Newton's iteration over the cost of one period of motion, and its largest share of the remaining
-time."""
+"""Computing time of Newton's iteration over that of one period of motion, and the largest part of the
+remaining time that it may use."""
 
 
 class _Clock:
-    """Clock that limits the solution to the requested time and reports on the target."""
+    """Clock that holds the time limit and reports how far the target is met."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -98,7 +98,7 @@ class _Clock:
         needed: tuple[float, float, float] | None = None,
         windows: int = 1,
     ) -> ScenePrediction:
-        """Return the prediction with a report on how far the target is met."""
+        """Return the prediction with the report on its target."""
         error, target = found.error_estimate, self._target
         is_met = error is not None and (target.error is None or error <= target.error)
         taken_s = self.taken_s
@@ -108,11 +108,11 @@ class _Clock:
 
 @dataclass(frozen=True, eq=False)
 class _Orbit:
-    """A stable periodic motion."""
+    """Stable periodic motion, with its responses."""
 
     period: int
     run: FollowedRun
-    """Run on this motion."""
+    """Run whose state is on this motion."""
     section: Floats
     """States once per drive period, shape (period, 6)."""
     responses_m: Floats
@@ -124,23 +124,23 @@ class _Orbit:
 
 @dataclass(eq=False)
 class _Path:
-    """A running motion, with the periodic motion that it may approach."""
+    """Motion from a start, with the periodic motion that it may approach."""
 
     run: FollowedRun
     recent: Floats
     """Recent states once per drive period, shape (n, 6)."""
     orbit: _Orbit | None = None
     distance: float = math.inf
-    """Relative distance from the periodic motion at the last check."""
+    """Relative distance from this periodic motion at the last check."""
     closest: float = CLOSE
-    """Relative change per period below which Newton's iteration is tried again."""
+    """Relative change per period below which Newton's iteration is tried next."""
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
-    """Yield results of a scene with a target, each better than the previous one.
+    """Yield results of a scene with a target, each better than the one before.
 
-    Raises ValueError when the scene has no target, when the specimen cannot be simulated, or when the
-    requested time is too short for one drive period.
+    Raises ValueError when the scene has no target, the specimen cannot be simulated, or the requested time is
+    too short for one drive period.
 
     """
     if scene.target is None:
@@ -182,22 +182,22 @@ class _Refinement:
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.apart(), self._twin.apart()
-        """Copies of the motion and of the stricter second start at their last check."""
+        """Copies of the motion and of the second, stricter run, made at the last check of both."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
-        """All periodic motions found."""
+        """All periodic motions found so far."""
         self._size_m = self._spent_s = 0.0
         self._run_error: float | None = None
-        """Relative integration error of the responses of each start; None until it is measured."""
+        """Relative integration error of the responses of each start; None if not yet measured."""
         self._kind: MotionKind | None = None
-        """Kind of the first start's motion if it does not repeat; None until it is determined."""
+        """Kind of the first start's motion if it does not repeat; None if not yet known."""
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
-        """Number of recent states that are stored."""
+        """Number of latest states once per drive period that are stored."""
 
     def answers(self) -> Iterator[ScenePrediction]:
-        """Yield the results; raise ValueError if there was no time for any result."""
+        """Yield the results; raise ValueError if the time was too short for any result."""
         for found in self._all():
             self._has_answered = True
             yield found
@@ -236,14 +236,14 @@ class _Refinement:
         return (made + math.ceil(look)) / self._frequency_hz
 
     def _drawn(self, count: int) -> Floats:
-        """Return random changes of the start, shape (count, 6), far smaller than the motion."""
+        """Return random changes of the start, shape (count, 6), which are far smaller than the motion."""
         drawn = pushes(self._scene.specimen, self._scene.drive, count, SEED)
         gap_m, most_m = min(self._scene.specimen.gaps_m), MOST_PUSH * self._scene.drive.amplitude_m
         return np.asarray(drawn * (most_m / gap_m if most_m < gap_m < math.inf else 1.0))
 
     @property
     def _settle_s(self) -> float:
-        """Return the time after which a motion that does not repeat is observed [s]."""
+        """Time after which a motion that does not repeat is observed [s]."""
         longest_s = self._scene.duration.longest_s
         if self._motion.slowest_rate >= 0.0:
             longest_s = min(longest_s, PAPER_DURATION_S)
@@ -257,7 +257,7 @@ class _Refinement:
     def _followed(
         self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[Stretch] | None:
-        """Follow a motion in short parts and return them; None if time ran out or the motion was lost."""
+        """Integrate a motion in short parts; return these, or None after the time limit or a failure."""
         parts: list[Stretch] = []
         while run.time_s < until_s:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
@@ -268,19 +268,19 @@ class _Refinement:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # The length of parts follows the nominal cost, equal on every machine, unless it is far too low.
+            # The parts follow the nominal cost, which is the same on every machine, unless it is far too low.
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
     def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
-        """Return the window of the next drive periods of a motion; None if time ran out or it was lost."""
+        """Return the next ``periods`` drive periods as a window; None after the time limit or a failure."""
         begins = run.apart()
         made = round(run.time_s * self._frequency_hz)
         parts = self._followed(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
         return None if parts is None else window_of(begins, parts)
 
     def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
-        """Return whether the motions from two starts have diverged."""
+        """Return whether the motions from two starts have separated."""
         mine, theirs = states_of(ours)[:, :3], states_of(other)[:, :3]
         self._size_m = max(self._size_m, float(np.abs(mine).max(initial=0.0)))
         gap_m = min(self._scene.specimen.gaps_m)
@@ -288,7 +288,7 @@ class _Refinement:
         return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
 
     def _approaches(self, path: _Path, seen: Sequence[Stretch]) -> bool:
-        """Add new states to a path; return whether it approaches a stable periodic motion, and store that."""
+        """Add new states to a path; return whether it approaches a stable periodic motion, now known."""
         path.recent = recent = np.concatenate([path.recent, states_of(seen)])[-self._kept :]
         if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
             return False
@@ -316,18 +316,18 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion over ``size``; inf if ``orbit`` is None."""
+        """Return the distance of a state from a periodic motion over ``size``; inf for no motion."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
 
     def _nearest(self, state: Floats, within: float) -> _Orbit | None:
-        """Return the known periodic motion nearest to a state; None if the distance exceeds ``within``."""
+        """Return the known periodic motion nearest to a state; None if it is farther than ``within``."""
         found = min(self._orbits, key=lambda each: self._away_from(each, state, 1.0), default=None)
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Return a stable motion near a run, whose period is ``period`` drive periods or a divisor of it."""
+        """Return a stable motion near a run, with this period (in drive periods) or a divisor of it."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
@@ -346,7 +346,7 @@ class _Refinement:
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
                 return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        # Effect of rounding at the end of a period, amplified by the inverse in Newton's iteration.
+        # Rounding error at the end of a period, amplified by the inverse matrix of Newton's iteration.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
@@ -378,7 +378,7 @@ class _Refinement:
         return states if Observable.POINCARE in self._scene.observe else None
 
     def _interim(self) -> Iterator[ScenePrediction]:
-        """Yield the result for a window that begins at the last check of both motions."""
+        """Yield an early result, for a window that begins at the last check of both motions."""
         self._spent_s = 0.0
         run, twin = (each.apart() for each in self._pair)
         periods = min(self._window_periods, max(1, round(run.time_s * self._frequency_hz) // 8))
@@ -390,7 +390,7 @@ class _Refinement:
 
     @property
     def _unsettled(self) -> float:
-        """Return the estimated relative distance from the final motion, from its change in one decay time."""
+        """Estimate the relative distance from the final motion, from the change during one decay time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -420,7 +420,7 @@ class _Refinement:
         return self._clock.report(found)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
-        """Yield results in a stated window for a non-repeating motion that is not sensitive to its start."""
+        """Yield results for a motion that does not repeat and is not sensitive to its start."""
         main, twin, periods = self._main, self._twin, self._window_periods
         for tolerance in (None, TIGHTEST):
             if tolerance is not None:
@@ -445,7 +445,7 @@ class _Refinement:
                 return
 
     def _many_starts(self) -> Iterator[ScenePrediction]:
-        """Yield the mean over nearly equal starts in a stated window, with more and more starts."""
+        """Yield means over a growing number of nearly equal starts, in stated windows."""
         lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
         begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
         each_s = begins_s + self._window_periods / self._frequency_hz
@@ -473,7 +473,7 @@ class _Refinement:
                 wanted, windows = next_size(starts, self._target.error, lead)
 
     def _observe_more(self, starts: list[Start], wanted: int, windows: int, begins_s: float) -> bool:
-        """Observe one more window or one more start; return False if time ran out or the run was lost."""
+        """Observe one more window, or one more start; return False after the time limit or a failure."""
         for each in starts:
             if each.repeats is None and len(each.windows) < windows:
                 window = self._observed(each.run, self._window_periods)
@@ -507,7 +507,7 @@ class _Refinement:
         return window is not None
 
     def _mean(self, starts: Sequence[Start], begins_s: float) -> ScenePrediction:
-        """Return the result for the mean over all starts and windows observed so far."""
+        """Return the result for the mean over all starts and windows so far."""
         windows, window_s = windows_of(starts), self._window_periods / self._frequency_hz
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)
@@ -548,7 +548,7 @@ class _Refinement:
         return self._clock.report(found, len(starts), needed, windows)
 
     def _kind_of_others(self, begin: FollowedRun) -> MotionKind:
-        """Return the kind of a non-repeating motion, from the growth of a perturbation in one window."""
+        """Return the kind of a motion that does not repeat, from the growth of perturbations in a window."""
         run, seen = begin.apart(), list[Stretch]()
         run.follow_tangent()
         until_s = run.time_s + self._window_periods / self._frequency_hz
@@ -564,7 +564,7 @@ class _Refinement:
         return found if is_torus else MotionKind.UNDECIDED
 
     def _lost(self) -> ScenePrediction:
-        """Return the result for a motion that could not be integrated to the end."""
+        """Return the result for a motion whose integration failed."""
         run = self._main
         found = self._prediction(np.full(4, math.nan), np.full(4, math.nan), run.time_s, 0.0, 0)
         found = replace(found, ended=run.outcome.text, outcome=run.outcome)
@@ -573,7 +573,7 @@ class _Refinement:
     def _prediction(
         self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
     ) -> ScenePrediction:
-        """Return a prediction with responses and relative errors; callers set the other fields."""
+        """Return a prediction with responses and errors; the caller sets its other fields."""
         amplitude_m = self._scene.drive.amplitude_m
         is_free = never_touches(self._scene.specimen, self._motion)
         response_i, response_ii, relative_i, relative_ii = (

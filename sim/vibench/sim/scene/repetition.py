@@ -21,30 +21,30 @@ from .prediction import MotionKind
 MOST_PERIODS = 32
 """Longest period that is detected, in drive periods."""
 FEWEST_BETWEEN = 8
-"""Fewest drive periods between compared states."""
+"""Fewest drive periods between the states that are compared."""
 SLOWEST_RATIO = 0.99
-"""Largest assumed ratio of a change to the previous change, for the slowest settling."""
+"""Largest assumed ratio of successive changes, for the slowest settling."""
 NEARLY = 0.01
-"""Largest relative change of a settling motion from one of its periods to the next."""
+"""Relative change from one period to the next below which a motion counts as settling."""
 TINY = 1e-300
 """Size used for a motion at rest."""
 DISTINCT = 20.0
-"""Smallest change, in tolerances, after each number of drive periods below the period. With a smaller change
-the motion may still be settling to a shorter period."""
+"""Smallest change, in tolerances, after fewer drive periods than the period. If a change is smaller, the
+motion may still be settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
-"""Growth that proves chaos: a factor of e^12 = 160 000, more than regular motions cause by shear."""
+"""Growth that proves chaos: a factor of e^12 = 160 000, which shear in regular motions does not reach."""
 NEUTRAL = 0.1
-"""Growth per decay time of the slowest mode that counts as zero; damping alone gives -1."""
+"""Growth per decay time of the slowest mode below which it counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
-"""Number of consecutive parts in which the changes of a drift steadily grow or shrink; this happens by chance
-in 2 of 720 cases."""
+"""Number of consecutive parts of a motion whose changes all grow or all shrink in a drift; this happens by
+chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Decay times without growth or decay of a perturbation after which a motion counts as quasi-periodic."""
+"""Time without growth or decay, in decay times, after which a motion counts as quasi-periodic."""
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """Period of a repeating motion, in drive periods, with its distance from exact repetition."""
+    """Period of a repeating motion, in drive periods, and its distance from the exact periodic motion."""
 
     period: int
     distance: float
@@ -62,49 +62,49 @@ class Growth:
 
     @property
     def total(self) -> float:
-        """Return the natural logarithm of the growth over all stretches."""
+        """Natural logarithm of the growth over all stretches."""
         return float(self.logarithms.sum())
 
     @property
     def is_certain(self) -> bool:
-        """Return whether the growth is large enough to prove chaos."""
+        """Whether the growth is large enough to prove chaos."""
         return self.total > CERTAIN_GROWTH
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Return the growth over the first and the second half of the stretches."""
+        """Growth over the first and over the second half of the stretches."""
         middle = len(self.logarithms) // 2
         return float(self.logarithms[:middle].sum()), float(self.logarithms[middle:].sum())
 
 
 @dataclass(frozen=True)
 class Sharpness:
-    """Tolerances relative to the size of a motion."""
+    """Tolerances of the test for repetition, relative to the size of the motion."""
 
     tolerance: float
-    """Largest distance from the periodic motion that counts as settled."""
+    """Largest distance from the periodic motion for a settled motion."""
     noise: float
-    """Changes from one period to the next caused by the integration steps."""
+    """Change from one period to the next that the integration steps may cause."""
 
 
 def repetition(
     section: Floats, omega: float, forgetting_periods: float, sharpness: Sharpness
 ) -> Repetition | None:
-    """Return the shortest period after which the end of a section repeats; None if it does not.
+    """Return the shortest period with which a motion ends; None if it does not repeat.
 
-    States one decay time apart are compared twice, because a small change per period may belong to a slow
-    drift over a large distance. The ratio of the two changes gives the remaining distance.
+    Two changes over the same number of periods, about a decay time, are compared, because a small change in
+    one period may be part of a slow drift. The ratio of the two changes gives the remaining distance.
 
     Parameters
     ----------
     section
-        States once per drive period, shape (n, 6); longer periods require longer sections.
+        States once per drive period, shape (n, 6); a longer period requires more states.
     omega
         Angular frequency of the drive [rad/s]; velocities are divided by it.
     forgetting_periods
         Drive periods in which the slowest mode without contact decays by a factor of e.
     sharpness
-        Tolerances.
+        Tolerances of the test.
     """
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
@@ -125,13 +125,13 @@ def repetition(
 
 
 def _returns_nowhere(points: Floats, tolerance: float) -> bool:
-    """Return whether the last state alone excludes repetition (a fast test that detects most chaos)."""
+    """Return whether the last state alone excludes repetition; a fast test that detects most chaos."""
     changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
     return bool(np.all(changes >= tolerance))
 
 
 def wandered_until(section: Floats, omega: float, period: int) -> int:
-    """Return the index of the first state from which a section nearly repeats with this period."""
+    """Return the index of the first state from which on a motion nearly repeats with this period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)
@@ -140,10 +140,10 @@ def wandered_until(section: Floats, omega: float, period: int) -> int:
 
 
 def is_drifting(section: Floats, omega: float) -> bool:
-    """Return whether the changes of a motion from period to period shrink or grow steadily.
+    """Return whether the changes of a motion from one period to the next steadily shrink or steadily grow.
 
-    Near a bifurcation a motion settles so slowly that a perturbation neither grows nor decays measurably, as
-    on a torus. On a torus, however, the changes from period to period keep their size.
+    Near a bifurcation a motion settles so slowly that, as on a torus, perturbations neither grow nor decay
+    measurably. On a torus, however, the changes from period to period keep their size.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def is_drifting(section: Floats, omega: float) -> bool:
 
 
 def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
-    """Return the distance from the periodic motion, extrapolated from the shrinking changes."""
+    """Return the remaining distance from the periodic motion, extrapolated from shrinking changes."""
     late = _change(points[-period:], points[-period - lag : -lag])
     if late < noise:
         return late
@@ -178,7 +178,7 @@ def longest_section(forgetting_periods: float) -> int:
 
 
 def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
-    """Return the kind of a motion; undecided if the growth is unclear or was observed too briefly."""
+    """Return the kind of a motion; undecided if the growth is unclear or was observed too shortly."""
     if repeats is not None:
         return MotionKind.PERIODIC
     times = growth.duration_s / fading_s
@@ -196,20 +196,20 @@ def _change(after: Floats, before: Floats) -> float:
 
 
 FORGETTING = 8.0
-"""Decay times of the slowest mode after which a non-repeating motion counts as on its attractor."""
+"""Decay times of the slowest mode after which a non-repeating motion counts as being on its attractor."""
 FEWEST_TIMES = 40.0
-"""Length of the longest run over the longest decay time; slower and undamped modes are given this time."""
+"""Longest run over the longest decay time; decay times of slower and undamped modes are limited to this."""
 MOST_STATES = 2_000_000
-"""Most drive periods in a window; the states of two windows and a copy take 300 MB."""
+"""Most drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
-"""Fewest drive periods after which a non-repeating motion counts as on its attractor."""
+"""Fewest drive periods after which a non-repeating motion counts as being on its attractor."""
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
 """Relative distance from the periodic motion below which a motion counts as settled."""
 ROUNDING = 1e-10
-"""Relative noise of exact flight, and of contacts that begin and end as one period before."""
+"""Relative noise of a motion that is exact, or whose contacts have the same steps in every period."""
 EXACTLY = 1e-9
-"""Relative distance from the periodic motion below which the rest of a run is skipped; smaller than the error
-of any accuracy level."""
+"""Relative distance from the periodic motion below which the rest of a run is skipped; below the error of
+every accuracy level."""
 STEPPING = 100.0
 """Noise of time integration over its tolerance, because steps differ from period to period. Measured: at most
 70 (p^7 at 130 Hz and 20 um)."""
@@ -217,39 +217,39 @@ STEPPING = 100.0
 
 @dataclass(frozen=True)
 class Pace:
-    """Time scales and tolerances for one drive."""
+    """Time scales and tolerances for a specimen under one drive."""
 
     frequency_hz: float
     forgetting_s: float
-    """Time in which the slowest mode without contact decays by e [s], limited to 1/40 of the longest run."""
+    """Decay time of the slowest mode without contact (factor e) [s], at most 1/40 of the longest run."""
     fading_s: float
-    """The same decay time without the limit [s]; for undamped modes, the limit."""
+    """The same decay time without this limit [s]; for undamped modes, the limit."""
     sharpness: Sharpness
     nearly: Sharpness
-    """Tolerances of the least accurate level."""
+    """Tolerances of the least accurate level, for motions that are nearly settled."""
 
     @property
     def forgetting_periods(self) -> float:
-        """Return the decay time ``forgetting_s`` in drive periods."""
+        """Decay time ``forgetting_s`` in drive periods."""
         return self.forgetting_s * self.frequency_hz
 
     @property
     def attractor_s(self) -> float:
-        """Return the time after which a non-repeating motion counts as on its attractor [s]."""
+        """Time after which a non-repeating motion counts as being on its attractor [s]."""
         return max(FORGETTING * self.forgetting_s, FEWEST_PERIODS / self.frequency_hz)
 
     @property
     def section_s(self) -> float:
-        """Return the length of a section that is needed to detect every period [s]."""
+        """Simulated time whose states suffice to detect every period [s]."""
         return (longest_section(self.forgetting_periods) + 1) / self.frequency_hz
 
     @property
     def settling_s(self) -> float:
-        """Return the run length that is needed to detect that a motion repeats [s]."""
+        """Length of a run that suffices to detect whether a motion repeats [s]."""
         return self.attractor_s + self.section_s
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
-        """Return the repetition at the end of consecutive stretches; None if the motion does not repeat."""
+        """Return the repetition at the end of consecutive stretches; None if there is none."""
         return self.repeats_in(states_of(stretches))
 
     def drifts(self, stretches: Sequence[Stretch]) -> bool:
@@ -257,21 +257,21 @@ class Pace:
         return is_drifting(states_of(stretches), 2.0 * np.pi * self.frequency_hz)
 
     def cycle(self, stretches: Sequence[Stretch]) -> int:
-        """Return the period of a nearly settled motion, over which lines are taken; 1 if there is none.
+        """Return the period of a nearly settled motion, in drive periods; 1 if there is none.
 
-        The limit for "nearly settled" is the same at every accuracy level, so that lines are comparable.
+        Lines are taken over this period. What counts as nearly settled is the same at every accuracy level.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period
 
     def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
-        """Return whether a perturbation grew enough in each half of the stretches to prove chaos."""
+        """Return whether a perturbation grew, in each half of the stretches, enough to prove chaos."""
         growth = growth_of(stretches)
         is_plenty = min(growth.halves) > CERTAIN_GROWTH
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC
 
     def repeats_in(self, section: Floats) -> Repetition | None:
-        """Return the repetition at the end of a section, shape (n, 6); None if it does not repeat."""
+        """Return the repetition at the end of states, shape (n, 6); None if there is none."""
         omega = 2.0 * np.pi * self.frequency_hz
         return repetition(section, omega, self.forgetting_periods, self.sharpness)
 
@@ -279,7 +279,7 @@ class Pace:
 def pace_of(
     specimen: Specimen, frequency_hz: float, accuracy: Accuracy, slowest_rate: float, longest_s: float
 ) -> Pace:
-    """Return the time scales and tolerances, for a slowest mode with ``slowest_rate`` <= 0 [1/s]."""
+    """Return time scales and tolerances; ``slowest_rate`` is that of the slowest mode, <= 0 [1/s]."""
     slowest_s = min(longest_s / FEWEST_TIMES, MOST_STATES / FEWEST_TIMES / frequency_hz)
     fading_s = -1.0 / slowest_rate if slowest_rate < 0.0 else slowest_s
     own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))
@@ -296,7 +296,7 @@ def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
 
 
 def growth_of(stretches: Sequence[Stretch]) -> Growth:
-    """Return the growth of the tangent vector over the stretches that have one."""
+    """Return the growth of the tangent vector over those stretches that have one."""
     carried = [stretch for stretch in stretches if np.isfinite(stretch.growth)]
     logarithms = np.array([stretch.growth for stretch in carried])
     return Growth(logarithms, sum(stretch.length_s for stretch in carried))

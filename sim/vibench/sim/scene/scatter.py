@@ -1,8 +1,8 @@
 """Scatter of Response I between windows of a motion that never repeats. SI units.
 
-Response I is the largest value in a window and has an extreme-value distribution: in chaos it scatters by a
-few per cent at any accuracy. The scatter is estimated from the largest values in blocks of one run, or from
-many runs with slightly different starts.
+Response I is the largest value in a window and therefore has an extreme-value distribution: in chaos it
+scatters by a few per cent at any accuracy. The scatter is estimated from the largest values in blocks of one
+run, or from several runs with slightly different starts.
 """
 
 import math
@@ -19,12 +19,12 @@ from .shares import student_quantile
 COVERED = 0.975
 """Probability below the upper end of a symmetric 95 % interval."""
 FEWEST_BLOCKS = 4
-"""Fewest blocks for an estimate."""
+"""Fewest blocks from which the scatter is estimated."""
 
 
 @dataclass(frozen=True)
 class WindowScatter:
-    """Scatter of the largest value between windows."""
+    """Scatter of the largest value in a window, from window to window."""
 
     relative: float
     """Standard deviation over the mean."""
@@ -33,19 +33,19 @@ class WindowScatter:
 
     @property
     def between_runs(self) -> float:
-        """Return the relative difference that two runs stay below in 19 cases of 20.
-        It is sqrt(2) standard deviations times Student's t for the number of blocks. Measured coverage:
-        85 to 99.7 % of the pairs of 40 runs, in seven chaotic regimes of five laws at three durations.
+        """Relative difference that two runs do not exceed in 95 % of cases.
+
+        It is sqrt(2) deviations times Student's t. Measured coverage: 85 to 99.7 % of pairs of chaotic runs.
         """
         return math.sqrt(2.0) * student_quantile(self.blocks - 1, COVERED) * self.relative
 
 
 def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatter | None:
-    """Return the scatter of the largest of ``blocks_in_window`` blocks; None for too few blocks.
+    """Return the scatter of the largest value in ``blocks_in_window`` blocks; None for too few blocks.
 
     It is the geometric mean of two standard deviations. The one of block peaks is too large, because peaks of
     longer windows scatter less (Coles, An Introduction to Statistical Modeling of Extreme Values (2001),
-    section 3.1). The bootstrap value is too small, because it never exceeds the largest observed peak.
+    section 3.1). That of the bootstrap is too small, because it never exceeds the largest observed peak.
     """
     peaks = np.sort(np.asarray(block_peaks, dtype=np.float64))
     if len(peaks) < FEWEST_BLOCKS:
@@ -57,7 +57,7 @@ def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatt
 def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
     """Return mean and standard deviation of the largest of ``drawn`` values, drawn with replacement.
 
-    Among n values drawn from N, the k-th smallest is the largest with probability (k/N)^n - ((k-1)/N)^n.
+    For n draws from N values, the k-th smallest is the largest with probability (k/N)^n - ((k-1)/N)^n.
     """
     count = len(ascending)
     weights = np.diff((np.arange(count + 1) / count) ** drawn)
@@ -86,10 +86,10 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 
 
 def _lines_apart(parts: Complex) -> float:
-    """Return the 95 % limit of the relative difference between the amplitudes of two lines.
+    """Return the 95 % limit of the relative difference between the amplitudes of a line in two windows.
 
-    A line is the mean of its complex parts. Consecutive parts may be correlated: the larger of the errors
-    from all parts and from means of pairs is used (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A
+    A line is the mean of its complex parts. Consecutive parts may be correlated, so the larger of two errors
+    is used, from all parts or from means of pairs (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A
     deviation perpendicular to the mean changes the amplitude by its square over twice the amplitude.
     """
     line = complex(parts.mean())
@@ -108,7 +108,7 @@ def _lines_apart(parts: Complex) -> float:
 def draws_of_starts(answer: Floats, others: Sequence[Floats]) -> Floats:
     """Return the 95 % limit of the relative difference between the responses of two starts, shape (4,).
 
-    ``answer`` and ``others`` are the responses of the starts, shape (4,) each. NaN if a start was lost.
+    ``answer`` and ``others`` are responses of nearly equal starts, shape (4,) each; NaN if a run failed.
     """
     found = np.array([answer, *others])
     times = math.sqrt(2.0) * student_quantile(len(found) - 1, COVERED)

@@ -1,4 +1,4 @@
-"""A scene: request for one simulation, with specimen, drive and observables. SI units."""
+"""A scene: request for one simulation of a specimen under a drive, with observables. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from ..specimen.stops import Strict, chosen, require_positive
 from .prediction import State
 
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
-"""Run from rest and window at its end [s], from Gong et al. 2025, section 2."""
+"""Length of the paper's runs from rest, and of the window at their end [s] (Gong et al. 2025, section 2)."""
 BUDGET_S = 1.0
-"""Default budget of a scene for following other starts and chaos [s]."""
+"""Default budget of computing time for other starts and for chaos [s]."""
 CLEAR, FEWEST, MOST = 8, 16, 64
-"""Numbers of starts, including the requested one. `CLEAR`: all settle on one motion, or chaos certainly
-lasts. `MOST`: they reach several motions and the budget allows it. `FEWEST`: all other cases."""
+"""Numbers of starts, including the requested one. `CLEAR` if all reach one motion, or chaos certainly lasts.
+`MOST` if they reach several motions and the budget allows it. `FEWEST` in all other cases."""
 
 
 class Observable(StrEnum):
-    """Observed quantity."""
+    """Quantity that a scene computes."""
 
     RESPONSE = "response"
-    """Responses I and II of m0 and of p."""
+    """Responses I and II of x and of p."""
     LYAPUNOV = "lyapunov"
     """Largest Lyapunov exponent; requires a tangent vector."""
     SPECTRUM = "spectrum"
-    """Amplitude spectrum of m0; requires stored samples."""
+    """Amplitude spectrum of x; requires stored samples."""
     POINCARE = "poincare"
     """States once per drive period."""
     SCATTER = "scatter"
@@ -36,12 +36,12 @@ class Observable(StrEnum):
 
 
 MOST_PERIODS = 1e12
-"""Most drive periods of a run: a double then resolves time to a ten-thousandth of a period."""
+"""Most drive periods of a run; times are then resolved to a ten-thousandth of a period."""
 
 
 @dataclass(frozen=True)
 class FixedDuration(Strict):
-    """Follow the motion for a given time and observe its end."""
+    """Simulate a given time and observe a window at its end."""
 
     duration_s: float = PAPER_DURATION_S
     window_s: float = PAPER_WINDOW_S
@@ -49,7 +49,7 @@ class FixedDuration(Strict):
 
     @property
     def longest_s(self) -> float:
-        """Return the length of the run [s]."""
+        """Length of the run [s]."""
         return self.duration_s
 
     def __post_init__(self) -> None:
@@ -64,7 +64,7 @@ class FixedDuration(Strict):
 
 @dataclass(frozen=True)
 class AutomaticDuration(Strict):
-    """Follow the motion until it settles, then observe one period, or a window if it never repeats."""
+    """Simulate until the motion settles, then observe one period, or a window if it never repeats."""
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
@@ -81,9 +81,9 @@ class Target(Strict):
     """Requested error or time, or both."""
 
     error: float | None = None
-    """Largest relative error of each response; if absent, as small as the time allows."""
+    """Largest relative error of each response; None for as small as the time allows."""
     time_s: float | None = None
-    """Time from the request to the last result [s]; if absent, at most one minute."""
+    """Limit of the computing time [s]; None for at most one minute."""
 
     def __post_init__(self) -> None:
         if self.error is None and self.time_s is None:
@@ -141,10 +141,10 @@ class Scene(Strict):
     start: Rest | Given = Rest()
     budget_s: float = BUDGET_S
     """Processor time [s] to find whether chaos lasts and, with sensitive dependence on the start, which
-    motions other starts reach. It is the nominal time on the machine of docs/accuracy.md, so that results are
-    the same on every machine. With zero, neither is determined."""
+    motions other starts reach; zero for neither. It is a nominal time, on the machine of docs/accuracy.md, so
+    that results are the same on every machine."""
     target: Target | None = None
-    """Requested error and time; they replace accuracy, duration and budget, which must not be given."""
+    """Requested error and time. They replace accuracy, duration and budget, which must then not be given."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:

@@ -1,8 +1,8 @@
-"""Motions of a scene from nearly equal starts. SI units.
+"""Motions of a scene from several nearly equal starts (initial states). SI units.
 
-After transient chaos, chance determines which motion is reached, and when: starts that differ by a millionth
-of the gap give random samples. They are followed in rounds until all have settled, chaos is known to last, or
-the budget is used up.
+After transient chaos, chance determines which motion is reached, and when. Starts that differ by a millionth
+of the gap then give random samples. They are integrated in rounds until all motions have settled, chaos is
+known to last, or the budget is used up.
 """
 
 import math
@@ -28,43 +28,43 @@ from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile,
 from .states_alone import Follow, StatesAlone
 
 PUSH = 1e-6
-"""Largest change of the start: displacements over the gap, velocities over the gap times 2 pi f."""
+"""Largest change of the start: of displacements over the gap, of velocities over the gap times 2 pi f."""
 SEED = 2025
 PARTED = 0.01
-"""Relative difference of displacements at which two starts have diverged: ten thousand times their initial
-difference."""
+"""Relative difference of displacements above which the motions from two starts have separated; it is ten
+thousand times the initial difference."""
 TOUCHING = 0.999
 """Ratio of abs(p) to the gap above which m1 may be in contact."""
 LEAST_SIZE = 1e-3
-"""Smallest size of a motion in the test for divergence, over the gap."""
+"""Smallest size of a motion, over the gap, that is used in the test for separation."""
 LEAST_S = 1e-3
-"""Smallest assumed cost of following and observing a start [s]."""
+"""Smallest assumed cost of one start [s]."""
 TOO_FEW = 4
-"""Fewest useful starts."""
+"""Fewest starts with which an ensemble is useful."""
 LASTING_S = 300.0
-"""Mean lifetime above which chaos counts as lasting [s]: ten times the length of the paper's runs."""
+"""Mean lifetime above which chaos counts as lasting [s]; ten times the length of the paper's runs."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReachedMotion:
-    """Motion reached from one start."""
+    """Final motion from one start."""
 
     run: FollowedRun
-    """Run at its end."""
+    """Run at the end of its window."""
     motion: MotionKind
     period: int | None
     responses_m: Floats
-    """Largest x, drive-frequency amplitude of x, and the same for p [m], shape (4,)."""
+    """Largest abs(x), amplitude of x at the drive frequency, and the same for p [m], shape (4,)."""
     scatter: WindowScatter | None
-    """Scatter of the largest x between windows, if the motion does not repeat."""
+    """Scatter of the largest abs(x) between windows, if the motion does not repeat."""
     wandered_until_s: float
-    """Last time at which the motion changed from period to period [s]."""
+    """Last time at which the motion still changed from one of its periods to the next [s]."""
     growth: Growth
     """Growth of a small perturbation; empty if the motion repeats."""
 
 
 def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats:
-    """Return random small changes of a start, shape (count, 6), in proportion to gap or drive amplitude."""
+    """Return random small changes of a start, shape (count, 6), proportional to gap or drive amplitude."""
     gap_m = min(specimen.gaps_m)
     length_m = gap_m if 0.0 < gap_m < math.inf else drive.amplitude_m
     scale = PUSH * length_m * np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
@@ -72,7 +72,7 @@ def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats
 
 
 def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
-    """Return whether a run from a slightly different start diverges from a motion.
+    """Return whether the motion from a slightly different start separates from a given motion.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
 
 
 def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
-    """Return whether m1 may touch a stop in each state, shape (n, 6); batches extrapolate such states."""
+    """Return for each state, shape (n, 6), whether m1 may touch a stop; batches extrapolate those states."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
     return np.asarray((p >= upper_m) | (p <= -lower_m))
@@ -103,12 +103,12 @@ def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Draw:
-    """Number, seed and cost limit of the starts."""
+    """Numbers of starts, seed, and limit of the cost."""
 
     clear: int = CLEAR
-    """Number of starts, including the requested one, if they all settle on one motion or chaos lasts."""
+    """Number of starts, including the requested one, if all reach one motion or chaos lasts."""
     fewest: int = FEWEST
-    """Number of starts in other cases."""
+    """Number of starts in all cases but these two."""
     most: int = MOST
     """Number of starts if they reach several motions."""
     seed: int = SEED
@@ -118,13 +118,13 @@ class Draw:
 
 NOT_CARRIED = Growth(np.empty(0), 0.0)
 MORE_S = 1.0
-"""Margin added to the remaining total time of all starts [s]."""
+"""Margin added to the total time that the starts must still be integrated [s]."""
 
 
 class SeveralStarts:
-    """Additional starts and their motions.
+    """Additional starts of a scene, and the motions that they reach.
 
-    Each start is followed at most as long as the scene's duration allows.
+    Each start is integrated at most as long as the scene's duration allows.
     """
 
     def __init__(
@@ -138,11 +138,11 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # Additional time with a tangent vector, to classify non-repeating motions.
+        # Time for which a non-repeating motion is then integrated with a tangent vector, to classify it.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
-        # Length of the first round; each later round is twice as long.
+        # Simulated time at the end of the first round; it doubles with each round.
         self._first_s = min(first_s, self._last_s)
         changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
         self._waiting = [begin.pushed(change) for change in changes]
@@ -151,21 +151,21 @@ class SeveralStarts:
 
     @property
     def reached(self) -> tuple[ReachedMotion, ...]:
-        """Return the motions of the starts, the requested one first."""
+        """Motions reached, that of the requested start first."""
         return tuple(self._reached)
 
     @property
     def followed_s(self) -> float:
-        """Return the total simulated time of all starts [s]."""
+        """Sum of the simulated times of all starts [s]."""
         return sum(each.run.time_s for each in self.reached)
 
     @property
     def escape(self) -> EscapeRate | None:
-        """Return the rate at which chaos dies out; None if no motion was irregular for long enough.
+        """Rate at which chaos ends; None if no motion was irregular for long enough.
 
-        A motion that is still irregular after the expected transient counts as chaotic from then on, until it
-        settles. If it has neither settled nor been found chaotic, the time needed to detect repetition is
-        subtracted, because it may have left chaos already.
+        A motion that is still irregular after the expected transient counts as chaotic from then until it
+        settles. If it has neither settled nor been proved chaotic, the time that detecting repetition takes
+        is subtracted, because its chaos may already have ended.
         """
         known = [
             (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
@@ -183,7 +183,7 @@ class SeveralStarts:
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
     def follow(self) -> None:
-        """Follow and observe as many starts as needed, within the budget."""
+        """Integrate and observe as many starts as needed, within the budget."""
         run, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = run.cost_s * min(1.0, self._first_s / run.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
@@ -193,19 +193,19 @@ class SeveralStarts:
             more = self._draw.fewest - self._draw.clear
             spent_s += self._follow_some(more, budget_s - spent_s, each_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
-            # The cost of one start determines how many more the budget allows.
+            # The cost per start so far determines how many more starts the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
             more = self._draw.most - self._draw.fewest
             self._follow_some(more, budget_s - spent_s, each_s)
 
     @property
     def _is_clear(self) -> bool:
-        """Return whether all starts reached one motion that is periodic or lasting chaos."""
+        """Whether all starts reached the same motion, which is periodic or lasting chaos."""
         settled = all(each.period is not None for each in self._reached)
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
     def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
-        """Follow and observe up to ``wanted`` more starts within a budget; return their cost [s]."""
+        """Integrate and observe up to ``wanted`` more starts within a budget; return their cost [s]."""
         count = math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
@@ -221,13 +221,13 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """Return whether chaos lasts: no start has settled, and the bound on its lifetime is long enough."""
+        """Whether chaos lasts: no start has settled, and a long enough lifetime is proved."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
     @property
     def _has_settled(self) -> bool:
-        """Return whether any start has reached a repeating motion."""
+        """Whether any start has reached a repeating motion."""
         reached = any(each.period is not None for each in self._reached)
         return reached or any(each.repeats is not None for each in self._under_way)
 
@@ -241,7 +241,7 @@ class SeveralStarts:
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
             if any(each.run.time_s < reach_s for each in left):
-                continue  # Use the remaining budget of other starts.
+                continue  # Share out the budget that finished starts did not use.
             if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
@@ -249,7 +249,7 @@ class SeveralStarts:
 
     @property
     def _lasting_after_s(self) -> float:
-        """Return the simulated time still needed to prove that chaos lasts, if no start settles [s]."""
+        """Simulated time still needed to prove that chaos lasts, if no start settles [s]."""
         escape = self.escape
         if escape is None or self._has_settled:
             return math.inf
@@ -275,15 +275,15 @@ class SeveralStarts:
 SAME = 1e-3
 """Largest relative difference of responses between runs of the same motion."""
 APART = 2.0
-"""Chaotic motions are different if their windows differ by this multiple of the 95 % limit of the scatter."""
+"""Difference of two chaotic motions over the 95 % limit of their scatter, above which they are different."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
-"""Kinds of motion in the order of preference for the start that represents a motion."""
+"""Kinds of motion that may represent a group of starts, in order of preference."""
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Return the starts grouped by motion; the start that represents a motion is first in its group."""
+    """Return the starts grouped by motion; the clearest motion comes first and represents its group."""
     groups: list[list[ReachedMotion]] = []
     order = {kind: place for place, kind in enumerate(CLEAREST)}
     for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
@@ -296,10 +296,10 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
 
 
 def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
-    """Return the kind of a motion reached from several starts.
+    """Return the kind of a motion that several starts reached.
 
-    In weak or bursting chaos, perturbations of most starts do not grow during the observation. If one start
-    proves growth, the total growth of all starts decides.
+    In weak or bursting chaos, the perturbations of most starts may not grow while observed. If they certainly
+    grow from one start, the total growth over all starts decides.
     """
     kinds = [each.motion for each in group if each.motion in CLEAREST]
     if group[0].period is None and any(each.growth.is_certain for each in group):
@@ -313,12 +313,12 @@ def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKin
 
 
 def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
-    """Return whether two starts reached the same motion or its symmetric partner.
+    """Return whether two starts reached the same motion or its mirror image.
 
-    Motions are compared by period and all four responses; by responses alone if one start settled too late to
-    be classified. For non-repeating motions only Response I is compared, within the scatter between windows;
-    chaotic motions that differ by less count as one. Weak chaos may appear undecided or quasi-periodic from
-    some starts: if the kinds of two motions differ, the smaller scatter is used.
+    Periodic motions are compared by period and all four responses; by responses alone if one start settled
+    too late to be classified. Other motions are compared by Response I only, within its scatter between
+    windows; chaotic motions closer than that count as one. Weak chaos may appear undecided or quasi-periodic
+    from some starts: if the kinds of two motions differ, the smaller scatter is used.
     """
     if one.period is not None and other.period is not None and one.period != other.period:
         return False
@@ -337,9 +337,9 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 
 
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
-"""Kinds of motion that may still change to another motion."""
+"""Kinds of motion that may still change if the run is continued."""
 FEWEST_DRAWS = 3
-"""Fewest starts on a motion for an estimate of its scatter."""
+"""Fewest starts on a motion from which its scatter between starts is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Function that returns the relative error of the responses of a motion; None if unknown."""
@@ -348,18 +348,18 @@ ErrorOf = Callable[[ReachedMotion], float | None]
 def ensemble_of(
     several: SeveralStarts, amplitude_m: float, forgetting_s: float, error_of: ErrorOf
 ) -> Ensemble:
-    """Return the motions reached from all starts, with their shares.
+    """Return the motions reached from all starts, with shares and errors.
 
     Parameters
     ----------
     several
-        Starts that have been followed and observed.
+        Starts that have been integrated and observed.
     amplitude_m
-        Drive amplitude.
+        Drive amplitude [m].
     forgetting_s
-        Time in which the slowest mode without contact decays by e.
+        Decay time (factor e) of the slowest mode without contact [s].
     error_of
-        Function for the relative error of the responses of a start.
+        Function for the relative error of the responses of one start.
     """
     reached, escape = several.reached, several.escape
     groups = motions_among(reached)
@@ -391,10 +391,10 @@ def ensemble_of(
 
 
 def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
-    """Return the number of starts of each motion, and whether the motion is final.
+    """Return the number of starts that reached each motion, and whether it is their final motion.
 
-    If there are several chaotic motions, even lasting chaos is not final: one chaotic motion can change to
-    another, and the escape rate counts only changes to periodic motions.
+    With several chaotic motions even lasting chaos is not final: one chaotic motion may change to another,
+    and the escape rate counts only changes to periodic motions.
     """
     is_one_chaos = kinds.count(MotionKind.CHAOTIC) == 1
     return [
@@ -404,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Return the kind of a motion; chaos is "chaotic so far" if it died out from a start or may not last."""
+    """Return the kind of a motion; "chaotic so far" for chaos that ended from a start or may not last."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
@@ -421,11 +421,11 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the 95 % limit of the relative difference between one more run and the mean of a group."""
+    """Return the 95 % limit of the relative difference between another run and the mean of a group."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
-        # The largest error is used, because some starts of bursting chaos contain no burst.
+        # Use the largest error, because with bursting chaos the runs from some starts contain no burst.
         known = [each for each in map(error_of, group) if each is not None]
         return max(known, default=None)
     widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
@@ -438,11 +438,11 @@ def _deviation(values: Sequence[float]) -> float | None:
 
 
 ALONE = 0.5
-"""Share of the budget for following chaos further; the rest is for other starts."""
+"""Part of the budget for integrating chaos further; the rest is for other starts."""
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
-    """Return whether the start determines which motion is reached.
+    """Return whether the start determines the final motion.
 
     Parameters
     ----------
@@ -451,7 +451,7 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
     begin
         The motion at its start.
     seen
-        Findings at the end of the run.
+        Window and kind of the motion at the end of the run.
     motion
         Linear motion without stops.
     """

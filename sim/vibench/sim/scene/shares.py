@@ -1,11 +1,11 @@
-"""Confidence intervals (95 %) of shares and rates that are estimated from counts."""
+"""95 % confidence intervals of shares and rates that are estimated from counts."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 # Quantiles of Student's t, the normal and the Poisson distribution, in closed form. They equal those of
-# scipy.special, which is not used because its import (0.2 s) takes longer than most predictions.
+# scipy.special, which is not used because importing it (0.2 s) takes longer than most scenes.
 
 
 def student_quantile(freedom: int, probability: float) -> float:
@@ -27,12 +27,12 @@ def student_quantile(freedom: int, probability: float) -> float:
 
 
 def normal_quantile(tail: float) -> float:
-    """Return the standard normal value that is exceeded with the probability ``tail`` (at most 0.5)."""
+    """Return the standard normal value exceeded with the probability ``tail`` (at most 0.5)."""
     return math.sqrt(2.0) * _root(math.erfc, 2.0 * tail, 30.0)
 
 
 def poisson_mean(fewer_than: int, probability: float) -> float:
-    """Return the mean of a Poisson count that is below ``fewer_than`` with the given probability."""
+    """Return the mean of a Poisson count that is below ``fewer_than`` with this probability."""
 
     def below(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
@@ -42,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Return the argument from 0 to ``high`` at which a decreasing function is ``value``, by bisection."""
+    """Return the argument in 0 to ``high`` at which a decreasing function equals ``value``; bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)
@@ -50,12 +50,12 @@ def _root(decreasing: Callable[[float], float], value: float, high: float) -> fl
 
 
 UNSURE = 0.05
-"""Probability that an interval misses its value."""
+"""Probability that a confidence interval does not contain the true value."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """A share of starts with its confidence limits."""
+    """Share of starts, with the limits of its confidence interval."""
 
     share: float
     low: float
@@ -86,7 +86,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     share, weight = count / trials, deviations**2 / trials
     middle = (share + 0.5 * weight) / (1.0 + weight)
     half = math.sqrt(weight * (share * (1.0 - share) + 0.25 * weight)) / (1.0 + weight)
-    # Set limits of 0 and 1 exactly, without rounding.
+    # Set limits of exactly 0 and 1, without rounding errors.
     return Share(
         share=share,
         low=0.0 if count == 0 else middle - half,
@@ -96,20 +96,20 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
 
 @dataclass(frozen=True)
 class Count:
-    """Trials with one outcome."""
+    """Number of trials with one outcome."""
 
     trials: float
-    """Number of trials; fractional if dependent trials count as fewer."""
+    """Number of trials; fractional if dependent trials count less."""
     is_final: bool
-    """False if the trials were not followed to their end and may still have any outcome."""
+    """Whether the trials have ended; otherwise they may still have any outcome."""
 
 
 def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
     """Return the shares of several outcomes with simultaneous 95 % confidence intervals.
 
-    For two outcomes the ordinary interval is used. For more outcomes each interval is widened, so that all
-    are valid at the same time (Goodman, Technometrics 7 (1965) 247). The intervals include any final outcome
-    of the trials that are not final.
+    Two outcomes have the ordinary interval. For more outcomes each interval is widened so that all hold
+    together (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final outcome of
+    the trials that have not ended.
     """
     trials = sum(each.trials for each in counts)
     pending = sum(each.trials for each in counts if not each.is_final)
@@ -125,7 +125,7 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """Rate at which chaos dies out, estimated from several starts; the inverse of its mean lifetime."""
+    """Rate at which chaos ends, estimated from several starts; its inverse is the mean lifetime."""
 
     rate_per_s: float
     """Number of escapes over the total time in chaos [1/s]."""
@@ -140,21 +140,21 @@ class EscapeRate:
 
     @property
     def lifetime_above_s(self) -> float:
-        """Return a lower bound on the mean lifetime of chaos."""
+        """Lower bound on the mean lifetime of chaos [s]."""
         return 1.0 / self.high_per_s
 
     @property
     def lifetime_below_s(self) -> float:
-        """Return an upper bound on the mean lifetime of chaos; infinite without escapes."""
+        """Upper bound on the mean lifetime of chaos [s]; infinite without escapes."""
         return 1.0 / self.low_per_s if self.low_per_s > 0.0 else math.inf
 
 
 def escape_rate(escapes: int, chaotic_s: float) -> EscapeRate:
-    """Return the rate at which chaos dies out, from the number of escapes and the total time in chaos.
+    """Return the rate at which chaos ends, from the number of escapes and the total time in chaos [s].
 
     Lifetimes of transient chaos are exponentially distributed (Grebogi, Ott and Yorke, Physica D 7 (1983)
-    181). A lifetime that has not ended counts up to the end of its run. The confidence interval is that of a
-    Poisson process (Garwood, Biometrika 28 (1936) 437).
+    181). Chaos that has not ended contributes the time up to the end of its run. The confidence interval is
+    that of a Poisson process (Garwood, Biometrika 28 (1936) 437).
     """
     tail = UNSURE if escapes == 0 else 0.5 * UNSURE
     low = 0.0 if escapes == 0 else poisson_mean(escapes, 1.0 - tail) / chaotic_s

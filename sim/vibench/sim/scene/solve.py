@@ -52,12 +52,12 @@ EXPONENT_PRECISION = 0.2, 0.01
 
 
 class Question(StrEnum):
-    """Extent of the requested solution."""
+    """Extent of the solution of a scene."""
 
     ANSWER = "answer"
-    """Responses with errors; with sensitive dependence on the start, also motions from other starts."""
+    """Responses with errors and, with sensitive dependence on the start, motions from other starts."""
     MOTION = "motion"
-    """Only the motion and its responses, without errors: for maps, where neighbouring points show more."""
+    """Only the motion and its responses, without errors; for maps, where neighbouring points show errors."""
 
 
 QuestionWord = Literal["answer", "motion"]
@@ -65,13 +65,13 @@ QuestionWord = Literal["answer", "motion"]
 
 @dataclass(frozen=True)
 class InBatches:
-    """Marker for a solver that calls `solve_scenes`."""
+    """Solver that solves many scenes together, by `solve_scenes`."""
 
     question: Question = Question.ANSWER
 
 
 Solver = Callable[[Scene], ScenePrediction] | InBatches
-"""Solver of scenes: a function for one scene, or batches."""
+"""Solver of scenes: a function for one scene, or `InBatches`."""
 
 
 def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWER) -> ScenePrediction:
@@ -80,10 +80,10 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     Each of the four responses has a relative error; ``error_estimate`` is the largest. It is twice the
     measured difference from a run with a far smaller tolerance (docs/accuracy.md). For a settled motion, that
     run continues from the end until the transient has decayed; otherwise it begins at the start. If the two
-    runs diverge, a repeated run is a new random sample: the error is then the difference that two samples
-    stay below in 19 cases of 20.
+    runs separate, any repeated run is a new random sample. The error is then the difference that two samples
+    do not exceed in 95 % of cases.
 
-    Raises ValueError when the specimen cannot be simulated, or not from this start.
+    Raises ValueError when the specimen cannot be simulated from this start.
     """
     question = chosen(Question, question)
     if scene.target is not None:
@@ -103,35 +103,35 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 
 
 def settle_scene(scene: Scene) -> ScenePrediction:
-    """Solve a scene as planned, without errors and other starts.
+    """Solve a scene as planned, without errors and without other starts.
 
-    It finds the same motion as `solve_scene` in a third of the time or less. Chaos is followed as long as
+    It finds the same motion as `solve_scene` in a third of the time or less. Chaos is integrated as long as
     the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
-    Raises ValueError when the specimen cannot be simulated, or not from this start.
+    Raises ValueError when the specimen cannot be simulated from this start.
     """
     return solve_scene(scene, Question.MOTION)
 
 
 MOST_HELD = 2e7
-"""Approximate number of states that a batch of scenes may store: one gigabyte."""
+"""Approximate number of states that a group of scenes may store at once: one gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Result of one scene of a batch."""
+    """Result of one of several scenes that were solved together."""
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for the scene [s], including its share of the batch. NaN if the time
-    includes loading of modules."""
+    """Processor time of this thread for the scene [s], including its share of batches. NaN if modules were
+    loaded in this time."""
 
 
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[Solved]:
     """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
 
-    The result of a scene does not depend on the others. In chaos it is a different random sample from that of
-    `solve_scene`. Raises ValueError when a scene cannot be simulated, or not from its start.
+    The result of a scene does not depend on the other scenes. In chaos it is another random sample than that
+    of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
     """
     found: list[Solved] = []
     together: list[Scene] = []
@@ -176,7 +176,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]
 
 @contextmanager
 def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
-    """Divide the processor time of the block equally among these scenes, and add it to ``taken_s``."""
+    """Share the processor time of the `with` block equally among these scenes; add it to ``taken_s``."""
     began_s = time.thread_time()
     yield
     part_s = (time.thread_time() - began_s) / max(1, len(places))
@@ -189,24 +189,24 @@ def solve_ensemble(
 ) -> Ensemble | None:
     """Solve a scene from several starts that differ by a millionth of the gap.
 
-    `solve_scene` does the same with few starts if the motion depends sensitively on the start. More starts
-    give narrower intervals; another seed gives another random sample. Raises ValueError for fewer than 4
-    starts, or when the specimen cannot be simulated.
+    `solve_scene` does this with few starts if the motion depends sensitively on the start. More starts give
+    narrower confidence intervals; another seed gives another random sample. Raises ValueError for fewer than
+    4 starts, or when the specimen cannot be simulated.
 
     Parameters
     ----------
     scene
-        Scene whose start is the first.
+        Scene whose start is the first of the starts.
     starts
         Number of starts including the scene's own, at least 4.
     seed
         Seed of the random differences between the starts.
     budget_s
-        Nominal processor time for all starts, as defined for `Scene`; infinite for no limit.
+        Limit of the nominal processor time for all starts, as in `Scene` [s]; infinite for no limit.
 
     Returns
     -------
-    Motions of all starts. None if the motion has a closed form or was lost, or if the budget is too small.
+    Motions from all starts. None if the motion has a closed form, its run failed or the budget is too small.
     """
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: give {TOO_FEW} or more."
@@ -232,7 +232,7 @@ def _plan(scene: Scene) -> tuple[Method, LinearMotion]:
 
 
 def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
-    """Return the prediction for a scene without contact from the exact linear solution."""
+    """Return the prediction for a scene without contact, from the exact linear solution."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
     match scene.duration:
@@ -285,14 +285,14 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
 
 
 class _Begun:
-    """Scene whose motion is integrated in time and then evaluated.
+    """Scene whose motion is integrated in time, and the evaluation of this motion.
 
     Parameters
     ----------
     scene, question
-        Scene, and extent of the requested solution.
+        Scene, and extent of the solution.
     method, motion
-        Planned method, and the linear motion until a stop is touched.
+        Method from the plan, and the linear motion, which is valid until a stop is touched.
     """
 
     def __init__(self, scene: Scene, method: Method, motion: LinearMotion, question: Question) -> None:
@@ -317,13 +317,13 @@ class _Begun:
                     pace,
                     window_s,
                     min(longest_s, MOST_STATES / scene.drive.frequency_hz),
-                    # Following chaos uses a part of the budget; other starts use the rest.
+                    # Continuing chaos uses a part of the budget; other starts use the rest.
                     alone_s=ALONE * scene.budget_s if is_answer else math.inf,
                     by_itself_s=math.inf if is_answer else 0.0,
                 )
 
     def answer(self, follow: Follow) -> ScenePrediction:
-        """Return the prediction for the scene; ``follow`` is called to follow other starts."""
+        """Return the prediction for the scene; ``follow`` integrates other starts."""
         scene, seen = self._scene, self.course.seen()
         if self._question is Question.MOTION:
             return self._found(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
@@ -343,7 +343,7 @@ class _Begun:
     def ensemble(
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
-        """Return the motions from as many other starts as the budget or ``draw`` allows; None if too few."""
+        """Return the motions from other starts, as many as budget or ``draw`` allow; None if too few."""
         scene, pace = self._scene, self._pace
         requested = ReachedMotion(
             self.run,
@@ -431,7 +431,7 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Return the kind of the motion; with an automatic duration, chaotic only if the chaos lasts."""
+    """Return the kind of the motion; with an automatic duration only lasting chaos is "chaotic"."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:
@@ -441,7 +441,7 @@ def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionK
 
 
 def _supported(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
-    """Return the prediction, with a chaotic motion corrected if its exponent is not above zero."""
+    """Return the prediction; a motion found to be chaotic is corrected if its exponent is not positive."""
     from ..exponents.lyapunov import ExponentVerdict  # noqa: PLC0415 - as above
 
     is_chaotic = found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}

@@ -26,33 +26,33 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the stricter run. For *quick*, a hundredth of its tolerance would not be enough, because
-closed-form collisions are more accurate than that."""
+"""Tolerance of the stricter run. For *quick*, a hundredth of its own tolerance would not suffice, because
+collisions in closed form are more accurate than that."""
 FORGETTING = 4.0
-"""Decay times of the slowest mode before a repeating motion is compared."""
+"""Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Length of a window over that of the shorter windows compared with it; also the ratio of their leakage."""
+"""Length of a window over that of the shorter windows to which it is compared; also the ratio of leakage."""
 LOOKS = 8
-"""Number of periods compared: periods of the motion, or drive periods if it does not repeat."""
+"""Number of periods that are compared: of the motion, or of the drive if the motion does not repeat."""
 SAFETY = 2.0
-"""Ratio of the stated to the measured error."""
+"""Stated error over measured error."""
 ROUNDING = 1e-11
-"""Relative error of an exact result due to rounding."""
+"""Relative rounding error of an exact result."""
 ROUNDED = 1e-13
 """Offset of the start of the stricter run, over the drive amplitude. It is several times the accumulated
-rounding of a run, because one offset is only one sample of the effect of rounding."""
+rounding error of a run, because one offset shows only one sample of the effect of rounding."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-"""Signs of the offset; y and z have the same sign so that p keeps its value, in case the gap is zero."""
+"""Signs of this offset for each coordinate. Those of y and z are equal, so that p does not change."""
 SLOWEST_RATIO = 0.9
-"""Largest assumed ratio of a change to the change before, for the slowest settling."""
+"""Largest assumed ratio of successive changes, for the slowest settling."""
 FIRST_LOOK = 16
-"""Drive periods before two runs are first compared; they are compared again whenever the time doubles."""
+"""Number of drive periods before two runs are first compared; later, whenever the time has doubled."""
 PARTED = 0.05
-"""Share of the gap, or relative difference of responses, at which two runs have diverged."""
+"""Difference over the gap, or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
 """Decay times of the slowest mode after which a chaotic motion counts as stationary."""
 MEMBERS = 5
-"""Number of additional starts if the window itself does not show the difference between samples."""
+"""Number of additional starts if the difference between samples cannot be estimated from the window."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +60,13 @@ class StatedErrors:
     """Relative errors of Response I and II of x, then of p; NaN where unknown."""
 
     stated: Floats
-    """Error of each response, shape (4,)."""
+    """Relative error of each response, shape (4,)."""
     integration: float
     """Largest measured integration error, which a stricter accuracy would reduce."""
 
 
 UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
-"""Errors of a lost run."""
+"""Errors of a run that failed."""
 
 
 def stated_errors(
@@ -85,16 +85,16 @@ def stated_errors(
     scene
         Requested scene.
     begin, run
-        Motion at time zero, and at its end.
+        The motion at time zero, and at its end.
     seen, pace
-        Findings of the run, and time scales and tolerances of the motion.
+        Window and kind of the motion, and its time scales and tolerances.
     slowest_rate
         Rate of the slowest mode without contact [1/s], zero or negative.
     follow
-        Function that follows other starts.
+        Function that integrates other starts.
     """
     answer = seen.window.responses_m
-    # A stricter run may not repeat yet; its lines are then taken over another length.
+    # The stricter run may not repeat yet. Its lines are then taken over another length, so add the leakage.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
@@ -116,10 +116,10 @@ def stated_errors(
 
 
 def _by_window(seen: SceneRun) -> Floats:
-    """Estimate the relative errors due to the position of the window, shape (4,).
+    """Estimate the relative errors due to the position of the window in time, shape (4,).
 
-    The errors are the largest differences from shorter windows at other positions. These include early
-    windows, because a slowly settling motion may settle further.
+    They are the largest differences from shorter windows at other positions. Early windows are included,
+    because a slowly settling motion may settle further.
     """
     answer = seen.window.responses_m
     lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
@@ -133,28 +133,28 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Return the rounding errors of exact responses; those of lines are also relative to the peaks."""
+    """Return the relative rounding errors of responses; those of lines also count relative to the peaks."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
 @dataclass(frozen=True, eq=False)
 class _StrictRun:
-    """Motion followed from its start at a stricter accuracy."""
+    """Motion integrated from its start with a smaller tolerance."""
 
     run: FollowedRun
-    """Run at the time when it diverged from the original run, otherwise at the end of the window."""
+    """Run at the time at which it separated from the original run, else at the end of the window."""
     responses_m: Floats | None
-    """Responses in the window, shape (4,); None if the run diverged before."""
+    """Responses in the window [m], shape (4,); None if the runs separated before."""
     is_together: bool
-    """Whether this run never diverged from the original run."""
+    """Whether the two runs never separated."""
 
 
 def _more_starts(
     begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace, follow: Follow
 ) -> list[Floats]:
-    """Return the responses of a few more starts in the same window, shape (4,) each; NaN for a lost start.
+    """Return the responses of a few more starts in the same window, shape (4,) each; NaN if a run fails.
 
-    The stricter run is included, because all other starts share the step errors before they diverge.
+    The stricter run is one of them, because all others share the step errors until they separate.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.pushed(push) for push in pushed[1:]]
@@ -175,10 +175,10 @@ def _more_starts(
 def error_of_settled(
     run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
 ) -> Floats:
-    """Return the relative errors of the responses of a repeating motion; NaN if the comparison failed.
+    """Return the relative errors of the responses of a repeating motion; NaN if a run fails.
 
-    The responses in this and the next periods, whose steps differ, are compared with a stricter run. The
-    stricter run is observed a second time later, because the motion may settle more slowly than its modes.
+    The responses in this and the next periods, whose time steps differ, are compared with a stricter run.
+    That run is observed again later, because the motion may settle more slowly than its modes decay.
     """
     cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
@@ -198,7 +198,7 @@ def error_of_settled(
 
 
 def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
-    """Return the largest relative error of the responses added by one drive period; NaN if lost."""
+    """Return the largest relative error of the responses that one drive period adds; NaN if a run fails."""
     cycle_s = 1.0 / run.drive.frequency_hz
     on = run.apart(accuracy.tolerance)
     seen, missed = [], []
@@ -210,10 +210,10 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
 
 
 def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> _StrictRun:
-    """Follow a motion from its start at a stricter accuracy until it diverges, else through the window.
+    """Integrate a motion from its start with a smaller tolerance, until it separates or the window ends.
 
-    The start is offset by a rounding error. Otherwise exact flights would be compared with themselves, and a
-    motion that amplifies rounding would appear exact.
+    The start is offset by a rounding error. Otherwise exact motion between contacts would be compared with
+    itself, and a motion that amplifies rounding errors would appear exact.
     """
     loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
     strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
@@ -224,18 +224,18 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return _StrictRun(strict, None, is_together=False)
-    # Take the lines over the same number of drive periods as in the original run.
+    # Take the lines over as many drive periods as in the original run.
     window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
     return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
 
 
 def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
-    """Return the responses of a window of a run, shape (4,); NaN if the run was lost."""
+    """Return the responses in a window of a run [m], shape (4,); NaN if the run failed."""
     return window.responses_m if run.outcome is Outcome.REACHED_END else np.full(4, np.nan)
 
 
 def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
-    """Return whether the states of two runs agree within `PARTED` times the gap."""
+    """Return whether the states of two runs agree within `PARTED` times the gap; False if one failed."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
     apart = np.abs(one.state - other.state) / _places_and_speeds(scene)
@@ -243,12 +243,12 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
 
 
 def _places_and_speeds(scene: Scene) -> Floats:
-    """Return the scale of each state: 1 for displacements, 2 pi f for velocities, shape (6,)."""
+    """Return the scale of each coordinate, shape (6,): 1 for displacements, 2 pi f for velocities."""
     return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
 
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
-    """Follow a run for whole drive periods; return its responses, shape (4,), NaN if it was lost."""
+    """Integrate over whole drive periods and return the responses [m], shape (4,); NaN if that fails."""
     seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
     if run.outcome is not Outcome.REACHED_END:
         return np.full(4, np.nan)

@@ -1,7 +1,7 @@
 """Motions integrated without a tangent vector until they repeat: transients, lasting chaos, other starts.
 
 A motion is integrated alone (`StatesAlone.follow`), or with others in SIMD batches of the native engine
-(`in_batches`). Its states do not depend on the other motions in the batch. SI units.
+(`in_batches`). Its states do not depend on the other motions in a batch. SI units.
 """
 
 import math
@@ -27,15 +27,15 @@ from .repetition import Growth, Pace, Repetition, growth_of, longest_section, wa
 from .scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5
-"""Shortest time between two checks [s]."""
+"""Shortest time between two checks for repetition [s]."""
 PARTS = 4
-"""Number of parts of a stretch, to see whether a small perturbation keeps growing."""
+"""Number of parts of a stretch in which growth is measured, to see whether a perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Decay times of the slowest mode for which states are kept; settling takes ten at *standard*."""
+"""Decay times of the slowest mode for which states are stored; settling takes ten at *standard*."""
 
 
 class StatesAlone:
-    """A run without a tangent vector, checked for repetition at intervals.
+    """Run without a tangent vector, which is regularly checked for repetition.
 
     Parameters
     ----------
@@ -46,10 +46,10 @@ class StatesAlone:
     slice_periods
         Drive periods between two checks.
     every
-        Keep every n-th state in `path`; None keeps none.
+        Store every n-th state in `path`; None stores none.
     by_itself_s
-        The motion joins a batch only after this time [s], because errors persist during the transient.
-        It is a whole number of drive periods, because batches begin at the end of a period.
+        Time after which the motion may join a batch [s], because errors made in a transient persist. It is a
+        whole number of drive periods, because batches begin at the end of a period.
     """
 
     def __init__(
@@ -66,11 +66,11 @@ class StatesAlone:
         self.until_s = self.cost_s = math.inf
         self.by_itself_s = by_itself_s
         self.path: list[Stretch] = []
-        """Stretches followed so far, with their kept states."""
+        """Stretches integrated so far, with every n-th state."""
         self.repeats: Repetition | None = None
-        """Repetition of the motion; None until it is found, which ends the run."""
+        """Repetition of the motion; once it is found, the run ends."""
         self.recent = np.empty((0, 6)) if recent is None else recent
-        """States once per drive period, up to now."""
+        """Latest states, once per drive period, shape (n, 6)."""
         self._settled_s: float | None = None
         self._pace = pace
         self._every = every
@@ -81,26 +81,26 @@ class StatesAlone:
 
     @property
     def is_over(self) -> bool:
-        """Return whether the motion repeats or was lost."""
+        """Whether the motion repeats or its integration failed."""
         return self.repeats is not None or self.run.outcome is not Outcome.REACHED_END
 
     @property
     def wandered_until_s(self) -> float:
-        """Return the last time at which two periods differed; the current time if it does not repeat."""
+        """Last time at which two periods differed [s]; the current time if the motion does not repeat."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
-        """End the run at this time or at this nominal cost, both counted from the start."""
+        """Set the time and the nominal cost [s] at which the run ends, both counted from the start."""
         self.until_s, self.cost_s = until_s, cost_s
         return self
 
     def follow(self, at_most_s: float = math.inf) -> None:
-        """Follow the motion until it repeats or the run ends, at the latest until ``at_most_s``."""
+        """Integrate until the motion repeats or the run ends, at the latest until ``at_most_s`` [s]."""
         run, frequency_hz, until_s = self.run, self._pace.frequency_hz, min(self.until_s, at_most_s)
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
             goal_s = min(until_s, self.by_itself_s) if run.time_s < self.by_itself_s else until_s
-            # The last part of a period is followed without a check.
+            # The last part, up to a period, is integrated without a check.
             end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self.note(stretch)
@@ -110,7 +110,7 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Return the drive periods of the next batch round; 0 in mid-period, in contact, or at the end."""
+        """Drive periods of the next round in a batch; 0 within a period, in contact, or at the end."""
         run = self.run
         if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
             return 0
@@ -119,7 +119,7 @@ class StatesAlone:
         return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
 
     def follow_to_flight(self) -> None:
-        """Follow a motion in contact until a drive period ends in flight, for at most `TRIES` periods."""
+        """Integrate until a drive period ends without contact, for at most `TRIES` periods."""
         run = self.run
         for _ in range(TRIES):
             if run.is_in_flight or run.periods is None:
@@ -134,7 +134,7 @@ class StatesAlone:
         return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
-        """Follow the motion for ``length_s``; return the growth of a small perturbation, empty for zero."""
+        """Integrate for ``length_s`` with a tangent vector; return its growth (empty for no length)."""
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
@@ -144,40 +144,40 @@ class StatesAlone:
 
 
 Follow = Callable[[Sequence[StatesAlone]], None]
-"""Function that follows motions to the end of their runs: `one_by_one` or `in_batches`."""
+"""Function that integrates motions to the end of their runs: `one_by_one` or `in_batches`."""
 
 
 def one_by_one(several: Sequence[StatesAlone]) -> None:
-    """Follow each motion in turn, without batches."""
+    """Integrate the motions one after the other, without batches."""
     for each in several:
         each.follow()
 
 
 WORTH_A_FIT_S = 3000.0
-"""Total simulated time of one specimen above which batches pay for their collision fit of one second [s]."""
+"""Total simulated time of one specimen for which batches save more than their collision fit costs [s]."""
 AUTOMATIC_S = 10.0
-"""Assumed length of a run with an automatic duration in this comparison [s]."""
+"""Assumed length, in this comparison, of a run with an automatic duration [s]."""
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
-    """Return whether batches are faster for this many motions of one specimen.
+    """Return whether batches are faster for this number of motions of one specimen.
 
-    The choice depends only on the request and the processor, not on measured times: results are reproducible.
+    The choice depends only on request and processor, not on measured times, so results are reproducible.
     """
     each_s = duration.duration_s if isinstance(duration, FixedDuration) else AUTOMATIC_S
     return motions * each_s >= WORTH_A_FIT_S and batches_pay()
 
 
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Longest time [s] and most drive periods between two checks of a batch, whose states fill memory."""
+"""Longest time [s] and most drive periods between two checks of a batch; limited by the stored states."""
 HELD_STATES, FULL = 1 << 20, 16
-"""Most states of all motions in a batch, and the number of motions that fill the SIMD registers."""
+"""Most stored states of all motions in a batch; number of motions that fill the SIMD registers."""
 TRIES = 8
-"""Most drive periods to wait for one that ends without contact, where a batch can begin."""
+"""Most drive periods to wait for one that ends without contact; only then a batch can begin."""
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:
-    """Follow motions in SIMD batches if the specimen allows, else one by one.
+    """Integrate motions in SIMD batches if the specimen allows it, otherwise one by one.
 
     A batch only computes states. Repetition is detected in the same way as without batches.
     """
@@ -205,9 +205,9 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Follow each motion in a batch for its number of periods; return the motions to follow further."""
+    """Integrate each motion in a batch for its number of periods; return those that must go on."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
-    # A motion that the batch cannot follow keeps its state and is followed without a batch.
+    # A motion that the batch cannot integrate keeps its state and is integrated without a batch.
     return [
         each
         for (each, _), stretch in zip(ready, found, strict=True)
