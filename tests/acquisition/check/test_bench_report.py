@@ -15,6 +15,10 @@ from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
+from ..run.ending_silent import terminal_v
+
+SILENT_V = 5e-3
+
 
 @pytest.fixture
 def checked(bench_of):
@@ -132,12 +136,16 @@ class PressedOnceItSounds(StopSwitch):
         return super().request
 
 
-def test_a_stop_during_a_check_silences_the_drive(bench_of, rig, tmp_path):
+@pytest.mark.parametrize("is_stuck", [False, True])
+def test_a_stop_during_a_check_silences_the_drive(bench_of, rig, tmp_path, is_stuck):
     with bench_of(rig) as (bench, virtual):
+        if is_stuck:
+            virtual.faults.stick_output()
         switch = PressedOnceItSounds(virtual.generator)
         with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
             bench_report(bench, tmp_path, switch)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
+        assert terminal_v(virtual) < SILENT_V
 
 
 class StalledOnceItSounds(PressedOnceItSounds):

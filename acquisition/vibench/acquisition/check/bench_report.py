@@ -123,6 +123,9 @@ class _BlockReader:
                     self._read_for(wait_s)
                 blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
                 return np.concatenate(blocks, axis=1)
+            except BaseException:
+                guard.silence()  # the second call below lowers the amplitude: the output's relay may be stuck
+                raise
             finally:
                 try:
                     guard.silence()
