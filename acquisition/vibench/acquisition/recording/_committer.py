@@ -193,11 +193,11 @@ class TableWriter:
     def __init__(self, places: TablePlaces) -> None:
         self._places = places
         self.rows = 0
-        """Number of rows so far."""
+        """Number of rows of the table so far."""
 
     @property
     def free_rows(self) -> int:
-        """Number of rows that still fit."""
+        """Number of rows that still fit into the table."""
         return self._places.table.capacity - self.rows
 
     def append(self, cells: Sequence[Cell]) -> Batch:

@@ -31,7 +31,7 @@ class Disk(Protocol):
 
 
 class PositionedFile(OpenFile):
-    """File on a real disk; its lock marks it as being recorded while open, and others may read it."""
+    """File on a real disk; while open, a lock marks it as being recorded, but other programs may read it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

@@ -47,7 +47,7 @@ _OUTSTANDING = 8.0
 _JUMP = 4.0
 """Smallest change between samples at the edge of a drop-out, relative to the largest in the flanks."""
 _STEEP = 0.2
-"""Smallest such change relative to the largest distance from the fit; clipped peaks change more slowly."""
+"""Smallest change at the edge, over the largest distance from the fit; clipped peaks change more slowly."""
 _MOST_PER_S = 400.0
 """Largest number of drop-outs per second; more indicate motion."""
 _ORDER = 48

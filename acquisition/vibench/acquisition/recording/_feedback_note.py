@@ -27,7 +27,7 @@ class Steadiness(StrEnum):
 
 
 class Held(StrEnum):
-    """Whether a level was reached."""
+    """Whether the controlled amplitude of the base (or of m0) was within its tolerance."""
 
     WITHIN = "within tolerance"
     OUTSIDE = "outside tolerance"
@@ -286,7 +286,7 @@ class Stability(StrEnum):
     STABLE = "stable"
     UNSTABLE = "unstable"
     OPEN = "not determined"
-    """The bounds of the multiplier include 1, or the motion changed."""
+    """Not determined: the bounds of the multiplier include 1, or the motion changed."""
 
 
 class BranchStabilityNote(AbstractNote):

@@ -411,7 +411,7 @@ class NotedSeal:
     seal: str
     """Seal in the table of points; for the file of an earlier attempt, the seal of that attempt."""
     attempt_seal: str
-    """Seal in the file's last attempt; empty without an attempt, or if it was made before seals existed."""
+    """Seal in the table of attempts; empty without an attempt, or for an attempt before seals existed."""
 
 
 def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:

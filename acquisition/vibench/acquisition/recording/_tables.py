@@ -28,7 +28,7 @@ class EventKind(StrEnum):
     STATE = "state"
     MARK = "mark"
     LIMIT = "limit"
-    """A limit was exceeded; the text has its numbers as a JSON object."""
+    """A limit was exceeded; the text is a JSON object with the measured value, the limit and the channel."""
     SPECIMEN = "specimen"
     """Change of the specimen found by the live twin."""
     LATE = "late"
