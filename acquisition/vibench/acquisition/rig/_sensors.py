@@ -104,7 +104,7 @@ class StatedUncertainty(FrozenModel):
     relative: float = Field(gt=0.0, lt=1.0)
     """Expanded uncertainty over the value; 0.01 means 1 %."""
     coverage_factor: PositiveFloat = 2.0
-    """Expanded over standard uncertainty; 2 on most certificates, 1.73 for uniform bounds."""
+    """Expanded uncertainty over standard uncertainty; 2 on most certificates, 1.73 for uniform bounds."""
     source: str = Field(min_length=1)
     """Certificate with its number, or data sheet."""
 
