@@ -101,7 +101,7 @@ class AcquisitionLoop:
         return block
 
     def cut(self) -> None:
-        """Let the next duration start now, even if the last one is incomplete and samples wait."""
+        """Let the next duration start now, even if the last one is incomplete and samples are unread."""
         self._due_s = self._sampled / self._digitizer.sample_rate_hz
 
     def enter(self, segment: Segment | None) -> None:

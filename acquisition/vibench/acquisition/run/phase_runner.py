@@ -32,10 +32,10 @@ CLEAR = 0.3
 
 
 class Heard(Protocol):
-    """Consumer of blocks."""
+    """Object that receives every block that is read."""
 
     def append(self, block: Block) -> None:
-        """Add the next block."""
+        """Receive the next block."""
 
 
 class GlideWatch:
