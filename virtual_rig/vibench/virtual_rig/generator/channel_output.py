@@ -97,7 +97,7 @@ class ChannelSettings:
     shape: str = SINE
     frequency_hz: float = 1e6
     amplitude_vpp: float = 2.0
-    """Amplitude in open circuit; this is 1 Vpp into 50 ohm."""
+    """Amplitude in open circuit, peak to peak [V]; the default is 1 Vpp into 50 ohm."""
     offset_v: float = 0.0
     """Offset in open circuit [V]."""
     phase_deg: int = 0
