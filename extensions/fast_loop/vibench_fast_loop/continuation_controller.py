@@ -226,7 +226,7 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 
 
 _EACH = 5
-"""Periods per change; short compared with the growth of deviations, long compared with the upper modes."""
+"""Drive periods per change: deviations hardly grow in this time, but the upper modes follow the change."""
 _LEAD, _TRIAL = 3, 8
 """Number of changes before the evaluated ones, and in the trial that finds the size of changes."""
 _CHANGED = (0, 2)
