@@ -23,7 +23,7 @@ Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
 class Until(FrozenModel):
     """Record until the bound on the error of every result named here is small enough.
 
-    The planned time is never exceeded. The bounds hold in 95 % of recordings, also in those that they end.
+    The planned time is never exceeded. The bounds hold in 95 % of recordings, also of those that end early.
     They include noise and chance, which recording time reduces, but not the uncertainty of calibrations.
     """
 
