@@ -36,9 +36,9 @@ class Found(Enum):
     """Kinds of instruments that the computer can find."""
 
     GENERATORS = auto()
-    """VISA resources."""
+    """VISA resources, which include generators."""
     CONVERTERS = auto()
-    """Devices of the DAQ driver."""
+    """Devices of the DAQ driver, which include converters."""
 
 
 @dataclass(frozen=True)
