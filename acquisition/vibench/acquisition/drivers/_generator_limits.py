@@ -210,7 +210,7 @@ class NoGenerator:
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
-        """Accepted amplitudes [V]."""
+        """Smallest and largest amplitude that is accepted, peak to peak [V]."""
         return _NOTHING_VPP, self.amplitude_limit_vpp
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
