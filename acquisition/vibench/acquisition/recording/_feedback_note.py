@@ -323,7 +323,7 @@ class UntilNote(AbstractNote):
     wishes: dict[str, SixFigures]
     """Requested relative 95 % bounds, by result."""
     longest_s: SixFigures
-    """Longest recorded time [s]."""
+    """Longest time that may be recorded [s]."""
     bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
     """95 % bounds at the last analysis; None if not determined, empty before the first analysis."""
     looked_s: SixFigures = 0.0
