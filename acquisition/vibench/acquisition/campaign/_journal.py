@@ -138,7 +138,7 @@ class CampaignProgress:
     number: int
     """Number of the current recording, from 1."""
     count: int
-    """Number of all recordings."""
+    """Number of all recordings of the campaign."""
     path: Path
     """Path of the current recording."""
     run: Progress
