@@ -58,7 +58,7 @@ def _with_defaults(schema: Json) -> None:
 
 
 def _with_a_base(schema: Json) -> None:
-    """Allow a specimen that starts from a named one, or is only a name."""
+    """Allow a specimen that starts from a named specimen, or is only a name."""
     for name, part in schema["definitions"].items():
         if "masses_kg" in part.get("properties", {}):
             _starts_from_another(part)
