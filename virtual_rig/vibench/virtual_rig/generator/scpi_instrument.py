@@ -35,7 +35,7 @@ class Command:
     query_takes: int = 0
     """Number of parameters of the query."""
     channels: int = CHANNELS
-    """Highest numeric suffix."""
+    """Highest numeric suffix of the header, such as 2 in ``SOUR2``."""
 
 
 def number(

@@ -244,7 +244,7 @@ class World:
             self._output(physical_channel).drop()
 
     def set_amplifier_gain_db(self, gain_db: float) -> None:
-        """Set the amplifier's gain."""
+        """Set the amplifier's voltage gain [dB]."""
         with self._turn:
             self.plant.gain = 10 ** (gain_db / 20)
 
