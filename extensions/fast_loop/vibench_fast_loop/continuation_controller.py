@@ -58,7 +58,7 @@ _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 _BELOW = 5.0
 """Start value of the first coefficient below the model's value, in steps."""
 _ABOVE = 8.0
-"""Start value of the first coefficient above the model's value, in steps; it is a factor of three."""
+"""Start value of the first coefficient above the model's value, in steps: about three times that value."""
 _LOWERED, _CALM = 0.3, 0.03
 """Largest decrease of the first coefficient per try [steps]; largest base harmonics relative to the level
 for a decrease. Both are small, because a motion with impacts is easily lost."""

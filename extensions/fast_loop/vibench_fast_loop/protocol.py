@@ -111,7 +111,7 @@ class LoopFacts(FrozenModel):
     rate_hz: PositiveFloat
     latency_s: NonNegativeFloat
     limit_v: PositiveFloat
-    """Largest output, peak [V]."""
+    """Largest output voltage, peak [V]."""
     watchdog_s: PositiveFloat
     """Time without a request after which the controller ramps down [s]."""
     pd_of: LoopInput | None = None
