@@ -88,7 +88,7 @@ def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
     heard = replace(found, noise_bias_i=1e-3, noise_error_i=2e-3, noise_source="silence before the check")
     told = heard.with_rest_as_noise(is_known_to_repeat=True)
     assert told.noise_error_i == found.rest_error_i > 2e-3
-    assert told.noise_source == "what the motion contains between its lines"
+    assert told.noise_source == "residual of the motion between its spectral lines"
     untold = replace(heard, noise_bias_i=np.nan, noise_error_i=np.nan)
     assert untold.with_rest_as_noise(is_known_to_repeat=True).noise_error_i == found.rest_error_i
     undecided = replace(heard, noise_displacement_m=found.rest_displacement_m / 25)

@@ -81,7 +81,7 @@ def test_colliding_noise_has_no_expected_uncertainty():
     plan = Measurement(name="strong", excitation=NOISE.model_copy(update={"amplitude_vpp": 3.0}))
     for each in expected_uncertainty(plan, RIG):
         assert each.after(10.0) is None
-        assert "may collide" in each.sentence
+        assert "make the masses collide" in each.sentence
 
 
 def dwell(at_hz, level_vpp):

@@ -1,4 +1,4 @@
-"""Minimum and maximum of a long signal per bin, for plots."""
+"""Minimum and maximum of a long signal in each of some hundred bins, for plots."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,12 +14,12 @@ DEFAULT_BINS = 1500
 
 @dataclass(frozen=True)
 class Envelope(Labelled):
-    """Extremes of a signal in equal stretches of time; arrays of shape (bins,)."""
+    """Extremes of a signal in equal intervals of time (bins); arrays of shape (bins,)."""
 
     OWN_UNITS: ClassVar = {"lower": "{unit}", "upper": "{unit}"}
 
     time_s: Reals
-    """Centre of each stretch."""
+    """Centre of each bin."""
     lower: Reals
     upper: Reals
 
@@ -27,7 +27,7 @@ class Envelope(Labelled):
 def envelope(
     samples: Reals, sample_rate_hz: float, *, bins: int = DEFAULT_BINS, start_s: float = 0.0
 ) -> Envelope:
-    """Reduce a signal, shape (samples,), to its extremes in at most ``bins`` stretches."""
+    """Reduce a signal, shape (samples,), to its extremes in at most ``bins`` equal intervals."""
     length = max(1, -(-samples.size // bins))
     starts = np.arange(0, samples.size, length)
     middle = np.minimum(starts + 0.5 * length, samples.size) / sample_rate_hz

@@ -122,14 +122,14 @@ class Decimator:
         self._given = 0
 
     def add(self, block: Reals) -> Reals:
-        """Add samples of shape (channels, n) and return the finished ones, shape (channels, m)."""
+        """Add samples, shape (channels, n), and return the output that is complete, shape (channels, m)."""
         self._received += block.shape[1]
         if self._factor == 1:
             return block
         return self._filtered(np.concatenate((self._pending, block), axis=1))
 
     def finish(self) -> Reals:
-        """Return the last samples, assuming zeros after the record."""
+        """Return the last output samples, assuming zeros after the record."""
         if self._factor == 1:
             return self._pending
         zeros = np.zeros((self._pending.shape[0], self._half))
@@ -164,5 +164,5 @@ def _taps(factor: int) -> Reals:
 
 
 def decimation_factor(sample_rate_hz: float, least_rate_hz: float) -> int:
-    """Return the largest factor that leaves at least the given rate."""
+    """Return the largest decimation factor whose new rate is at least ``least_rate_hz``."""
     return max(1, int(sample_rate_hz / least_rate_hz))

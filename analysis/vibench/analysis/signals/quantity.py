@@ -116,7 +116,7 @@ def converted_signal(
 
 
 def steady_line(samples: Reals, cycles_per_sample: float, beyond: int = 0) -> Complexes:
-    """Return the steady sine in a signal at a frequency, as a rotating phasor with the sine as real part.
+    """Return the steady sine of known frequency in a signal, as a rotating phasor (real part: the sine).
 
     The sine is continued by ``beyond`` samples at both ends: shape (samples + 2 beyond,).
     """
