@@ -1,4 +1,4 @@
-"""Measurements under a sine: sweeps, dwells, stepped sines, tracked resonances.
+"""Measurements with a sine drive: sweeps, dwells, stepped sines, tracked resonances.
 
 Results are Responses I and II of the paper, their phase and orders, collision regions, jumps and hysteresis.
 For a dwell, they include Poincaré points (one per drive period), a verdict on the motion, and levels in the

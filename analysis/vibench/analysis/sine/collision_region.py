@@ -18,20 +18,20 @@ _DISTORTION = 0.02
 _RINGING = 2.0
 """Least ratio of the residual to the residual simulated without contact in the same sweep."""
 _TOO_FAST = 0.5
-"""Residual relative to order 1 that collisions usually exceed; ringing above it can hide collisions."""
+"""Residual relative to order 1 that collisions usually exceed; ringing above this can hide collisions."""
 _IMPACTS = 0.1
 """Least ratio of orders 2 and 3 to order 1 that shows impacts; ringing off modes causes at most 0.05."""
 _RING_CYCLES = 5_000.0
 """Cycles after which a mode with a damping ratio of 0.02 % has decayed to 1/500."""
 _ENOUGH = 0.25
-"""Least share of a region with such orders; only required if no specimen is known."""
+"""Minimum share of a region in which orders 2 and 3 show impacts; required if no specimen is known."""
 _SMOOTH_AT_MOST = 0.1
 """Residual relative to order 1 above which a motion is never smooth."""
 _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _VOTE_S = 1.0
-"""Length of the neighbourhood whose majority decides on an interval, because collisions persist."""
+"""An interval collides if most intervals within this time exceed the threshold: collisions persist."""
 _MERGE_S = 3.0
 """Quiet stretches shorter than this do not split a region: motion may settle briefly between impacts."""
 
@@ -86,24 +86,24 @@ class Collisions(Labelled):
     """Flags of intervals inside a region, shape (intervals,)."""
     is_unexplained: Flags
     """Flags of intervals with a residual above the noise and distortion of the sensors, shape (intervals,).
-    The threshold also counts rattling during a whole sweep as noise."""
+    In contrast, the threshold takes rattling during a whole sweep for noise."""
     too_fast_hz: tuple[tuple[float, float], ...]
-    """Frequency limits of stretches where collisions are not determined, because ringing may hide them."""
+    """Frequency ranges in which collisions are not determined, because ringing may hide them."""
     noise_rms: float
     """Noise used in the threshold [m/s]."""
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
-    """Find where the motion is not a smooth, slowly varying sine.
+    """Find the intervals of a sweep in which the masses collide: the motion is no slowly varying sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
-    sweep. An interval collides if this residual exceeds three limits: 4 times the noise, 2 % of order 1, and
-    twice the residual simulated without contact under the recorded base motion. The noise is the larger of
-    two estimates: from the sixth difference of the samples, and from the quietest tenth of the sweep if it
-    can be smooth. The majority of neighbours decides, also during laser drop-outs. A residual of twice its
-    limits is enough if two successive intervals show impacts; otherwise it is not determined. Impacts show as
-    orders 2 and 3 above a tenth of order 1 and above twice their value without contact. If no specimen is
-    known, a region must show impacts at frequencies whose double and triple the sweep has not just passed.
+    sweep. The residual has three limits: 4 times the noise, 2 % of order 1, and twice the residual simulated
+    without contact. The noise is the larger of two estimates: from the sixth difference of the samples, and
+    from the quietest tenth of the sweep if it can be smooth. An interval collides if most neighbours exceed
+    the limits, also in drop-outs, or if two successive intervals exceed twice the limits and show impacts.
+    Above twice the limits without impacts, it is not determined. Impacts show as orders 2 and 3 above a tenth
+    of order 1 and above twice their value without contact. If no specimen is known, a region must show
+    impacts at frequencies whose double and triple the sweep has not just passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -116,7 +116,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
             f"more than {votes}"
         )
     ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
-    # Take the maximum over a vote: real resonances may differ a little from the described ones.
+    # Take the maximum over the neighbours: real resonances may differ a little from the described ones.
     rung = maximum_filter1d(_RINGING * np.nan_to_num(sweep.linear_impacts), votes)
     impacts = sweep.velocity.impacts > np.maximum(_IMPACTS, rung)
     most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))
@@ -169,7 +169,7 @@ def _noise(sweep: SweptMotion, residual: Reals, fundamental: Reals) -> float:
 
 
 def _majority(above: Flags, votes: int) -> Flags:
-    """Return the majority in each interval's neighbourhood, one-sided at the ends of the sweep."""
+    """Return whether most neighbours of each interval are flagged; one-sided at the ends of the sweep."""
     total = np.concatenate(([0], np.cumsum(above)))
     place = np.arange(above.size)
     low, high = np.maximum(place - votes // 2, 0), np.minimum(place + votes // 2 + 1, above.size)
@@ -192,7 +192,7 @@ def _merge_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
 
 
 def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
-    """Move the ends of a run, which the vote blurs, to the split with the fewest misclassified intervals."""
+    """Move the ends of a run, which the majority blurs, to the split with the fewest wrong intervals."""
     half = votes // 2 + 1
     begin = _best_split(above, max(0, first - half), min(first + half, last))
     end = (

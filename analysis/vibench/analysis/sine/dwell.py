@@ -33,14 +33,14 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""The same ratio to the noise in the silence; the silence is shorter than the ring-down of a mode."""
+"""Limit of the residual relative to the noise in silence, which is shorter than a mode's ring-down."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
 By chance, a mode excited by noise is this faint in one of 400 short silences. A silence also lacks the noise
 of the generator.
 """
-BETWEEN = "what the motion contains between its lines"
+BETWEEN = "residual of the motion between its spectral lines"
 
 
 @dataclass(frozen=True)
@@ -239,9 +239,9 @@ class DwellResponse(Labelled):
     response_i: float
     """Largest |x| over the window, divided by the drive amplitude."""
     noise_bias_i: float
-    """Expected bias of Response I by noise; NaN if the noise is unknown."""
+    """Expected bias of Response I due to noise; NaN if the noise is unknown."""
     noise_error_i: float
-    """RMS error of Response I by noise, including the bias; NaN if the noise is unknown."""
+    """RMS error of Response I due to noise, including the bias; NaN if the noise is unknown."""
     noise_source: str
     """Source of the noise estimate, or the reason why the noise is unknown."""
     rest_bias_i: float
@@ -254,7 +254,7 @@ class DwellResponse(Labelled):
     sd_response_ii: float
     """NaN if the response still changes by an unknown amount."""
     slow_change: float
-    """Relative standard uncertainty of Response I by slow change of base or response; NaN if unknown."""
+    """Relative standard uncertainty of Response I due to slow change of base or response; NaN if unknown."""
     phase_rad: float
     """Phase lead of x over the base displacement at the drive frequency, without the channels' delay."""
     sd_phase_rad: float
@@ -319,7 +319,7 @@ def dwell_response(
     window_s
         Length of the window, which ends with the settled part of the displacement [s].
     towards_hz
-        Frequencies, for example of the bound modes; the largest peak within 10 % of each is listed.
+        Frequencies, for example of the bound modes [Hz]; the largest peak within 10 % of each is listed.
     delay_s
         Lag of the response channel behind the base channel [s].
     sensors
@@ -445,7 +445,7 @@ def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -
 def _slow_changes(
     base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
 ) -> tuple[float, float]:
-    """Return the relative uncertainties by slow change of the base, and of response over base."""
+    """Return the relative uncertainties due to slow change of the base, and of response over base."""
     settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
     rate = displacement.sample_rate_hz
     moved, shook = (

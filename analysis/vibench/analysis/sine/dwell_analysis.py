@@ -53,7 +53,7 @@ class Section:
     """Displacement and velocity of the points, shape (periods,)."""
     orbit_displacement_m: Reals
     orbit_velocity_m_per_s: Reals
-    """Phase portrait over the same stretch, shape (samples,)."""
+    """Phase portrait over the same periods, shape (samples,)."""
     time_s: Reals
     """Time of the points, from the first sample of the record; shape (periods,)."""
 

@@ -14,19 +14,19 @@ from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse
 
 _SIDE = 12
-"""Intervals on each side to which a straight line is fitted."""
+"""Number of intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
 """Least size of a jump in standard errors, since thousands of steps are tested with rough errors."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
-"""Intervals of the transition, which belong to neither side."""
+"""Number of intervals during the jump itself, which belong to neither side."""
 _DEGREE, _EXPLAINED = 4, 0.06
 """Degree of the polynomial fitted to 1/response squared at a resonance, and its largest residual relative to
 the step. A jump leaves 0.13 or more; 400 resonances left at most 0.03."""
 _LARGER = 2.0
-"""Smallest ratio of a jump to the largest step of the linear specimen nearby."""
+"""Smallest ratio of a jump to the largest step that the linear specimen has nearby."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -149,7 +149,7 @@ def _peaks(size: Reals) -> list[int]:
 
 
 def _likely(logarithm: Reals) -> tuple[int, int, int]:
-    """Return the lower bound, best value and upper bound of the place of a step between two levels."""
+    """Return lower bound, best value and upper bound of the index at which one level changes to another."""
     count = logarithm.size
     misfit = np.full(count, np.inf)
     for place in range(2, count - 1):

@@ -70,12 +70,12 @@ class SteppedResponse(Labelled):
     response_i: Reals
     noise_bias_i: Reals
     noise_error_i: Reals
-    """RMS error of Response I by noise; NaN if unknown, like its bias."""
+    """Bias and rms error of Response I due to noise; NaN if the noise is unknown."""
     response_ii: Reals
     sd_response_ii: Reals
     """NaN if the response still changed during the step."""
     slow_change: Reals
-    """Relative standard uncertainty of Response I by slow change; NaN if unknown."""
+    """Relative standard uncertainty of Response I due to slow change; NaN if unknown."""
     phase_rad: Reals
     left_out: int
     """Number of steps that were incomplete, lost samples or had drop-outs."""
@@ -199,7 +199,7 @@ class NotedJump:
 
 
 def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
-    """Return the jumps that were bracketed as closely as requested."""
+    """Return the jumps whose two frequencies are as close as requested."""
     return tuple(
         NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
         for each in notes

@@ -115,13 +115,13 @@ _LINEAR_ABOVE = 5.5
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Largest relative difference of the largest Response II from linear simulation for the same motion."""
+"""Difference of the largest Response II from linear simulation, relative, up to which both agree."""
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
 """Periods of the band's lower edge in which a bridge's error of three times the motion decays to 2 %."""
 _ROOM = 1.1
-"""Factor on the interval length, because the first interval may start slightly below the band."""
+"""Factor on the length of longer intervals, because the first may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 """Sixth difference with unit gain for white noise, which removes the smooth motion."""
@@ -176,8 +176,8 @@ class SweptMotion(Labelled):
     linear_impacts: Reals
     """Orders 2 and 3 relative to order 1 in the same simulation: modes may ring at twice the drive."""
     steady_over_swept: float
-    """Largest Response II without contact under steady sines, divided by the largest in this sweep. NaN if
-    the measured Response II differs, for example while the specimen still rings."""
+    """Largest Response II without contact for steady sines, divided by the largest in this sweep. NaN if the
+    measured Response II differs, for example while the specimen still rings."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
@@ -213,7 +213,7 @@ class SweepResponse(SweptMotion):
     """Drive frequency at the centre of each longer interval, shape (longer intervals,)."""
     noise_bias_i: Reals
     noise_error_i: Reals
-    """Expected bias and rms error of Response I by noise."""
+    """Expected bias and rms error of Response I due to noise."""
 
 
 Transmission = Callable[[Reals], Complexes]
@@ -439,7 +439,7 @@ class SweepSums:
         return np.asarray(bridged.reshape(-1, self._factor).any(axis=1))
 
     def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
-        """Return the velocity [m/s] without contact under the recorded acceleration of the base [m/s2]."""
+        """Return the velocity [m/s] without contact due to the recorded acceleration of the base [m/s2]."""
         # Padded, so that ringing after the end does not wrap around to the start.
         padded = fft.next_fast_len(2 * base.size, real=True)
         frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
@@ -452,7 +452,7 @@ class SweepSums:
         return np.asarray(fft.irfft(spectrum, padded, overwrite_x=True)[: base.size])
 
     def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
-        """Return displacement at many orders, in intervals long enough to separate them."""
+        """Return displacement at `ALL_ORDERS`, in intervals long enough to separate them."""
         cycles = self._low_hz * self._interval / self._rate_hz
         longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
         longer = min(longer, response.size)

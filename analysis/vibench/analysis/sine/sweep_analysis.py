@@ -73,13 +73,13 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
 
 
 _NEAR = 12
-"""Largest number of intervals between a jump and the start or end of collisions that it marks."""
+"""Largest number of intervals between a jump and the start or end of collisions to which it belongs."""
 
 
 _BEHIND_STEPS = 1.5
 """Tolerance in steps: a stepped sweep lags by up to half a step; measuring adds up to another half."""
 _LAST = 5
-"""Number of intervals checked at the end."""
+"""Number of intervals that are checked at the end of a sweep."""
 
 
 def played_check(response: SweepResponse, sweep: Sweep) -> Check:
@@ -120,7 +120,7 @@ def measured_sweep(
 
 
 class SweepDraws:
-    """Analysis of simulated records (draws) of one recorded sweep, which all have its drive."""
+    """Analysis of simulated records (draws) of one recorded sweep; all have the drive of the recording."""
 
     def __init__(self, sweep: Sweep, specimen: Specimen | None) -> None:
         self._sweep, self._specimen = sweep, specimen
