@@ -29,7 +29,7 @@ class SpectralAverages:
     """Mean of conj(X_i) X_j over the used segments, shape (channels, channels, lines); not scaled."""
     segments_used: int
     segments_excluded: int
-    """Number of segments left out because they contain an invalid sample."""
+    """Number of segments left out because they contain invalid samples."""
     n_eff: float
     """Number of independent averages, corrected for overlap and gaps."""
     segment_samples: int
@@ -335,7 +335,7 @@ class Spectrogram(Labelled):
 
 
 class SpectrogramSums:
-    """Spectrogram of a signal that arrives in blocks; memory holds one segment and the picture.
+    """Spectrogram of a signal that arrives in blocks; memory contains only one segment and the result.
 
     Parameters
     ----------
