@@ -14,7 +14,7 @@ from ..tables import Labelled, plus_minus
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 WIDENING = 1.4
-"""Factor on the scatter if the scatter decided when the recording ended, see `Budget.widened`."""
+"""Factor on the scatter of a recording that ended when its scatter was small enough: `Budget.widened`."""
 
 
 RESULT_PATTERNS: Mapping[str, str] = {
@@ -38,7 +38,7 @@ class Cause(StrEnum):
     CLOCK = "clock"
     NOISE = "noise"
     CHANCE = "chance"
-    """Chance: one draw of an irregular motion or of the response to noise."""
+    """Chance: the record is one random sample of an irregular motion or of the response to noise."""
 
 
 @dataclass(frozen=True)

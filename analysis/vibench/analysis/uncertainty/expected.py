@@ -1,4 +1,4 @@
-"""Expected uncertainty of a plan before measuring, and distribution of recording time by this estimate."""
+"""Expected uncertainty of a plan before the measurement; recording times that reach its targets."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -59,7 +59,7 @@ _SURELY_OTHER = 5.0
 
 @dataclass(frozen=True)
 class SimulatedDwell:
-    """Results of simulated dwells of the rig from several starts."""
+    """Scatter of simulated dwells of the rig that start in several ways."""
 
     sd_largest: float
     """Relative standard deviation of Response I; 0 if nothing collides."""
@@ -72,10 +72,10 @@ class SimulatedDwell:
 def simulated_dwell(
     measurement: Measurement, rig: Rig, at_hz: float, window_s: float
 ) -> SimulatedDwell | None:
-    """Simulate amplifier, table and specimen under the plan's voltage, and analyse them like a recording.
+    """Simulate amplifier, table and specimen with the plan's voltage, and analyse them like a recording.
 
-    Some runs start more gently than the generator's ramp, others more abruptly: if all reach the same motion,
-    so will the measurement. None if a simulation fails, or the window is too short.
+    Some runs start more gently than the generator's ramp, others more abruptly. If all reach the same motion,
+    the measurement is expected to reach it too. None if a simulation fails, or the window is too short.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
     phase = 2 * np.pi * (np.arange(per_period) + 0.5) / per_period
@@ -121,7 +121,7 @@ def _scatter(found: DwellResponse) -> tuple[float, float]:
 
 
 def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
-    """Return the peak voltage at the terminal: as set, or as feedback needs for its level."""
+    """Return the peak voltage at the terminal: the setting, or what feedback needs for its level."""
     excitation = measurement.excitation
     if not isinstance(excitation, HeldDwell):
         return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
@@ -152,7 +152,7 @@ class Expected(Labelled):
     time_s: float
     """Planned recording time, or the length of a sine's window."""
     scatter: float | None
-    """Relative standard uncertainty by noise or chance after `time_s`; None if not stated."""
+    """Relative standard uncertainty due to noise or chance after `time_s`; None if not stated."""
     cause: Cause
     lasting: float
     """Relative standard uncertainty that time does not reduce: calibrations, alignment, clock."""
@@ -197,9 +197,9 @@ class Expected(Labelled):
             case Cause.NOISE, _:
                 return "the sensors' noise is not stated"
             case Cause.CHANCE, name if name in {RESPONSE_I, RESPONSE_II}:
-                return "this drive allows several motions, and the start decides which of them is measured"
+                return "this drive allows several motions, and the initial state decides which is measured"
             case _:
-                return "the masses may collide under this noise"
+                return "this noise may make the masses collide"
 
 
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
@@ -234,7 +234,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
 
 
 MOST_STEPS = 6
-"""Most stretches whose end is predicted; the other stretches are assumed to last as long on average."""
+"""Maximum number of parts whose end is predicted; further parts are assumed to last as long on average."""
 
 
 def recorded_s(measurement: Measurement) -> float:
@@ -243,18 +243,18 @@ def recorded_s(measurement: Measurement) -> float:
 
 
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
-    """Predict the recorded time of a measurement with `until`, over all stretches [s].
+    """Predict the recorded time of a measurement with `until`, total of all parts [s].
 
-    A stretch ends at a check of its bounds, and at its planned time at the latest. None if the scatter is
+    A part ends at a check of its bounds, and at its planned time at the latest. None if the scatter is
     unknown beforehand, or without `until`.
     """
     return _in_all(measurement, rig, end_s)
 
 
 def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
-    """Predict the recorded time until all targets are met, over all stretches [s].
+    """Predict the recorded time until all targets are reached, total of all parts [s].
 
-    None if the time is not known, or no time is long enough.
+    None if the time cannot be predicted, or no time is long enough.
     """
     needed_s = _in_all(measurement, rig, lambda need_s, first_s, _: max(need_s, first_s))
     return needed_s if needed_s is not None and np.isfinite(needed_s) else None
@@ -274,7 +274,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield for some stretches the times [s] needed for all targets, until the first check, and planned."""
+    """Yield for some parts the times [s] needed for all targets, until the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
@@ -296,7 +296,7 @@ def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | Non
 
 
 def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
-    """Return the recorded time after which expected bounds meet the targets [s]; None if unknown."""
+    """Return the recorded time after which the expected bounds reach the targets [s]; None if unknown."""
     needs = []
     for name, wish in until.wishes.items():
         found = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
@@ -305,7 +305,7 @@ def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
         for each in found:
             if each.scatter is None:
                 return None
-            # The uncertainty of a maximum does not fall with time: it is in `lasting`, and `scatter` is 0.
+            # The uncertainty of a maximum does not fall with time; it is in `lasting`, and `scatter` is 0.
             share = COVERAGE * WIDENING * (each.scatter or each.lasting) / wish
             fixed = float(np.inf) if share > 1.0 else 0.0
             needs.append(each.time_s * share**2 if each.scatter else fixed)
@@ -496,7 +496,7 @@ class TimeShare:
     planned_s: float
     """Recording time in the campaign [s]."""
     needed_s: float | None
-    """Predicted recording time until the targets are met [s]; None without targets or a prediction."""
+    """Predicted recording time until the targets are reached [s]; None without targets or a prediction."""
     allotted_s: float
     """Longest recording time after the distribution [s]."""
 
@@ -508,10 +508,10 @@ class TimeShare:
 
 
 def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, tuple[TimeShare, ...]]:
-    """Return the campaign with recording times that fill ``available_s``, and the share of each measurement.
+    """Return the campaign with recording times that fill ``available_s``, and the time of each measurement.
 
-    A measurement needs the time after which `expected_uncertainty` meets its `until`. All these times are
-    multiplied by one factor. Sweeps, and measurements without a prediction, keep their times.
+    A measurement needs the time after which `expected_uncertainty` reaches the targets in `until`. All these
+    times are multiplied by one factor. Sweeps, and measurements without a prediction, keep their times.
 
     Raises ConfigurationError when no measurement has targets with a prediction, or the time is too short for
     all targets.
@@ -551,7 +551,7 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
 
 
 def _cost(measurement: Measurement) -> float:
-    """Return the time on the rig per recorded time; each realisation of noise adds ramps and a wait."""
+    """Return the ratio of rig time to recorded time; each realisation of noise adds ramps and a wait."""
     has_many = measurement.excitation.stretches > 1
     return measured_s(measurement) / recorded_s(measurement) if has_many else 1.0
 

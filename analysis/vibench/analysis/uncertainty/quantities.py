@@ -22,10 +22,10 @@ from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_un
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Usual and smallest number of parts of a window; their maxima give the scatter of the largest value."""
 _ALIKE = 1e-12
-"""Relative difference of maxima that is only rounding error."""
+"""Relative difference of maxima up to which it is only rounding error."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Chance, not stated: for a maximum, or a 0.1 s interval of a sweep, without draws of the twin."""
+"""Chance that is not stated: of a maximum, or of a 0.1 s interval of a sweep, without draws of the twin."""
 _ENDS = 2
 """Number of intervals at each end of a sweep; a largest value there depends on where intervals begin."""
 _PEAKED = 1.05
@@ -80,7 +80,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float, peak: tuple[s
 
 
 def _chance_share(found: NoiseResponse) -> float:
-    """Return the share of the lines' variance that noise between periods does not explain; 0 if unknown."""
+    """Return the share of the lines' variance that the scatter of periods does not explain; 0 if unknown."""
     if found.periodic is None or found.periodic.distortion_variance is None:
         return 0.0
     more = float(np.median(found.periodic.distortion_variance))
@@ -172,7 +172,7 @@ def sd_of_largest(maxima: Reals) -> float:
     """
     if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
         return 0.0
-    # Divide by the largest, because sums of the smallest floating-point numbers have no digits left.
+    # Divide by the largest, because sums of the smallest floating-point numbers lose all digits.
     ordered, count = np.sort(maxima) / np.max(maxima), maxima.size
     place = np.arange(count)
     first, second, third = (
@@ -248,7 +248,7 @@ def _largest(
 
 
 def _scatter(overlay: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
-    """Return the scatter of one value over draws with the measured kind of motion; None below five draws."""
+    """Return the scatter of one value over draws with the measured kind of motion; None below 5 draws."""
     curve = None if overlay is None else overlay.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
