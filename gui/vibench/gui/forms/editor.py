@@ -18,7 +18,7 @@ from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, q
 
 
 class Editor(Protocol):
-    """A widget that edits one value of a plan; the value has the plain type used in a plan file."""
+    """Widget that edits one value of a plan; the value has the type that it has in a plan file."""
 
     @property
     def widget(self) -> QWidget:
@@ -26,7 +26,7 @@ class Editor(Protocol):
 
     @property
     def complaint(self) -> str:
-        """Why the text cannot be read; empty when it can."""
+        """Why the typed text cannot be read; empty if it can."""
 
     def content(self) -> Any:
         """Return the value as stored in a plan file; None for an empty field."""
@@ -51,7 +51,7 @@ class QuantityEditor:
 
     @property
     def complaint(self) -> str:
-        """Why the text cannot be read; empty when it can."""
+        """Why the typed text cannot be read; empty if it can."""
         return self._edit.complaint
 
     def content(self) -> float | int | None:
@@ -64,10 +64,10 @@ class QuantityEditor:
 
 
 class Choice(QComboBox):
-    """A combo box that ignores the space bar, and the mouse wheel unless it has the focus.
+    """Combo box that ignores the space bar, and the mouse wheel unless it has the focus.
 
-    The space bar is reserved for freezing the pictures of the Run page. F4 and Alt+Down open the list.
-    The width does not depend on the longest entry.
+    The space bar freezes the plots of the Run page. F4 and Alt+Down open the list. The width does not depend
+    on the longest entry.
     """
 
     LETTERS = 10
@@ -81,14 +81,14 @@ class Choice(QComboBox):
         self.setMinimumContentsLength(self.LETTERS)
 
     def replace_items(self, items: Iterable[str], chosen: str = "") -> None:
-        """Replace the entries without a signal, and choose one; by default the first."""
+        """Replace the entries without emitting a signal, and choose one; by default the first."""
         with QSignalBlocker(self):
             self.clear()
             self.addItems(list(items))
             self.setCurrentIndex(max(0, self.findText(chosen)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Pass the space bar on to the page."""
+        """Leave the space bar to the page."""
         if event.key() == Qt.Key.Key_Space:
             event.ignore()
         else:
@@ -100,7 +100,7 @@ class Choice(QComboBox):
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the mouse wheel unless the field has the focus, so that scrolling changes no value."""
+        """Ignore the mouse wheel without focus, so that scrolling the page changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
@@ -108,7 +108,7 @@ class Choice(QComboBox):
 
 
 class _LineOnEach(QStyledItemDelegate):
-    """Delegate that shows a description beside each entry of the open list."""
+    """Delegate that shows a description beside each entry of an open list."""
 
     def initStyleOption(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
@@ -143,7 +143,7 @@ class ChoiceEditor:
             self._box.setCurrentIndex(place)
 
     def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
-        """List the values below headings; ``lines`` gives the heading and the description of each value."""
+        """Group the values under headings; ``lines`` has heading and description for each value."""
         blocked, chosen = self._box.blockSignals(True), self.content()
         self._box.clear()
         model = self._box.model()
@@ -162,7 +162,7 @@ class ChoiceEditor:
 
 
 class TextEditor:
-    """Editor of a text; the plan validates it."""
+    """Editor of a text; the plan's model validates it."""
 
     complaint = ""
 
@@ -181,7 +181,7 @@ class TextEditor:
 
 
 class SuggestionEditor:
-    """Editor of a text that is chosen from a list or typed; the plan validates it."""
+    """Editor of a text that is chosen from a list or typed; the plan's model validates it."""
 
     complaint = ""
 
@@ -215,9 +215,9 @@ class SuggestionEditor:
 
 
 class ListEditor:
-    """Editor of a list as one line of text: ``95, 266, 500``.
+    """Editor of a list of values, typed in one line: ``95, 266, 500``.
 
-    If the unit can be chosen, each number is read as in a quantity field.
+    If the unit can be chosen by the user, each number is read as in a quantity field.
     """
 
     def __init__(self, unit: str, changed: Callable[..., None]) -> None:
@@ -227,12 +227,12 @@ class ListEditor:
         self._line.editingFinished.connect(changed)
         self._complaint = ""
         self._shown: tuple[str, list[Any]] = ("", [])
-        """The text shown last, and its values in full precision."""
+        """Text shown last, and its values in full precision."""
         self.widget = self._line
 
     @property
     def complaint(self) -> str:
-        """Why the text cannot be read; empty when it can."""
+        """Why the typed text cannot be read; empty if it can."""
         self.content()
         return self._complaint
 
@@ -266,7 +266,7 @@ class ListEditor:
 
 
 def unwrap_optional(annotation: Any) -> tuple[Any, bool]:
-    """Return a type without ``Annotated`` and ``| None``, and whether None is allowed."""
+    """Return a type without ``Annotated`` and ``| None``, and whether it allowed None."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):

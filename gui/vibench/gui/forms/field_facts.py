@@ -28,7 +28,7 @@ _ENDINGS = (
     ("_a", "A"),
     ("_n", "N"),
 )
-"""Suffixes of field names, longest first, and their units."""
+"""Endings of field names, longest first, with their units."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class FieldFacts:
 
     @property
     def shown_unit(self) -> str:
-        """Unit of a number that is typed without a unit."""
+        """Unit in which a number without a unit is read."""
         return UNITS.in_field(self.unit)
 
     @property
@@ -63,7 +63,7 @@ class FieldFacts:
 
     @property
     def label_with_unit(self) -> str:
-        """Label with unit, shown at the beginning of a complaint."""
+        """Label with unit, with which a complaint begins."""
         return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property
@@ -89,7 +89,7 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    """Return the bounds as text; a selectable unit follows each bound, another unit only the last bound."""
+    """Return the limits as text; a unit that can be chosen follows each one, other units only the last."""
     each = f" {unit}" if unit in CHOICES else ""
     texts = ", ".join(_limit_texts(field, each))
     return texts if each or not texts else f"{texts} {unit}".strip()
@@ -111,7 +111,7 @@ def _limit_texts(field: FieldInfo, unit: str) -> Iterator[str]:
 
 
 def _inner(annotation: Any) -> Iterator[object]:
-    """Yield the constraints of the elements of a tuple, or of an optional value."""
+    """Yield the constraints on the elements of a tuple, or on an optional value."""
     for part in get_args(annotation):
         yield from getattr(part, "__metadata__", ())
         yield from _inner(part)

@@ -37,7 +37,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Return the model's complaints by field, without those that follow from another complaint."""
+    """Return the model's complaints by field, without those that only follow from another complaint."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()
@@ -46,7 +46,7 @@ def complaints_of(error: ValidationError) -> dict[Loc, str]:
 
 
 class ModelForm(QWidget):
-    """Form of a plan; its content has the plain types used in a file, and the plan's model validates it."""
+    """Form of a plan; its content has the types of a plan file, and the plan's model validates it."""
 
     changed = Signal()
 
@@ -77,7 +77,7 @@ class ModelForm(QWidget):
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Return the content as stored in a file; omit empty fields, except where None has a meaning."""
+        """Return the content as in a file; leave out empty fields, unless empty differs from the default."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
         values = {
             name: value
@@ -87,7 +87,7 @@ class ModelForm(QWidget):
         return {**self._fixed, **values}
 
     def show_content(self, content: Mapping[str, Any]) -> None:
-        """Show content from a file; missing fields show the plan's defaults."""
+        """Show content from a file; a field without content shows the default."""
         with QSignalBlocker(self):
             for name, row in self._rows.items():
                 row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
@@ -95,9 +95,9 @@ class ModelForm(QWidget):
         self.changed.emit()
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Show complaints at their fields, also in inner models, and return all with their field names.
+        """Show complaints at their fields, also in inner models; return all of them with field names.
 
-        A complaint about several fields together is attributed to the field changed last.
+        A complaint about several fields together is shown with the name of the field changed last.
         """
         sentences: list[str] = []
         for name, row in self._rows.items():
@@ -121,7 +121,7 @@ class ModelForm(QWidget):
 
     @property
     def is_read(self) -> bool:
-        """Whether all typed texts can be read, in this form and in inner ones."""
+        """Whether all typed texts can be read, here and in inner forms."""
         return all(
             row.editor.form.is_read if isinstance(row.editor, GroupEditor) else not row.editor.complaint
             for row in self._rows.values()
@@ -145,7 +145,7 @@ class ModelForm(QWidget):
         self._rows[name].explain()
 
     def _explain(self) -> None:
-        """Rewrite values and explanations in the chosen units; unreadable text stays unchanged."""
+        """Show values and explanations in the chosen units; text that cannot be read stays as it is."""
         for row in self._rows.values():
             row.explain()
             if row.facts.unit in CHOICES and not row.editor.complaint:
@@ -160,7 +160,7 @@ class ModelForm(QWidget):
 
 
 class GroupEditor:
-    """Editor of an inner model."""
+    """Editor of an inner model, which may have several kinds."""
 
     def __init__(
         self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
@@ -172,7 +172,7 @@ class GroupEditor:
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
         self._memories: dict[str, dict[str, Any]] = {}
-        """Last content of each kind, shown again when that kind is chosen again."""
+        """Last content of each kind; shown again when this kind is chosen again."""
         self._usual: Mapping[str, Any] = {}
         self._fresh: Mapping[str, Mapping[str, Any]] = {}
         if len(kinds) > 1:
@@ -184,12 +184,12 @@ class GroupEditor:
 
     @property
     def kind_choice(self) -> Choice | None:
-        """The choice of the kind; None if there is only one."""
+        """Combo box for the kind; None if there is only one kind."""
         return None if self._kind is None else self._kind.widget
 
     @property
     def complaint(self) -> str:
-        """Always empty, because complaints are shown at the fields."""
+        """Always empty, because complaints are shown at the fields inside."""
         return ""
 
     def content(self) -> Any:
@@ -213,18 +213,18 @@ class GroupEditor:
         fresh: Mapping[str, Mapping[str, Any]],
         lines: Mapping[str, tuple[str, str]],
     ) -> None:
-        """Set starting values for the fields of a new kind, and describe the kinds in the list.
+        """Set the values with which a newly chosen kind starts, and describe the kinds in the list.
 
-        ``usual`` fills empty fields of any kind. ``fresh`` gives values by kind,
-        which replace values typed for another kind.
-        ``lines`` gives the heading and the description of each kind.
+        ``usual`` fills empty fields of every kind. ``fresh`` has values by kind, which replace those typed
+        for another kind. ``lines`` has the heading and the description of each kind.
+
         """
         self._usual, self._fresh = usual, fresh
         assert self._kind is not None
         self._kind.explain(lines)
 
     def _turn(self, *_: object) -> None:
-        """Change the kind; fields with the same name keep their values."""
+        """Change to the chosen kind; fields of the same name keep their values."""
         assert self._kind is not None
         left, chosen = self.form.content(), self._kind.content()
         if chosen is None:  # a heading
@@ -260,7 +260,7 @@ class OptionalGroupEditor(GroupEditor):
         self._there = QCheckBox(f"Give {facts.label.lower()}")
         self._there.setAccessibleName(f"Give {facts.label.lower()}")
         self._there.setToolTip(facts.tooltip)
-        # Left-aligned at its natural width, because a form may be wider than a small window.
+        # Left-aligned with its own width, because the form may be wider than a small window.
         self._layout.insertWidget(0, self._there, alignment=Qt.AlignmentFlag.AlignLeft)
         self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())
@@ -271,14 +271,14 @@ class OptionalGroupEditor(GroupEditor):
         return super().content() if self._there.isChecked() else None
 
     def show_content(self, content: Any) -> None:
-        """Show content from a file; None unticks the box."""
+        """Show content from a file; None clears the check box."""
         self._there.setChecked(content is not None)
         if content is not None:
             super().show_content(content)
 
 
 _DRAWN = frozenset({"excited_lines", "detection_lines"})
-"""Fields that the plan fills by a random draw; they are not carried over to another kind."""
+"""Fields that the plan fills with random numbers; another kind does not take them over."""
 
 
 def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
@@ -296,7 +296,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Return whether an empty field differs from the default."""
+    """Return whether leaving a field empty differs from its default."""
     return unwrap_optional(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 
@@ -311,14 +311,14 @@ def _as_content(value: Any) -> Any:
 
 
 def _after_kind(editor: Editor, loc: Loc) -> Loc:
-    """Remove the kind from the location of an error; pydantic includes it, the form does not."""
+    """Remove the kind from the location of an error: pydantic includes it, the form does not."""
     if isinstance(editor, GroupEditor) and editor.kind_choice is not None and loc:
         return loc[1:]
     return loc
 
 
 def _sentence(text: str, facts: FieldFacts) -> str:
-    """Reword a complaint of the model for the form."""
+    """Return a complaint of the model in words for the form."""
     unit = f" in {facts.shown_unit}" if facts.unit else ""
     if text == "Field required":
         return f"the field is empty; type a value{unit}"
@@ -330,7 +330,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class ValidatedForm(QWidget, Generic[Model]):
-    """A form with the complaints and warnings of its model below it."""
+    """Form with the complaints and warnings of its model below it."""
 
     changed = Signal()
 
@@ -343,7 +343,7 @@ class ValidatedForm(QWidget, Generic[Model]):
         super().__init__()
         self._model = model
         self.value: Model | None = None
-        """The validated model; None while the content is not allowed."""
+        """The validated model; None if the content is not allowed."""
         self.form = ModelForm(model, hidden)
         self._complaint = SentenceLabel(rank="complaint", name=f"Complaint about the {name}")
         self._warning = SentenceLabel(name=f"Warning about the {name}")
@@ -359,7 +359,7 @@ class ValidatedForm(QWidget, Generic[Model]):
 
     @property
     def warning(self) -> str:
-        """Warnings about allowed values that may be unintended, such as springs derived from another mass."""
+        """Warnings about allowed values that may be mistakes, such as springs derived from another mass."""
         return self._warning.text()
 
     def show_value(self, value: Model) -> None:

@@ -1,4 +1,4 @@
-"""A field for one quantity as people type it ("12,5", "5 ms", "45 µm"); the tooltip shows the limits."""
+"""Field for one quantity as people type it ("12,5", "5 ms", "45 µm"); its tooltip shows the limits."""
 
 import re
 from decimal import Decimal
@@ -37,24 +37,24 @@ _NUMBER = re.compile(r"^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(\S
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Return a value given in SI as text in the field's unit, in full precision."""
+    """Return an SI value as text in the unit of a field, in full precision."""
     shown = UNITS.of(unit, value if abs(value) < _SMALL else 1.0)
     if shown.per_si != 1.0:
-        # Twelve digits hide that 4.5e-05 / 1e-06 is not quite 45, but parsing must return the same value.
+        # Twelve digits hide that 4.5e-05 / 1e-06 is not exactly 45; but reading the text must give the value.
         text = shown.text(value, 12)
         if parse_quantity(text, unit, shown.name) == value:
             return text
         if UNITS.chosen.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
         if unit in CHOICES:
-            # Do not show the SI unit, because a plain number typed over it would be read in metres.
+            # Do not show the SI unit: a number typed over it without a unit would be read in metres.
             return f"{Decimal(repr(value)).scaleb(round(log10(shown.per_si))):f} {shown.name}"
     number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
     return f"{number} {unit}".strip()
 
 
 def unit_of(text: str, unit: str) -> str:
-    """Return the unit in the text of a field; without one, the unit of an empty field."""
+    """Return the unit in a field's text; if there is none, the unit of an empty field."""
     match = _NUMBER.match(text)
     return (match[2] if match else "") or UNITS.in_field(unit)
 
@@ -62,7 +62,7 @@ def unit_of(text: str, unit: str) -> str:
 def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
     """Return the SI value of a text; a comma is a decimal point, and a unit may have a prefix.
 
-    A number without a unit is read in the unit ``shown``, or else in the unit of an empty field.
+    A number without a unit is read in the unit ``shown`` or, if that is empty, in the unit of an empty field.
     Raises ConfigurationError when the text is not a number or has another unit.
     """
     match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
@@ -87,28 +87,28 @@ def _short(text: str) -> str:
 
 
 def _scale(number: str, prefix: str) -> float:
-    """Shift the decimal point in the text, so that 45 µm equals 45e-6 exactly."""
+    """Shift the decimal point in the text, so that 45 µm is exactly 45e-6."""
     mantissa, _, exponent = number.lower().partition("e")
     return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
 
 
 _LONGEST_SHOWN = 40
 _SMALL = 1e-2
-"""SI value from which a quantity is shown without a unit prefix."""
+"""SI value from which on a quantity is shown without a unit prefix."""
 _DIGITS = 6
-"""Displayed digits of a long number; the stored value keeps all."""
+"""Number of displayed digits of a long number; the stored value keeps all."""
 MOST_WHOLE = 1 << 53
-"""Largest integer up to which a float is exact."""
+"""Largest integer up to which every integer is exact as a float."""
 MOST_TIMES = 1000.0
-"""Factor of change above which a value must be confirmed, because it is often a wrong unit."""
+"""Factor of change above which the user must confirm a value, because the unit is often wrong."""
 STEP = 0.05
-"""Relative change per step: a small change that never crosses zero."""
+"""Relative change per step of the arrow keys; such steps never reach zero."""
 
 
 class QuantityEdit(QAbstractSpinBox):
-    """Field for a number in full precision; it may be empty where that is allowed.
+    """Field for a number in full precision; it may be empty if that is allowed.
 
-    The value changes when typing ends, not at every key.
+    The value changes when typing is finished, not with every key.
     """
 
     changed = Signal()
@@ -119,9 +119,9 @@ class QuantityEdit(QAbstractSpinBox):
         self._shown_unit = ""
         self._value: float | int | None = None
         self.complaint = ""
-        """Why the text cannot be read; empty when it can."""
+        """Why the typed text cannot be read; empty if it can."""
         self._value_to_confirm: float | int | None = None
-        """A value to be confirmed by a second Return."""
+        """Value that a second Return will confirm; None if there is none."""
         self._is_confirmed = False
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -129,7 +129,7 @@ class QuantityEdit(QAbstractSpinBox):
         self.editingFinished.connect(self._take)
 
     def value(self) -> float | int | None:
-        """Return the number, None when the field is empty."""
+        """Return the number; None if the field is empty."""
         return self._value
 
     def set_value(self, value: float | int | None) -> None:
@@ -142,7 +142,7 @@ class QuantityEdit(QAbstractSpinBox):
         self.lineEdit().setText(text)
 
     def show_unit(self, unit: str) -> None:
-        """Change the unit of the quantity."""
+        """Change the unit of the quantity and clear the field."""
         self._unit = unit
         self.set_value(None)
 
@@ -158,12 +158,12 @@ class QuantityEdit(QAbstractSpinBox):
         self.changed.emit()
 
     def stepEnabled(self) -> QAbstractSpinBox.StepEnabledFlag:
-        """Allow steps up and down; the plan checks the limits."""
+        """Allow steps up and down; the plan's model checks the limits."""
         flag = QAbstractSpinBox.StepEnabledFlag
         return flag.StepUpEnabled | flag.StepDownEnabled
 
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
-        """Accept every key; the text is read when typing ends."""
+        """Accept every key; the text is read when typing is finished."""
         return QValidator.State.Acceptable, text, position
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -172,14 +172,14 @@ class QuantityEdit(QAbstractSpinBox):
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the mouse wheel unless the field has the focus, so that scrolling changes no value."""
+        """Ignore the mouse wheel without focus, so that scrolling the page changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
             event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Accept a second Return as confirmation; leaving the field does not confirm."""
+        """Take a second Return as confirmation; leaving the field does not confirm."""
         self._is_confirmed = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         super().keyPressEvent(event)
         self._is_confirmed = False
@@ -230,7 +230,7 @@ class QuantityEdit(QAbstractSpinBox):
             if value != int(value) or abs(value) > MOST_WHOLE:
                 raise ConfigurationError(f"{_short(text)} is not allowed; give a whole number below 2^53")
             return int(value)
-        # Compare the texts, so that rounding of the displayed number does not change the value.
+        # Compare texts, so that the rounding of the displayed number does not change the value.
         return (
             self._value
             if self._value is not None and text == quantity_text(self._value, self._unit)
