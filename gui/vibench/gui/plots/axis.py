@@ -1,4 +1,4 @@
-"""Axes with their unit in the label and 1-2-5 ticks on logarithmic scales, and a grid at all ticks."""
+"""Axes with the unit in the label, 1-2-5 ticks on logarithmic scales, and a grid at all ticks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,16 +24,16 @@ class Scale(Enum):
     LOGARITHMIC = auto()
 
     def drawn(self, value: float) -> float:
-        """Return the position at which a plot draws a value."""
+        """Return the coordinate at which pyqtgraph draws a value: its decimal logarithm, if logarithmic."""
         return log10(value) if self is Scale.LOGARITHMIC else value
 
     def value_at(self, drawn: float) -> float:
-        """Return the value that a plot draws at a position."""
+        """Return the value that is drawn at a coordinate."""
         return float(10.0 ** min(max(drawn, -300.0), 300.0)) if self is Scale.LOGARITHMIC else drawn
 
 
 class Blankness(Enum):
-    """Whether an axis has numbers."""
+    """Whether an axis shows numbers."""
 
     WRITTEN = auto()
     BLANK = auto()
@@ -45,15 +45,15 @@ class PlotAxis:
 
     label: str
     unit: str = ""
-    """SI unit of the values if the user can choose the displayed unit; otherwise the displayed text."""
+    """SI unit of the values if the user can choose the displayed unit; otherwise the displayed unit."""
     factor: float = 1.0
-    """Factor from plotted to displayed values for a fixed unit: 1e3 shows seconds as milliseconds."""
+    """Displayed over plotted value, for a unit that cannot be chosen: 1e3 shows seconds as ms."""
     scale: Scale = Scale.LINEAR
     short: str = ""
 
     @property
     def shown(self) -> ShownUnit:
-        """The displayed unit, with the factor from plotted to displayed values."""
+        """Displayed unit, with the factor from plotted to displayed values."""
         return UNITS.on_axis(self.unit) if self.unit in CHOICES else ShownUnit(self.unit, self.factor)
 
     @property
@@ -75,26 +75,26 @@ FREQUENCY = PlotAxis("Frequency", "Hz")
 LOG_FREQUENCY = PlotAxis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
 TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
-"""Distance between labels on a vertical axis, in font heights."""
+"""Smallest distance between labels on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Spacing passed to pyqtgraph to mark ticks that have no number."""
+"""Spacing that tells `tickStrings` that these ticks have no number."""
 _WIDE = "2000"
-"""Text as wide as the widest label on a logarithmic horizontal axis, including margins."""
+"""Text as wide as the widest label on a logarithmic horizontal axis, with margins."""
 
 
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
-    """An axis of a plot; in logarithmic mode, positions are decimal logarithms."""
+    """Axis of a plot; on a logarithmic scale, its coordinates are decimal logarithms."""
 
     def __init__(self, orientation: str, axis: PlotAxis) -> None:
         super().__init__(orientation)
         self._blankness = Blankness.WRITTEN
         self.levels: tuple[list[float], ...] = ()
-        """Positions of the ticks painted last, major ones first."""
+        """Coordinates of the ticks painted last, those with numbers first."""
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
         self._axis = axis
         UNITS.on_change(self._show_other_unit)
-        # Cache the painted axis, because its text is the most expensive part of a frame.
+        # Cache the image of the axis, because its text takes the largest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     @property
@@ -108,32 +108,32 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         self._show_other_unit()
 
     def _show_other_unit(self) -> None:
-        # pyqtgraph removes the label of a closed plot.
+        # The label no longer exists after pyqtgraph has closed the plot.
         if self.label is not None:
             self._fit_label()
             self.update()
 
     def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
         """Adapt the label to the available length."""
-        # pyqtgraph calls this method before the item is initialised.
+        # pyqtgraph also calls this method before the object is initialised.
         if getattr(self, "_axis", None) is not None and self.label is not None:
             self._fit_label()
         super().resizeEvent(event)
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Paint without the QPicture that pyqtgraph uses, which looks up the font for every label."""
+        """Paint directly; pyqtgraph would paint via a QPicture, which looks up the font for every label."""
         self.levels = ()
         specs = self.generateDrawSpecs(painter)
         if specs is not None:
             self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
-        """Hide numbers and label, because the plot below shows them for both plots."""
+        """Hide numbers and label, because the plot below shows them for both."""
         self.setStyle(showValues=False)
         self.showLabel(False)
 
     def blank(self, blankness: Blankness) -> None:
-        """Hide or show the numbers, which have no meaning on an empty plot."""
+        """Hide the numbers while the plot is empty, or show them again."""
         if blankness is not self._blankness:
             self._blankness = blankness
             self.update()
@@ -144,7 +144,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return f"<span style='{style}'>{escape(printable(self.labelText))}</span>"
 
     def showLabel(self, show: bool = True) -> None:  # noqa: FBT001, FBT002 - pyqtgraph's own
-        """Show or hide the label; ignore the call that pyqtgraph makes when the text changes."""
+        """Show or hide the label; ignore pyqtgraph's own call when only the text changes."""
         if not getattr(self, "_is_fitting", False):
             self._is_labelled = show
         super().showLabel(show and self._is_labelled)
@@ -164,7 +164,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return self.orientation in ("left", "right")
 
     def tickValues(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
-        """Return the positions of ticks: major ones have a label, minor ones do not."""
+        """Return the coordinates of the ticks: major ones have a number, minor ones do not."""
         found = self._ticks(low, high, size)
         self.levels = tuple([each for each in places if low <= each <= high] for _, places in found)
         return found
@@ -172,7 +172,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
             factor = self._axis.shown.per_si
-            # Draw only labelled ticks, because each grid line costs time in every frame.
+            # Return only ticks with numbers, because each grid line takes time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             widest = max(super().tickStrings(values, 1.0, step), key=len, default="")
@@ -185,7 +185,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return [(step, [value - shift for value in values]) for step, values in ticks]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
-        """Return the labels of ticks."""
+        """Return the numbers at ticks, as text."""
         if self._blankness is Blankness.BLANK or (self.logMode and spacing == _MINOR):
             return [""] * len(values)
         if not self.logMode:
@@ -201,9 +201,9 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
 
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
-    """Return a larger step and the ticks at its multiples, so that at most ``most`` are left.
+    """Return a larger step and the ticks at its multiples, of which there are at most ``most``.
 
-    A scale needs two numbers; if fewer would be left, keep the outermost two of the previous step.
+    A scale needs two numbers. If fewer are left, return the outermost two ticks of the step before.
     """
     wider, kept = step, list(values)
     for every in (1, 2, 5, 10, 20, 50, 100):
@@ -217,7 +217,7 @@ def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, 
 
 
 def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]]:
-    """Return ticks of a logarithmic axis: 1-2-5 per decade, or evenly spaced numbers within one decade."""
+    """Return the ticks of a logarithmic axis: 1-2-5 per decade, or even spacing within a decade."""
     if high - low < 1.0:
         return [(0.1, _even(10**low, 10**high))]
     decades = range(floor(low), ceil(high) + 1)
@@ -234,17 +234,17 @@ def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]
 
 
 def _even(low: float, high: float) -> list[float]:
-    """Return logarithms of evenly spaced round numbers."""
+    """Return the logarithms of evenly spaced round numbers."""
     rough = (high - low) / 6
     decade = 10 ** floor(log10(rough))
     step = next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough)
-    edge = 1e-9  # Limits that are round numbers up to rounding errors get a tick.
+    edge = 1e-9  # so that limits that are round numbers get a tick in spite of rounding errors
     first, last = ceil(low / step - edge), floor(high / step + edge)
     return [log10(n * step) for n in range(first, last + 1) if n > 0]
 
 
 def number_text(value: float) -> str:
-    """Return the text of a tick: 10, 100, 1k, 20k; powers of ten where a number has many zeros."""
+    """Return the number at a tick as text: 10, 100, 1k, 20k; a power of ten for many zeros."""
     smallest, thousand, million = 1e-3, 1e3, 1e6
     if value == 0 or smallest <= abs(value) < thousand:
         return f"{value:.6g}"
@@ -260,15 +260,15 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _ABOVE = 100
 """Drawing order above the curves, so that filled areas do not hide the grid."""
 _OPACITY = 0.25
-"""Opacity of grid lines at labelled ticks; lines at other ticks are fainter."""
+"""Opacity of grid lines at ticks with numbers; lines at other ticks are fainter."""
 _APART = 20.0
-"""Smallest spacing of grid lines at full opacity [pixels]; denser lines are fainter."""
+"""Smallest spacing of grid lines with full opacity [pixels]; denser lines are fainter."""
 
 
 class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
     """Grid lines over the whole plot.
 
-    It replaces the grid of pyqtgraph, which blends an image of the size of the plot in every frame.
+    They replace pyqtgraph's grid, which blends an image of the size of the plot in every frame.
     """
 
     def __init__(self, across: AxisItem, up: AxisItem) -> None:

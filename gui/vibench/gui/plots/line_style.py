@@ -1,4 +1,4 @@
-"""Styles of lines, dots and areas; the current theme gives their pens and colours."""
+"""Styles of lines, dots and areas, from which the theme determines pens and colours."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Dash(Enum):
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Dash pattern of a line, and the function that gives its colour in a theme."""
+    """Dash pattern of a line, and the function that returns its colour in a theme."""
 
     colour: Callable[[Theme], Colour]
     dash: Dash = Dash.SOLID
@@ -37,7 +37,7 @@ class LineStyle:
 
 
 def curve_style(number: int, dash: Dash = Dash.SOLID) -> LineStyle:
-    """Return the style of the curve with this number."""
+    """Return the style of a curve, given by its number in the plot."""
     return LineStyle(lambda theme: theme.traces[number % len(theme.traces)], dash)
 
 
@@ -65,14 +65,14 @@ def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
 
 
 def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Return the pen of a straight line; its width is ``ratio``, the screen pixels per logical pixel."""
+    """Return the pen of a straight line, ``ratio`` screen pixels (one logical pixel) wide."""
     return dashed_pen(line_style.colour(theme), ratio, line_style.dash)
 
 
 def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Return the pen of a curve, one screen pixel wide; `LogicalLine` draws it wider.
+    """Return the pen of a curve, one screen pixel wide; `LogicalLine` draws it wider if necessary.
 
-    Dashes have the same length on screens of every resolution.
+    Dashes have the same length on all screens, whatever their resolution.
     """
     pen = dashed_pen(line_style.colour(theme), 1, line_style.dash)
     if line_style.dash is not Dash.SOLID and ratio > 1.0:
@@ -81,20 +81,20 @@ def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
 
 
 def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
-    """Return the colour of an area."""
+    """Return the colour of a filled area."""
     colour: QColor = pg.mkColor(line_style.colour(theme))
     colour.setAlphaF(line_style.fill_opacity or 0.25)
     return colour
 
 
 class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
-    """Curve that draws a thick line as several thin ones, each shifted by one screen pixel.
+    """Curve that draws a thick line as several thin ones, shifted by one screen pixel each.
 
-    A pen of two pixels looks the same and takes three times as long, because Qt draws such lines as areas.
+    A pen of two pixels looks the same but takes three times as long, because Qt draws it as an area.
     """
 
     def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None) -> None:
-        """Draw the line once more, to the right and below, for each further screen pixel of its width."""
+        """Draw the line, then again to the right and below for each further screen pixel of its width."""
         super().paint(painter, option, widget)
         ratio = painter.device().devicePixelRatioF()
         place = painter.transform()
@@ -106,7 +106,7 @@ class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
 
 
 class LogicalLine(pg.PlotDataItem):  # type: ignore[misc] # untyped library
-    """pyqtgraph's curve with a faster line painter."""
+    """Curve of pyqtgraph with a faster way to draw thick lines."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -119,7 +119,7 @@ _INSIDE = "enclosed"
 
 
 class Band:
-    """A filled area between a lower and an upper line."""
+    """Filled area between a lower and an upper bound."""
 
     def __init__(self, of: str) -> None:
         self.of = of
@@ -136,7 +136,7 @@ class Band:
         self.item.setData(np.concatenate((x[there], x[back])), np.concatenate((below[there], above[back])))
 
     def at(self, across: float) -> tuple[float, float] | None:
-        """Return the bounds at the nearest point; None without finite bounds."""
+        """Return the bounds at the point nearest to ``across``; None if they are not finite."""
         x, below, above = self._edges
         if x.size == 0:
             return None

@@ -13,7 +13,7 @@ _MARKER = LineStyle(lambda theme: theme.accent)
 
 
 class Markers(QObject):
-    """Two vertical lines at the same values in every plot."""
+    """Two vertical lines, each at the same value in all plots."""
 
     moved = Signal()
 
@@ -31,7 +31,7 @@ class Markers(QObject):
         return tuple(sorted(self._values)) if self._are_shown else ()
 
     def draw_in(self, plots: Iterable[Plot]) -> None:
-        """Draw the markers in plots, from which the lines of an earlier call were removed."""
+        """Draw the markers in these plots, after their earlier lines were removed."""
         self._plots = tuple(plots)
         self.lines = [[plot.upright(_MARKER, value) for plot in self._plots] for value in self._values]
         for number, lines in enumerate(self.lines):
@@ -41,7 +41,7 @@ class Markers(QObject):
         self._place()
 
     def show(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
-        """Show or hide the markers; they are moved into the visible range."""
+        """Show or hide the markers; if they are outside the visible range, move them into it."""
         self._are_shown = are_shown
         if are_shown and self._plots:
             scale = self._plots[0].scales[0]

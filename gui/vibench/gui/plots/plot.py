@@ -1,4 +1,4 @@
-"""Base class of all plots: labelled axes that follow the data in steps, and a legend."""
+"""Base class of all plots: labelled axes whose range follows the data in steps, and a legend."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,38 +22,38 @@ from .reading import Reading
 from .upright_marks import Rules, Stripes
 
 ROOM = 0.15
-"""Empty margin at both ends after a change of the range, as a share of the data's range."""
+"""Empty margin at both ends when the range of an axis is set, over the range of the data."""
 LEAST_USED = 0.5
-"""If the data fill less than this share of the range, the range is reduced."""
+"""Share of the axis that the data must fill; otherwise the range is reduced."""
 
 Range = tuple[float, float]
 
 
 def steady_range(shown: Range, data: Range) -> Range | None:
-    """Return a new range; None while the data lies inside and fills enough of the current range."""
+    """Return a new range for an axis; None if the data are inside and fill enough of the current one."""
     low, high = data
     size = high - low
     is_inside = shown[0] <= low and high <= shown[1]
     if is_inside and size >= LEAST_USED * (shown[1] - shown[0]):
         return None
     if size <= 0.0:
-        # A constant signal needs an axis range around its value, whatever its unit.
+        # A constant signal needs a range around its value, whatever its unit.
         half = 0.5 * abs(low) or 1e-3
         wanted = (low - half, high + half)
         return None if is_inside and shown[1] - shown[0] <= 8 * half else wanted
     return low - ROOM * size, high + ROOM * size
 
 
-# Antialiasing would halve the frame rate; without hardware support, OpenGL would draw grey areas.
+# Antialiasing would halve the frame rate. OpenGL without hardware support would draw grey areas.
 pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
 _DOT = "●"
 _VEIL = 0.5
-OUT_OF_DATE = "of earlier inputs"
+OUT_OF_DATE = "outdated: inputs have changed"
 _FIRST = -1000
 _RIGHT_EM = 0.6
-"""Right margin, in font heights; half of the last number extends into it."""
+"""Right margin, in font heights, which has room for half of the last number."""
 _MARGIN = 4
 """Margin above and below the legend [pixels]."""
 
@@ -63,13 +63,13 @@ class LegendEntry:
     """A curve's name, with the colour and sign of its line."""
 
     sign: str
-    """The line style as text: ``━━``, ``╍╍``, ``●``."""
+    """Line style as text: ``━━``, ``╍╍``, ``●``."""
     colour: str
     name: str
 
 
 class LegendLine(QLabel):
-    """Legend with entries side by side, wrapped to the width; no entry is split over two lines."""
+    """Legend whose entries are side by side and wrapped to the width; no entry is split."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -105,28 +105,28 @@ class LegendLine(QLabel):
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
-    """Plot with one pair of axes. Curves receive values; for logarithmic axes the plot takes logarithms.
+    """Plot with one pair of axes. Curves get plain values; for a logarithmic axis the plot takes logarithms.
 
     `add_actions` defines keys and context menu. A disabled plot is dimmed and marked as outdated.
     """
 
     up_em = 5.0
-    """Width of the vertical axis, in font heights; equal in all plots, so that stacked plots are aligned."""
+    """Width of the vertical axis, in font heights; the same in all plots, so that stacked plots align."""
 
     def __init__(
         self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
     ) -> None:
         self.across = AxisItem("bottom", across)
         self.up = AxisItem("left", up)
-        # Creating pyqtgraph's own menus would take half of the plot's creation time.
+        # pyqtgraph's own menus would take half of the time for creating a plot.
         super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up}, enableMenu=False)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for unseen in ("top", "right"):
-            # Otherwise pyqtgraph would rewrite the label of an invisible axis at every change of the range.
+            # Otherwise pyqtgraph updates the label of the invisible axis at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
-            # Paint the axes before the grid, because painting determines the ticks that the grid uses.
+            # Paint the axes before the grid, because painting them determines the ticks for the grid.
             axis.setZValue(_FIRST)
         # Hide the last number of an axis where it would be cut off.
         self.up.setStyle(hideOverlappingLabels=True)
@@ -140,10 +140,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[LineStyle, str, str]] = []
         self.named_curves: list[tuple[str, pg.PlotDataItem]] = []
-        """All lines and sets of points, with their names in the legend; the name may be empty."""
+        """All lines and sets of points, with their names for the legend; a name may be empty."""
         self.bands: list[Band] = []
         self.read_more: Callable[[float, float], str] = lambda _across, _up: ""
-        """Function that returns additional text for the reading at a point."""
+        """Function that returns more text for the cursor reading at a point."""
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self.theme = theme
@@ -160,7 +160,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Fit axes and margins to the font."""
         em = self.fontMetrics().height()
         self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * em), 1)
-        # Fixed, because a width that depends on the numbers would require painting twice.
+        # Fixed: a width that depends on the numbers would require painting twice.
         self.up.setWidth(self.up_em * em)
 
     def with_legend(self) -> "Plot":
@@ -170,13 +170,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self
 
     def with_hint(self, text: str) -> "Plot":
-        """Show this text while no curve has a point."""
+        """Show a hint while no curve has points."""
         self._hint = text
         self._look_for_points()
         return self
 
     def always_numbered(self) -> "Plot":
-        """Show numbers on the horizontal axis of an empty plot also, because a plot above shares the axis."""
+        """Show numbers on the horizontal axis even if the plot is empty, because a plot above shares it."""
         self._blanked = (self.up,)
         self.across.blank(Blankness.WRITTEN)
         return self
@@ -205,7 +205,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return item
 
     def band(self, line_style: LineStyle, of: str = "") -> Band:
-        """Add an area between the bounds of a named curve; it does not affect the range of the axes."""
+        """Add an area between the bounds of a named curve; the axes ignore it when fitting their range."""
         band = Band(of)
         self.bands.append(band)
         self.addItem(band.item, ignoreBounds=True)
@@ -235,7 +235,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self._line(line_style, self.scales[0].drawn(value), 90, label, label_at)
 
     def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
-        """Add a horizontal line; a logarithmic axis does not show values of zero or below."""
+        """Add a horizontal line; on a logarithmic axis, it is hidden for values of zero or below."""
         item = self._line(line_style, value, 0, label, 0.92)
         self.move_level(item, value)
         return item
@@ -273,14 +273,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     @property
     def columns(self) -> int:
-        """Number of columns for the extremes of a signal.
+        """Number of columns in which a signal is drawn by its smallest and largest values.
 
         It is slightly more than the width in logical pixels, so that no pixel between columns stays empty.
         """
         return int(1.02 * self.getViewBox().width()) + 2
 
     def show_everything(self) -> None:
-        """Let the axes follow the data."""
+        """Let the axes follow the data again."""
         self.getPlotItem().enableAutoRange()
 
     def turn_scale(self) -> None:
@@ -295,7 +295,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def keep_in_view(
         self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
     ) -> None:
-        """Fit the ranges to these extremes, but only if needed, because redrawing an axis is expensive."""
+        """Set the ranges to these extremes if necessary; redrawing an axis takes long."""
         if not any(self.getViewBox().autoRangeEnabled()) and not self._follows:
             return
         self._follows = True
@@ -306,7 +306,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.setYRange(*wanted, padding=0)
 
     def event(self, event: QEvent) -> bool:
-        """Redraw straight lines after the window was moved to a screen of another resolution."""
+        """Redraw straight lines if the window was moved to a screen with another resolution."""
         if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "theme", None) is not None:
             self.retheme(self.theme)
         return bool(super().event(event))
@@ -314,14 +314,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the legend to the new width."""
         super().resizeEvent(event)
-        # pyqtgraph also calls this method before the widget is initialised and after it is closed.
+        # pyqtgraph also calls this method before the object is initialised and after it is closed.
         if getattr(self, "_legend", None) is not None and self.plotItem is not None:
             self._place_legend()
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         """Draw the hint on an empty plot, or dim a disabled one."""
         super().drawForeground(painter, rect)
-        # Clearing a curve emits no signal, so check again.
+        # Clearing a curve emits no signal, so look for points again.
         self._look_for_points()
         if self._is_empty or not self.isEnabled():
             painter.resetTransform()
@@ -357,7 +357,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.reading.hide()
 
     def _stop_following(self, *_: object) -> None:
-        """Stop following the data after the user has zoomed or moved the view."""
+        """Stop following the data, because the user has zoomed or moved the view."""
         self._follows = False
 
     def _place_levels(self) -> None:
@@ -405,16 +405,16 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self._holds_points or any(getattr(each, "image", None) is not None for each in items)
 
     def _look_for_points(self, *_: object) -> None:
-        """Show the hint and hide the numbers while the plot is empty.
+        """Look whether any curve has points; if not, show the hint and hide the numbers.
 
-        Call this before painting, because a change during painting would cause a second painting.
+        Call this before painting, because a change during painting would cause another painting.
         """
         self._is_empty = bool(self._hint) and not self._holds_points
         for axis in self._blanked:
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
     def _show_units(self) -> None:
-        """Rewrite names and readings in other units, unless the plot is closed."""
+        """Show names and reading in other units, unless the plot is closed."""
         if self.plotItem is not None:
             self._relegend()
             self.reading.again()

@@ -1,4 +1,4 @@
-"""Actions of a plot by key and context menu, and saving as image or numbers."""
+"""Actions of a plot, by key and context menu; saving as picture or numbers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
 
 
 def add_actions(plot: "Plot") -> None:
-    """Add all actions to a plot; other keys are passed on to the page."""
+    """Add all actions to a plot; its other keys are passed on to the page."""
     clipboard = QGuiApplication.clipboard()
     for text, key, act in (
         ("Show everything", "A", plot.show_everything),
@@ -40,7 +40,7 @@ def add_actions(plot: "Plot") -> None:
 
 
 def save_plot(plot: "Plot") -> None:
-    """Ask for a path and save the image or the numbers."""
+    """Ask for a path; save the picture or the numbers there."""
     wish = Path(f"{plot.accessibleName().lower().replace(' ', '_')}.png")
     path = new_path(plot, "Save picture or numbers", wish, FILTERS)
     if path is None:
@@ -53,9 +53,9 @@ def save_plot(plot: "Plot") -> None:
 
 
 def write_plot(plot: "Plot", path: Path) -> None:
-    """Write the image or the numbers in the format of the suffix.
+    """Write the picture or the numbers, in the format of the path's suffix.
 
-    Raises OSError when the file exists or cannot be written.
+    Raises OSError when the file exists, cannot be written, or has another suffix.
     """
     if path.exists():
         raise FileExistsError(0, "it exists already")
@@ -68,7 +68,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
             generator.setOutputDevice(memory)
             generator.setSize(plot.size())
             generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
-            # With another resolution, axes and curves would not line up.
+            # With any other resolution, axes and curves would not line up.
             generator.setResolution(plot.logicalDpiX())
             painter = QPainter(generator)
             plot.render(painter)
@@ -81,7 +81,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
 
 
 def numbers_of(plot: "Plot", separator: str) -> str:
-    """Return the curves as rows of name, x and y, in the displayed units."""
+    """Return the curves as lines of name, x and y, in the displayed units."""
     across, up = plot.across.axis, plot.up.axis
     rows = [separator.join(("Curve", across.text, up.text))]
     for number, (name, item) in enumerate(plot.named_curves):

@@ -1,4 +1,4 @@
-"""Plots one above the other over one horizontal axis."""
+"""Plots one above the other with a common horizontal axis."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ AXIS_EM = 3
 
 
 class PlotStack(QWidget):
-    """Plots with equal heights, of which only the last labels the common axis."""
+    """Plots of equal height; only the lowest one labels the common axis."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class PlotStack(QWidget):
         self._share_height()
 
     def _label_last(self) -> None:
-        """Label the axis of the last plot only, and share the height."""
+        """Label only the axis of the lowest plot, and make all plots equally high."""
         for plot in self.plots:
             is_last = plot is self.plots[-1]
             plot.across.setStyle(showValues=is_last)
@@ -45,5 +45,5 @@ class PlotStack(QWidget):
         height = max(1, (self.height() - axis) // max(1, len(self.plots)))
         for place in range(len(self.plots)):
             self._layout.setStretch(place, height + (axis if place == len(self.plots) - 1 else 0))
-        # Activate the layout now, because a later change would repaint everything.
+        # Apply the layout now; a later change would repaint everything.
         self._layout.activate()

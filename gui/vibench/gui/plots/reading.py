@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 
 class Reading:
-    """Crosshair at the pointer, with a text that shows its coordinates and the nearest curve.
+    """Crosshair at the pointer, with a text that states its values and the nearest curve.
 
-    With a mark set, differences from it are shown too, as a ratio in dB on a logarithmic vertical axis.
+    If a mark is set, the differences from it are stated too; on a logarithmic vertical axis, the ratio in dB.
     """
 
     def __init__(self, plot: "Plot") -> None:
         self._plot = plot
         self._lines: tuple[pg.InfiniteLine, ...] = ()
-        """Two lines of the crosshair, then two of the mark; created at first use."""
+        """Two lines of the crosshair, then two of the mark; created when first needed."""
         self._label: QLabel | None = None
         self._at = QPointF()
         self._marked: tuple[float, float] | None = None
@@ -37,7 +37,7 @@ class Reading:
 
     @property
     def text(self) -> str:
-        """The reading in words; empty while the crosshair is hidden."""
+        """The reading as text; empty while the crosshair is hidden."""
         return self._label.text() if self._label is not None and self.place is not None else ""
 
     def dress(self, theme: Theme) -> None:
@@ -48,7 +48,7 @@ class Reading:
             line.setPen(pg.mkPen(theme.accent, style=Qt.PenStyle.DashLine))
 
     def follow(self, place: QPointF) -> None:
-        """Read at a pointer position in the scene; hide the crosshair outside the axes and while dragging."""
+        """Read at the pointer, given in the scene; hide the crosshair outside the axes or while dragging."""
         box = self._plot.getViewBox()
         is_pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
         if box.sceneBoundingRect().contains(place) and not is_pressed:
@@ -57,7 +57,7 @@ class Reading:
             self.hide()
 
     def show_at(self, point: QPointF) -> None:
-        """Read at a point in view coordinates."""
+        """Read at a point given in the coordinates of the axes."""
         self._at = point
         drawn, scales = (point.x(), point.y()), self._plot.scales
         for line, at in zip(self._create_lines()[:2], drawn, strict=True):
@@ -84,7 +84,7 @@ class Reading:
         self._show_text("   ".join(parts))
 
     def again(self) -> None:
-        """Read again after a change of the curves."""
+        """Read again, after the curves have changed."""
         if self.place is not None:
             self.show_at(self._at)
 
@@ -96,14 +96,14 @@ class Reading:
             self.show_at(self._plot.getViewBox().viewRect().center())
 
     def mark_or_unmark(self) -> None:
-        """Mark the current place; a second call at the same place removes the mark."""
+        """Set the mark at the crosshair; a second call at the same place removes the mark."""
         if self.place is None:
             self.on_or_off()
         self._marked = None if self._marked == self.place else self.place
         self._place_marks()
 
     def rescale(self) -> None:
-        """Move the mark to the same values after a change of scale."""
+        """Move the mark to its values again, after a change of the scale."""
         self.hide()
         self._place_marks()
 
@@ -116,7 +116,7 @@ class Reading:
                 line.hide()
 
     def forget(self) -> None:
-        """Hide the reading, and discard the lines that the plot has deleted."""
+        """Hide the reading, and drop the lines, which the plot has deleted."""
         self.hide()
         self._lines, self._marked = (), None
 
@@ -153,7 +153,7 @@ class Reading:
         self._label.show()
 
     def _nearest(self, point: QPointF) -> tuple[str, float] | None:
-        """Return name and height of the vertically nearest curve."""
+        """Return name and value of the curve that is vertically nearest; None without curves."""
         found: list[tuple[float, str, float]] = []
         for name, item in self._plot.named_curves:
             drawn_x, drawn_y = item.getData()

@@ -1,4 +1,4 @@
-"""A long signal in a plot, drawn as the smallest and largest sample of every pixel column."""
+"""Long signal in a plot, drawn as the smallest and largest sample in every pixel column."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ MOST_COLUMNS = 3000
 
 
 class SignalCurve:
-    """Curve of a long signal; only the visible part is drawn, and short impacts stay visible at any zoom."""
+    """Curve of a long signal. Only the visible part is drawn; short impacts are visible at any zoom."""
 
     def __init__(self, plot: Plot, line_style: LineStyle, name: str = "") -> None:
         self._plot = plot
@@ -38,7 +38,7 @@ class SignalCurve:
         last = int(np.ceil((high_s - self._start_s) * self._rate_hz)) + 2
         count = len(self._samples)
         if self._plot.getViewBox().autoRangeEnabled()[0]:
-            # The axes will be fitted to the data, so draw the whole signal.
+            # The range of the axis follows the data, so draw the whole signal.
             first, last = 0, count
         self._draw(min(max(first, 0), count), min(max(last, 0), count))
 
@@ -59,7 +59,7 @@ class SignalCurve:
 
 
 SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
-"""Item role of the bar's length, 0 to 1 or more."""
+"""Item role for the length of the bar; 1 is the whole width."""
 OVER = "#b3261e"
 NEAR = "#a06a00"
 WELL = "#00694d"

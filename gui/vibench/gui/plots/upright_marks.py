@@ -1,4 +1,4 @@
-"""Vertical stripes and lines of a plot; one item draws all marks of a kind, column by column."""
+"""Vertical stripes and lines of a plot; a single item draws all marks of one kind."""
 
 from collections.abc import Callable, Iterable
 
@@ -11,20 +11,20 @@ from PySide6.QtGui import QPainter, QPen
 _BEHIND = -10
 """Drawing order below the curves."""
 _LEAST_APART = 5
-"""Smallest distance between drawn lines [pixels]; closer lines would merge into a grey area."""
+"""Smallest distance between drawn lines [pixels]; closer lines would look like a grey area."""
 
 
 class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
-    """Base class of items that draw many marks; one item per mark would be slow in every frame."""
+    """Base class of items that draw many marks; one item per mark would slow down every frame."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__()
         self._across = across
-        """Function from a value to its position on the axis, which may be logarithmic."""
+        """Function from a value to its coordinate on the axis, which may be logarithmic."""
         self.setZValue(_BEHIND)
 
     def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
-        """Start painting in pixels; return the visible rectangle and the scale from values to columns."""
+        """Switch to pixels; return the visible rectangle, and scale and shift from values to columns."""
         to_pixels = painter.transform()
         visible = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()
@@ -40,7 +40,7 @@ class Stripes(_UprightMarks):
         self._bands: NDArray[np.float64] = np.empty((0, 2))
 
     def show_bands(self, bands: Iterable[tuple[float, float]]) -> None:
-        """Show these stripes, each from low to high."""
+        """Show stripes, each given by its lower and upper end."""
         places = [(self._across(low), self._across(high)) for low, high in bands]
         self._bands = np.array(places, dtype=np.float64).reshape(-1, 2)
         self.update()
@@ -51,7 +51,7 @@ class Stripes(_UprightMarks):
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Fill each pixel column that stripes cover only once, so that overlaps are not darker."""
+        """Fill every pixel column that has a stripe once, so that overlaps are not darker."""
         visible, scale, shift = self._begin(painter)
         width = max(1, round(visible.width()))
         edges = np.clip(np.floor(self._bands * scale + shift - visible.left()), -1, width).astype(int)
@@ -67,7 +67,7 @@ class Stripes(_UprightMarks):
 
 
 class Rules(_UprightMarks):
-    """Vertical lines; none is drawn while they would be too close together."""
+    """Vertical lines; if they would be too close together, none is drawn."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)
