@@ -1,5 +1,5 @@
-"""Pages of the window: one package for each page, independent of the others.
+"""Pages of the window: one package per page, independent of one another.
 
-This package imports none of them, because a worker process that runs a function of one page must not load
+This package itself imports no page, so that a worker process that runs a function of one page does not load
 the other pages. The window's page catalogue lists the pages in the order of work.
 """

@@ -21,7 +21,7 @@ def page(context):
 def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
     page._predicted(preview.predict_test(preview.TestPreview(Measurement(name="weak", excitation=plan), RIG)))
-    assert page.expectation.text().startswith("Will be known: Response II: ± ")
+    assert page.expectation.text().startswith("Expected uncertainty: Response II: ± ")
     assert "Response I: not known beforehand" in page.expectation.toolTip()
     page._prediction_failed(ValueError("no"))
     assert page.expectation.text() == ""

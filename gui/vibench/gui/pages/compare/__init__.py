@@ -1,5 +1,5 @@
-"""The Compare page: recordings and predictions overlaid on one another.
+"""The Compare page: curves of recordings and predictions, overlaid.
 
-It shows curves with their bounds, their peaks, two markers and the difference of two curves.
+It shows curves with their bounds, their peaks, values at two markers, and the difference of two curves.
 Analyses and exports run in another process.
 """

@@ -1,4 +1,4 @@
-"""Compare: recordings and predictions overlaid on one another, with peaks, differences and exports."""
+"""Compare: curves of recordings and predictions, overlaid, with peaks, differences and exports."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -36,17 +36,17 @@ def export_comparison(
     pair: tuple[Curve, Curve] | None,
     markers_hz: tuple[float, ...],
 ) -> Path:
-    """Write the comparison in the format of the path's suffix, and return the path written."""
+    """Write the comparison to ``path``, in the format of its suffix; return the path written."""
     from vibench.analysis.report import write_comparison  # noqa: PLC0415 - loading it takes most of a second
 
     return write_comparison(path, curves, recordings, pair, markers_hz)
 
 
 class AnalysisPanel(QGroupBox):
-    """The analysis options, the button that applies them, and the progress bar."""
+    """Analysis options, the button that applies them, and the progress bar."""
 
     wanted = Signal()
-    """Request to analyse all recordings again."""
+    """Request to analyse all recordings again with the current options."""
     cancelled = Signal()
 
     def __init__(self) -> None:
@@ -65,11 +65,11 @@ class AnalysisPanel(QGroupBox):
         self.show_progress(0, 0)
 
     def options(self) -> AnalysisOptions | None:
-        """Return the options; None while they are not valid."""
+        """Return the options; None if they are not valid."""
         return self.form.value
 
     def show_progress(self, done: int, total: int) -> None:
-        """Show how many recordings are analysed; the bar is hidden when all are."""
+        """Show how many recordings are analysed; when all are, hide the bar."""
         self._bar.show_done(done, total)
         for widget in (self._bar, self._cancel):
             widget.setVisible(done < total)
@@ -83,7 +83,7 @@ FILTERS = f"SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;{REPO
 
 
 class ComparePage(Page):
-    """Curves on the left, their picture on the right, numbers below."""
+    """Curves on the left, their plot on the right, numbers below it."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -119,11 +119,11 @@ class ComparePage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens files of branches."""
+        """Function that opens files of `vibench branches`."""
         return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
 
     def add_recordings(self, paths: tuple[Path, ...]) -> None:
-        """Analyse recordings in the background and overlay their curves."""
+        """Analyse recordings in the background, then overlay their curves."""
         options = self.panel.options()
         if options is None:
             return
@@ -143,7 +143,7 @@ class ComparePage(Page):
         self._say_progress()
 
     def add_prediction(self, curves: tuple[Curve, ...]) -> None:
-        """Overlay a prediction."""
+        """Overlay the curves of a prediction."""
         for source in dict.fromkeys(each.source for each in curves):
             self.curves.replace_source(source, tuple(each for each in curves if each.source == source))
 
@@ -172,7 +172,7 @@ class ComparePage(Page):
     def _compared(self, found: ComparedRecording) -> None:
         others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
         if (first := first_copies([*others, found])[-1]) < len(others):
-            self._recordings.pop(found.path, None)  # absent if it was requested twice
+            self._recordings.pop(found.path, None)  # absent if the same path was requested twice
             text = copy_sentence(others[first], str(others[first].path), found)
             self.context.warn(f"{found.path} {text}.", "It is shown once.")
             self._end_job()
@@ -228,7 +228,7 @@ class ComparePage(Page):
         self.add_branches(tuple(Path(each) for each in chosen))
 
     def add_branches(self, paths: tuple[Path, ...]) -> None:
-        """Read results of `vibench branches` in the background and overlay them."""
+        """Read files of `vibench branches` in the background, then overlay their curves."""
         for path in paths:
             self.context.background.ask(branch_curves, self.add_prediction, self.context.fail, path)
 

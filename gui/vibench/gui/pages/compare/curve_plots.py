@@ -1,4 +1,4 @@
-"""Two plots with a common frequency axis: the curves with their bounds, and the difference of two curves."""
+"""Two plots with a common frequency axis: curves with their bounds, and the difference of two curves."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -48,7 +48,7 @@ _OTHER_DOTS = 4
 
 
 class CurvePlots(QWidget):
-    """The plots of a comparison, with two movable markers."""
+    """Plots of a comparison, with two markers that the user can move."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -59,7 +59,7 @@ class CurvePlots(QWidget):
             "Select a curve and its reference on the left."
         )
         self.differences.always_numbered().setXLink(self.magnitudes)
-        # The lower plot labels the frequency axis of both.
+        # The lower plot labels the frequency axis for both.
         self.magnitudes.across.show_nothing()
         parts = splitter("Curves and their difference", self.magnitudes, self.differences, (500, 170))
         fill_box(QVBoxLayout(self), parts, margin=0)
@@ -104,7 +104,7 @@ PEAK_HEADINGS = (
 
 
 class NumberTable(ReadTable):
-    """A read-only table with variable columns; the first column takes the remaining width."""
+    """Read-only table with a variable number of columns; the first one takes the remaining width."""
 
     def __init__(self, name: str, hint: str) -> None:
         super().__init__(name, PEAK_HEADINGS[:1], hint)
@@ -112,7 +112,7 @@ class NumberTable(ReadTable):
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 
     def show_numbers(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-        """Show other columns and rows."""
+        """Show these columns and rows instead of the present ones."""
         self.setColumnCount(len(headings))
         self.setHorizontalHeaderLabels(list(headings))
         self.show_rows(rows)
@@ -139,7 +139,7 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-# Cached: a chaotic curve has thousands of peaks, listed again whenever a curve is ticked or units change.
+# Cached: a chaotic curve has thousands of peaks, and these are needed whenever a curve is ticked.
 _peaks = lru_cache(maxsize=64)(curve_peaks)
 
 
@@ -170,14 +170,14 @@ _DASHES = {
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
-"""Dash patterns by origin: the first for transmissibility or Response I, the second for Response II."""
+"""Dash patterns by origin of a curve: first for transmissibility and Response I, second for Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Curves ticked by default. Response II is not, because it equals Response I without contact."""
+"""Curves that are ticked at first. Response II is not, because without contact it equals Response I."""
 _SWATCH = (28, 12)
 
 
 class CurveList(QListWidget):
-    """List of curves with check boxes; the colour shows the source of a curve, the dashes its kind."""
+    """List of curves with check boxes; the colour of a curve shows its source, the dash its kind."""
 
     changed = Signal()
 
@@ -211,14 +211,14 @@ class CurveList(QListWidget):
             hint_in_list(self, "No curves yet: add recordings, or overlay a simulation.")
 
     def line_style(self, curve: Curve) -> LineStyle:
-        """Return the line style of a curve: the colour of its source, the dash of its kind."""
+        """Return the line style of a curve: colour by its source, dash by its kind."""
         sources = list(dict.fromkeys(each.source for each in self._curves))
         first, second = _DASHES[curve.origin]
         dash = second if curve.response is CurveKind.RESPONSE_II else first
         return curve_style(sources.index(curve.source), dash)
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
-        """Replace the curves of a source."""
+        """Replace the curves of a source by new ones."""
         ticked = {each.name for each, _ in self.ticked()}
         known = {each.name for each in self._curves}
         others = [each for each in self._curves if not _is_of(each, source)]
@@ -230,7 +230,7 @@ class CurveList(QListWidget):
         )
 
     def remove_chosen(self) -> tuple[str, ...]:
-        """Remove the selected curves; return the sources without remaining curves."""
+        """Remove the selected curves; return the sources that have no curve left."""
         before = {each.source for each in self._curves}
         ticked = {each.name for each, _ in self.ticked()}
         rows = {index.row() for index in self.selectedIndexes()}
@@ -239,13 +239,13 @@ class CurveList(QListWidget):
         return tuple(before - {each.source for each in self._curves})
 
     def tick(self, name: str, state: Qt.CheckState) -> None:
-        """Show or hide a curve."""
+        """Show or hide the curve ``name``."""
         for row, each in enumerate(self._curves):
             if each.name == name:
                 self.item(row).setCheckState(state)
 
     def retheme(self, theme: Theme) -> None:
-        """Redraw the swatches in other colours."""
+        """Redraw the samples of the line styles in other colours."""
         self._theme = theme
         with QSignalBlocker(self):
             for row, each in enumerate(self._curves):
@@ -274,7 +274,7 @@ def _name(each: Curve) -> str:
 
 
 def _is_of(each: Curve, source: str) -> bool:
-    """Return whether a curve belongs to a source; steps up and down of one recording are two sources."""
+    """Return whether a curve belongs to a source; steps up and steps down of a recording are two sources."""
     return each.source == source or each.source in (f"{source} up", f"{source} down")
 
 
@@ -291,7 +291,7 @@ def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:
 
 
 def _caution(curve: Curve, reference: Curve) -> str:
-    """Return a warning if the base levels differ, because contact makes the response depend on the level."""
+    """Return a warning if base levels differ, because with contact the response depends on the level."""
     levels = (curve.level_m, reference.level_m)
     if levels[0] == levels[1]:
         return ""
@@ -303,7 +303,7 @@ _NOBODY = "– nothing –"
 
 
 class PairBox(QGroupBox):
-    """Choice of a curve and its reference; by default the second and the first of the shown curves."""
+    """Choice of a curve and its reference; at first the second and the first visible curve."""
 
     changed = Signal()
 
@@ -325,7 +325,7 @@ class PairBox(QGroupBox):
         return self._summary.text()
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
-        """Offer these curves; the selection is kept where possible."""
+        """Offer these curves; the selection is kept if possible."""
         self._curves = {_name(each): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
@@ -341,7 +341,7 @@ class PairBox(QGroupBox):
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:
-        """Return the difference and show it in words; None if the curves cannot be compared."""
+        """Return the difference and describe it in words; None if the curves cannot be compared."""
         pair = self.pair()
         self._summary.setText("")
         if pair is None:

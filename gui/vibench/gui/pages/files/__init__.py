@@ -1,5 +1,5 @@
-"""The Files page: recordings of a folder, as a list and as plots.
+"""The Files page: the recordings of a folder, as a list and as plots.
 
-It has a table with state and thumbnail of each recording, its channels over time at any zoom, and a
-spectrogram. Folders and overviews are read in another process.
+It has a table with the state and a thumbnail of each recording. The open recording is shown over time, at any
+zoom, and as a spectrogram. Folders and overviews are read in another process.
 """

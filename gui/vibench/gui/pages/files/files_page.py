@@ -1,4 +1,4 @@
-"""Files: recordings of a folder, listed with state and thumbnail, and opened at any zoom."""
+"""Files: the recordings of a folder, listed with state and thumbnail, and shown at any zoom."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -38,15 +38,15 @@ from .spectrogram_view import Pictures
 
 EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
 LOOK_S = 2.0
-"""Interval between checks for deleted files [s]."""
+"""Interval between two checks whether files were deleted [s]."""
 CHECK_WAIT_MS = 250
-"""Delay between opening a recording and checking all of its samples [ms]."""
+"""Delay from opening a recording to checking its samples against the seal [ms]."""
 PAINTED_MS = 50
-"""Delay before the facts of a recording are shown, so that its pictures are painted first [ms]."""
+"""Delay before the facts of a recording are shown, so that its plots are painted first [ms]."""
 
 
 class FilesPage(Page):
-    """The table of recordings above, the selected recording below."""
+    """Page with the table of recordings above, and the open recording below."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -57,7 +57,7 @@ class FilesPage(Page):
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
         self._pictured_path: Path | None = None
-        """The recording that the pictures show."""
+        """Path of the recording that the plots show."""
         self._listing: Job | None = None
         self._making: Job | None = None
         self._check = LatestRequest(
@@ -79,7 +79,7 @@ class FilesPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The pictures, which must show the recording named above them."""
+        """The plots, which must show the recording named above them."""
         wanted = None if self._opened is None else self._opened.path
         inside = self.pictures.spectrogram.displayed_results, self.pictures.hidden_motion.displayed_results
         return DisplayedResult(self.pictures, self._pictured_path, wanted), *inside
@@ -90,12 +90,12 @@ class FilesPage(Page):
         return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
 
     def enter(self) -> None:
-        """List the folder again, because new files may exist, and focus the table."""
+        """List the folder again, because there may be new files, and focus the table."""
         self.list_folder()
         self.table.setFocus()
 
     def refresh(self) -> None:
-        """List the folder again after a listed file was deleted."""
+        """List the folder again if a listed file was deleted."""
         now_s = monotonic()
         if now_s - self._looked_s > LOOK_S:
             self._looked_s = now_s
@@ -119,11 +119,11 @@ class FilesPage(Page):
         self._wanted = path
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
-        # Show the page first, because both steps together would block the event loop.
+        # Show the page first; together with opening, it would block the event loop.
         in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
-        """Open a recording, even if it is open already; selecting a listed recording opens it."""
+        """Open a recording even if it is open already; selecting a row of the table opens its file."""
         before = self._opened
         self.table.choose(path)
         if self._opened is before:
@@ -133,7 +133,7 @@ class FilesPage(Page):
         entries, shown = found.recordings, self.table.recordings
         self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
-        # A late answer must not change a newer selection.
+        # A late result must not replace a newer selection.
         chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
         self._wanted = None
         shown.show_entries(entries)
@@ -142,7 +142,7 @@ class FilesPage(Page):
         if missing:
             self.context.background.ask(thumbnails, shown.show_thumbnails, self.context.fail, missing)
         if chosen:
-            # A recording that was still growing may have its final name now.
+            # A recording that was still being written may have its final name now.
             self.table.choose(*map(name_now, chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
@@ -155,7 +155,7 @@ class FilesPage(Page):
             self._open(paths[0])
 
     def _open(self, path: Path) -> None:
-        """Open a recording; if it has no overview, compute one in the background first."""
+        """Open a recording; if it has no overview, compute one in the background before showing it."""
         if self._making is not None:
             self._making.drop()
             self._making = None
@@ -171,7 +171,7 @@ class FilesPage(Page):
         self._opened = recording
         self._title.setText(recording.path.name)
         if recording.path != path:
-            # The recording ended after it was listed.
+            # The recording ended after the folder was listed, which changed its name.
             self._wanted = recording.path
             self.list_folder()
         if recording.samples == 0:
@@ -183,7 +183,7 @@ class FilesPage(Page):
             self._making = self.context.background.ask(read_levels, self._show, self.context.fail, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
-        """Add one channel per pass of the event loop; reading all channels at once would block the window."""
+        """Read one channel per pass of the event loop; all channels at once would block the window."""
         if recording is not self._opened:
             return
         if len(levels) == len(recording.roles):
@@ -198,7 +198,7 @@ class FilesPage(Page):
         self._making = None
         if self._opened is None:
             return
-        # Delayed until the pictures are drawn, because checking the seal takes as long as drawing.
+        # Delayed until the plots are drawn, because checking the seal takes as long as drawing.
         QTimer.singleShot(PAINTED_MS, self, self._show_facts)
         if not self._opened.is_growing:
             self._check.ask(self._opened.path)
@@ -237,7 +237,7 @@ class FilesPage(Page):
             self._go_to(Path(chosen))
 
     def _typed_folder(self) -> None:
-        # Use os.path, because pathlib raises errors for names that no system allows.
+        # Not pathlib, which raises errors for names that no operating system allows.
         folder = Path(os.path.expanduser(self._folder_line.text()))  # noqa: PTH111
         if folder == self._folder:
             return
@@ -250,7 +250,7 @@ class FilesPage(Page):
             self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:
-        """List another folder; the folder of new recordings stays as set in the menu."""
+        """List another folder; the folder of new recordings does not change."""
         self._folder = folder
         self.table.recordings.show_entries(())
         self._count.setText("◌ reading…")
@@ -281,7 +281,7 @@ class FilesPage(Page):
         parts = PageParts(self.context, FILES, Qt.Orientation.Vertical)
         parts.setAccessibleName("List and recording")
         browser = ScrollArea("List of recordings", self._browser())
-        parts.show_parts(browser, ScrollArea("Recording in sight", self._viewer()), (200, 600))
+        parts.show_parts(browser, ScrollArea("Open recording", self._viewer()), (200, 600))
         fill_box(QVBoxLayout(self), parts)
         self.time_histories.range_changed.connect(self._say_view)
         self.time_histories.markers.moved.connect(self._say_view)

@@ -1,4 +1,4 @@
-"""The table of recordings: one row per file, with state, thumbnail and campaign."""
+"""Table of recordings: one row per file, with state, thumbnail and campaign."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -48,19 +48,19 @@ from ...widgets.theme import Theme
 Levels = dict[str, tuple[OverviewLevel, ...]]
 
 NOTE = "note"
-"""Name of a result that contains a note; later notes are numbered."""
+"""Name of the stored result that contains a note; further notes are numbered."""
 
 
 @dataclass(frozen=True)
 class ListedRecording:
-    """A row of the table."""
+    """Row of the table."""
 
     path: Path
     catalogue_entry: CatalogueEntry
 
     @property
     def name(self) -> str:
-        """Path relative to the folder, without suffix; different for each attempt of a measurement."""
+        """Path relative to the folder, without suffix; unique, also between attempts of a measurement."""
         return self.catalogue_entry.path.removesuffix(".part").removesuffix(".h5")
 
     @property
@@ -82,9 +82,9 @@ class ListedCampaign:
 
     name: str
     states: tuple[JournalPointState, ...]
-    """One state per point."""
+    """State of each point."""
     files: frozenset[Path]
-    """Recordings of the last attempts."""
+    """Recording of the last attempt at each point."""
 
     @property
     def text(self) -> str:
@@ -101,14 +101,14 @@ class ListedCampaign:
 
 @dataclass(frozen=True)
 class Listing:
-    """Contents of a folder."""
+    """Recordings and campaigns in a folder."""
 
     recordings: tuple[ListedRecording, ...] = ()
     campaigns: tuple[ListedCampaign, ...] = ()
 
 
 def read_listing(folder: Path) -> Listing:
-    """Return the contents of a folder; a missing folder counts as empty."""
+    """Return the recordings and campaigns in a folder; a missing folder counts as empty."""
     if not folder.is_dir():
         return Listing()
     recordings = tuple(ListedRecording(folder / each.path, each) for each in list_recordings(folder))
@@ -120,7 +120,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
         try:
             points = read_journal(path)
         except RecordingError:
-            # A file of this name from another program is not a campaign.
+            # A file of another program may have this suffix.
             continue
         files = frozenset(path.parent / each.file for each in points if each.file)
         name = path.name.removesuffix(JOURNAL_SUFFIX)
@@ -128,7 +128,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
 
 
 def export_recording(path: Path, target: Path) -> tuple[Path, ...]:
-    """Export a recording in the format of the target's suffix; return the files written."""
+    """Export a recording in the format of the target's suffix; return the paths written."""
     from vibench.analysis.exchange import Format, excerpt, export_samples  # noqa: PLC0415 - slow to load
 
     with open_recording(path) as recording:
@@ -143,7 +143,7 @@ def add_note(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the notes of the plan, then later notes from oldest to newest, or an error text."""
+    """Return the plan's notes, then the later ones from oldest to newest; or an error text."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     try:
@@ -155,12 +155,12 @@ def notes_of(recording: Recording) -> tuple[str, ...]:
 
 
 def thumbnails(paths: tuple[Path, ...]) -> dict[Path, Thumbnail | None]:
-    """Return thumbnails of recordings; None where a file cannot be read."""
+    """Return the thumbnails of recordings; None for a file that cannot be read."""
     return {path: thumbnail(path) for path in paths}
 
 
 def read_levels(path: Path) -> Levels:
-    """Return the stored overview of a recording, or compute it from all samples."""
+    """Return the stored overview of a recording, or compute one from all samples."""
     with open_recording(path) as recording:
         return overview_levels(recording)
 
@@ -175,7 +175,7 @@ _STATE_SYMBOLS: dict[str, str] = {
 
 
 def state_text(state: str) -> str:
-    """Return symbol and word of a state, so that it can be read without colour."""
+    """Return symbol and word for a state, which can be read without colour."""
     return f"{_symbol(state)} {state}"
 
 
@@ -203,12 +203,12 @@ def role_text(role: str) -> str:
 
 
 def whole_check(path: Path) -> VerifiedRecording:
-    """Check all samples and results against their seals, which takes seconds for a long recording."""
+    """Check all samples and results against their seals; takes seconds for a long recording."""
     return verify_recordings(path)[0]
 
 
 def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
-    """Return a line about a recording; ``found`` is the result of `whole_check`, None until it ends."""
+    """Return a line about a recording; ``found`` is the result of `whole_check`, None if not yet known."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -236,10 +236,10 @@ ALL = "All recordings"
 
 
 class CampaignChoice(Choice):
-    """Choice of all recordings or the recordings of one campaign; hidden in a folder without campaigns."""
+    """Choice between all recordings and those of one campaign; hidden in a folder without campaigns."""
 
     chosen = Signal(object)
-    """Files of the selected campaign as a set; None for all recordings."""
+    """Files of the selected campaign, as a set; None for all recordings."""
 
     def __init__(self) -> None:
         super().__init__("Campaign")
@@ -250,7 +250,7 @@ class CampaignChoice(Choice):
         self.hide()
 
     def offer(self, campaigns: tuple[ListedCampaign, ...]) -> None:
-        """Offer the campaigns; the selection is kept."""
+        """Offer these campaigns; the selection is kept."""
         before = self.currentIndex()
         name = self._campaigns[before - 1].name if before > 0 else ""
         self._campaigns = campaigns
@@ -275,7 +275,7 @@ _THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.S
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
 _MEASURED_ROWS = 24
-"""Rows measured to size the columns: more than one screen, few enough not to block the event loop."""
+"""Number of rows from which column widths are computed: more than fit on a screen, but quick to measure."""
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 
@@ -295,7 +295,7 @@ class RecordingModel(QAbstractTableModel):
         self._pictures: dict[Path, QPixmap] = {}
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """Show another list; thumbnails of remaining files are kept. An identical list changes nothing."""
+        """Show another list; thumbnails of files in both lists are kept. The same list changes nothing."""
         if entries == self.entries:
             return
         self.beginResetModel()
@@ -307,7 +307,7 @@ class RecordingModel(QAbstractTableModel):
         self.endResetModel()
 
     def missing_pictures(self) -> tuple[Path, ...]:
-        """Return the readable files without a thumbnail."""
+        """Return the readable files that have no thumbnail yet."""
         return tuple(e.path for e in self.entries if e.is_readable and e.path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
@@ -339,7 +339,7 @@ class RecordingModel(QAbstractTableModel):
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Return text, thumbnail, tooltip or sorting value of a cell."""
+        """Return text, thumbnail, tooltip or sorting value of a cell, depending on the role."""
         entry, column = self.entries[index.row()], index.column()
         text, sorting = self._rows[index.row()][column]
         content: Any = None
@@ -362,7 +362,7 @@ class RecordingModel(QAbstractTableModel):
         return content
 
     def _picture(self, path: Path) -> QPixmap | None:
-        """Return the thumbnail of a visible row; drawing the thumbnails of all rows would take too long."""
+        """Return the thumbnail of a row, drawn when first visible; drawing all rows would take too long."""
         found = self._thumbnails.get(path)
         if found is not None and path not in self._pictures:
             self._pictures[path] = _paint_thumbnail(found, self._theme)
@@ -373,20 +373,20 @@ class _ChosenRows(QSortFilterProxyModel):
     _only: frozenset[Path] | None = None
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Show only rows of these files; None shows all."""
+        """Show only the rows of these files; None shows all."""
         self.beginFilterChange()
         self._only = paths
         self.endFilterChange()
 
     def filterAcceptsRow(self, row: int, parent: Index) -> bool:
-        """Return whether the row passes both the search and the campaign filter."""
+        """Return whether a row matches both the search text and the selected campaign."""
         if not super().filterAcceptsRow(row, parent):
             return False
         return self._only is None or self.sourceModel().index(row, NAME).data(PATH_ROLE) in self._only
 
 
 class RecordingTable(QTableView):
-    """The sortable table; several rows can be selected."""
+    """Sortable table; several rows can be selected."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -427,11 +427,11 @@ class RecordingTable(QTableView):
         self.recordings.retheme(theme)
 
     def search(self, text: str) -> None:
-        """Show only rows that contain the text."""
+        """Show only the rows that contain the text."""
         self._sorted.setFilterFixedString(text)
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Show only rows of these files; None shows all."""
+        """Show only the rows of these files; None shows all."""
         self._sorted.show_only(paths)
 
     def chosen_paths(self) -> tuple[Path, ...]:
@@ -440,12 +440,12 @@ class RecordingTable(QTableView):
         return tuple(index.data(PATH_ROLE) for index in rows)
 
     def choose(self, *paths: Path) -> None:
-        """Select exactly the rows of these files; without a match nothing changes."""
+        """Select the rows of these files and no others; if there are none, nothing changes."""
         indices = [self._sorted.index(row, NAME) for row in range(self._sorted.rowCount())]
         wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
         if not wanted:
             return
-        # Not selectRow, which extends the selection while Ctrl is held.
+        # Not selectRow, which would extend the selection while Ctrl is pressed.
         self.selectionModel().setCurrentIndex(wanted[0], _THIS_ROW_ALONE)
         for index in wanted[1:]:
             self.selectionModel().select(index, _THIS_ROW_TOO)
@@ -470,7 +470,7 @@ def _cells(entry: ListedRecording) -> tuple[Cell, ...]:
 
 
 def _paint_thumbnail(found: Thumbnail, theme: Theme) -> QPixmap:
-    """Return a thumbnail with a line from the lowest to the highest value of each column."""
+    """Return a thumbnail: in each column a line from the lowest to the highest value."""
     ratio = QGuiApplication.primaryScreen().devicePixelRatio()
     picture = QPixmap(THUMBNAIL_SIZE * ratio)
     picture.setDevicePixelRatio(ratio)

@@ -1,4 +1,4 @@
-"""The pictures of a recording: time histories, spectrogram and hidden-state estimate of the visible range."""
+"""Plots of a recording in the visible time range: over time, spectrogram, estimated motion of m1."""
 
 from collections.abc import Callable
 from math import nan
@@ -36,16 +36,16 @@ from .recording_table import role_text
 from .time_histories import RecordingTimeHistories
 
 _WAIT_MS = 250
-"""Delay between the last change of the view and the computation [ms]."""
+"""Delay from the last change of the visible range to the computation [ms]."""
 CHOOSE = "Choose a recording in the list above."
 Request = TypeVar("Request", bound=HiddenViewRequest | SpectrogramRequest)
 Found = TypeVar("Found", bound=HiddenView | DensityPicture)
 
 
 class _RangePicture(QWidget, Generic[Request, Found]):
-    """A picture of the visible range, computed while its tab is visible.
+    """Plot of the visible time range, computed while its tab is visible.
 
-    A subclass defines `_request_for`, `_draw` and `_erase`.
+    Subclasses define `_request_for`, `_draw` and `_erase`.
     """
 
     plot: Plot
@@ -58,34 +58,34 @@ class _RangePicture(QWidget, Generic[Request, Found]):
         self._view_s = (0.0, 0.0)
         self._request: object = None
         self._of: object = None
-        """Inputs of the displayed picture; None without a picture."""
+        """Inputs of the displayed plot; None without a plot."""
         self._latest_request: LatestRequest[Request, Found] = LatestRequest(
             background, compute, self._show, lambda error: self._clear(str(error)), _WAIT_MS, self
         )
 
     @property
     def is_busy(self) -> bool:
-        """Whether a picture is being computed."""
+        """Whether a plot is being computed."""
         return self._latest_request.is_busy
 
     @property
     def displayed_results(self) -> DisplayedResult:
-        """The picture, with visible range and options as inputs."""
+        """The plot, with visible range and options as inputs."""
         return DisplayedResult(self.plot, self._of, self._request)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Select another recording or none; the hint is shown until a picture exists."""
+        """Show another recording, or none; ``hint`` is shown until there is a plot."""
         self._recording = recording
         self._latest_request.drop()
         self._clear(hint)
 
     def show_view(self, low_s: float, high_s: float) -> None:
-        """Compute the picture of a time range [s] if this tab is visible."""
+        """Compute the plot of a time range [s], if this tab is visible."""
         self._view_s = (low_s, high_s)
         self._ask()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Start a computation that was not needed while the tab was hidden."""
+        """Start the computation that was postponed while the tab was hidden."""
         super().showEvent(event)
         self._ask()
 
@@ -115,15 +115,15 @@ class _RangePicture(QWidget, Generic[Request, Found]):
         self._erase(hint)
 
     def _request_for(self, recording: Recording, low_s: float, high_s: float) -> Request | str:
-        """Return the request for a time range, or why there is none."""
+        """Return the request for a time range [s], or text why there is none."""
         raise NotImplementedError
 
     def _draw(self, found: Found) -> None:
-        """Draw a picture."""
+        """Draw a result."""
         raise NotImplementedError
 
     def _erase(self, hint: str) -> None:
-        """Show a hint instead of a picture."""
+        """Show a hint instead of a result."""
         raise NotImplementedError
 
 
@@ -132,7 +132,7 @@ _ANOTHER = "another file…"
 
 
 class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
-    """Estimated motion of m1 between its stops, with and without a contact model."""
+    """Estimated motion p of m1 between its stops, with and without a contact model."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__("Hidden motion", background, hidden_view)
@@ -166,7 +166,7 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
         return HiddenViewRequest(Path(recording.path), low_s, high_s, self.specimen.currentData(), numbers)
 
     def _choose_specimen(self, place: int) -> None:
-        """Select another specimen; the last entry opens a file dialog and adds the chosen file."""
+        """Use another specimen; the last entry opens a file dialog and adds the chosen file to the list."""
         if self.specimen.itemText(place) == _ANOTHER:
             given, _ = QFileDialog.getOpenFileName(self, "Specimen", "", "Specimens (*.toml)")
             if given:
@@ -195,18 +195,18 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Widths of the spectral lines [Hz]; with None, the width follows from the visible range."""
+"""Widths of the spectral lines that can be chosen [Hz]; None: by the length of the visible range."""
 _BAR_EM = 4
 """Width of the colour scale with its label, in font heights."""
 _SHOWN_DB = 80.0
-"""Range of colours below the strongest line [dB]."""
+"""Range of the colours, from the strongest spectral line down [dB]."""
 
 
 class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
-    """Frequency over time; colours show the power spectral density in dB."""
+    """Spectrogram: frequency over time; colours show the power spectral density in dB."""
 
     zoomed = Signal(float, float)
-    """Time range after a zoom by wheel or mouse [s]."""
+    """Time range after a zoom with the mouse [s]."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__("Spectrogram", background, recording_spectrogram)
@@ -230,16 +230,16 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
 
     @property
     def plot(self) -> Plot:  # type: ignore[override] # the spacing selects one of two
-        """Plot with the selected frequency scale."""
+        """Plot with the selected scale of the frequency axis."""
         return self._plots[self._spacing]
 
     @property
     def image(self) -> "_Image":
-        """Image with the selected frequency scale."""
+        """Image with the selected scale of the frequency axis."""
         return self._images[self._spacing]
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Select another recording or none, and offer its channels."""
+        """Show another recording, or none, and offer its channels."""
         super().show_recording(recording, hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
@@ -336,7 +336,7 @@ class _Image:
         return f"{self.item.image[row, column]:.1f} {self.bar.axis.labelText}"
 
     def show_picture(self, found: DensityPicture) -> None:
-        """Draw a picture; the colours cover a fixed range below the strongest line."""
+        """Draw a spectrogram; the colours cover a fixed range below its strongest line."""
         bottom, top = map(self._plot.scales[1].drawn, found.frequency_hz)
         left, right = found.time_s
         self.item.setImage(found.decibel, autoLevels=False)
@@ -357,7 +357,7 @@ class _Image:
 
 
 class Pictures(QTabWidget):
-    """Tabs that show the same time range of the same recording."""
+    """Tabs that show the same time range of the same recording in different ways."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
@@ -373,7 +373,7 @@ class Pictures(QTabWidget):
         self.spectrogram.zoomed.connect(self.time_histories.show_range)
 
     def show_recording(self, overview: RecordingOverview | None, hint: str) -> None:
-        """Show another recording or none; the hint explains an empty picture."""
+        """Show another recording, or none; ``hint`` explains empty plots."""
         recording = None if overview is None else overview.recording
         for picture in (self.spectrogram, self.hidden_motion):
             picture.show_recording(recording, hint)

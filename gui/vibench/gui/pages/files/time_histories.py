@@ -1,4 +1,4 @@
-"""Time histories of a recording, one plot per channel; only the visible range is drawn."""
+"""Time histories of a recording, one plot per channel; only the visible time range is drawn."""
 
 from dataclasses import dataclass
 
@@ -25,11 +25,11 @@ _STEP, _ZOOM = 0.2, 0.6
 _LEAST_EM = 3
 SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
-"""Largest number of plots kept for reuse; creating a plot takes as long as drawing it ten times."""
+"""Largest number of plots kept for reuse; creating a plot takes ten times as long as drawing it."""
 _LABEL_AT = 0.1
-"""Height of segment names, as a share of the plot; low, because the channel name is at the top."""
+"""Height of segment names over the height of the plot; low, because the channel name is at the top."""
 _NAMED_SHARE = 0.08
-"""Smallest share of the recording at which the name of a segment is drawn."""
+"""Shortest segment, over the length of the recording, whose name is drawn."""
 
 
 @dataclass(eq=False)
@@ -40,7 +40,7 @@ class _TimeHistory:
 
 
 class RecordingTimeHistories(PlotStack):
-    """Plots over one time axis. Wheel, + and - zoom; arrows and dragging move; Home shows all."""
+    """Plots over a common time axis. Wheel, + and - zoom; arrow keys and dragging move; Home shows all."""
 
     range_changed = Signal()
 
@@ -52,7 +52,7 @@ class RecordingTimeHistories(PlotStack):
         self._histories: list[_TimeHistory] = []
         self._kept: dict[tuple[str, str], _TimeHistory] = {}
         self.markers = Markers(0.0, 0.0, self)
-        # One move may cause several changes of the range; draw only once, after the last.
+        # One move may change the range several times. Draw once, after the last change.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
 
@@ -97,7 +97,7 @@ class RecordingTimeHistories(PlotStack):
             self.show_range(0.0, self._overview.recording.duration_s)
 
     def show_range(self, low_s: float, high_s: float) -> None:
-        """Show a time range."""
+        """Show a time range [s]."""
         if self._histories:
             self._histories[0].plot.setXRange(low_s, high_s, padding=0.0)
 
@@ -108,8 +108,8 @@ class RecordingTimeHistories(PlotStack):
         middle_s = 0.5 * (low_s + high_s)
         self.show_range(middle_s - half_s, middle_s + half_s)
 
-    def move(self, share: float) -> None:  # type: ignore[override] # a view moves in time
-        """Move the visible range later by this share of its width."""
+    def move(self, share: float) -> None:  # type: ignore[override] # moves the visible time range
+        """Move the visible range to later times, by ``share`` of its width."""
         low_s, high_s = self.view_s
         step_s = share * (high_s - low_s)
         self.show_range(low_s + step_s, high_s + step_s)
@@ -138,7 +138,7 @@ class RecordingTimeHistories(PlotStack):
         event.accept()
 
     def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
-        """Return the plot of a channel, reused from another recording if possible."""
+        """Return the plot of a channel; a plot of another recording is reused if possible."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             up = PlotAxis("", plain_unit(channel.unit))
@@ -156,7 +156,7 @@ class RecordingTimeHistories(PlotStack):
         return self._kept[kind]
 
     def _begin(self, history: _TimeHistory, number: int, recording: Recording) -> None:
-        """Set position and limits of a plot for a recording, without drawing."""
+        """Set position and limits of a plot for a recording, without drawing the signal."""
         plot, is_last = history.plot, number == len(recording.channels) - 1
         plot.wipe()
         history.curve = plot.curve(curve_style(number))
@@ -173,14 +173,14 @@ class RecordingTimeHistories(PlotStack):
         plot.show()
 
     def _forget_others(self) -> None:
-        """Delete plots that this recording does not use, when more are kept than allowed."""
+        """Delete plots that this recording does not use, if more are kept than allowed."""
         for kind, history in list(self._kept.items()):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]
                 history.plot.deleteLater()
 
     def _mark_segments(self, overview: RecordingOverview) -> None:
-        """Draw a line where each segment starts; long segments are named in the first plot."""
+        """Draw a line at the start of each segment; the first plot also names long segments."""
         recording = overview.recording
         begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
         for history in self._histories:

@@ -1,4 +1,4 @@
-"""The Maps page: the request on the left; on the right the growing map, and the motion at one point."""
+"""The Maps page: the request on the left; on the right the map, and below it the motion at one point."""
 
 from collections.abc import Callable
 from functools import partial
@@ -40,18 +40,18 @@ from ...widgets.units import SentenceLabel
 
 AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
-"""Style of marks on a map, whose colours are the same in every theme."""
+"""Style of marks on the map, whose colours do not depend on the theme."""
 HINT = "Kinds of motion over frequency and amplitude, drawn while computed. Click a point to see its motion."
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
-"""The colour scale ends at this quantile, and begins at one minus this quantile."""
+"""Quantile at which the colour scale ends; it begins at one minus this quantile."""
 
 
 class MapPlot(QWidget):
-    """The map: frequency on the horizontal axis, amplitude on the vertical one."""
+    """Plot of the map: frequency on the horizontal axis, base amplitude on the vertical one."""
 
     picked = Signal(float, float)
-    """Frequency [Hz] and amplitude [m] of a clicked point."""
+    """Frequency [Hz] and base amplitude [m] of a point that was clicked."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -67,12 +67,12 @@ class MapPlot(QWidget):
 
     @property
     def in_sight(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Visible ranges of frequency [Hz] and amplitude [m]."""
+        """Visible ranges of frequency [Hz] and base amplitude [m]."""
         (left, right), (bottom, top) = self.plot.getViewBox().viewRange()
         return (left, right), (10.0**bottom, 10.0**top)
 
     def show_picture(self, picture: MapPicture, quantity: str) -> None:
-        """Draw a complete or partial map; the axes change only when its limits change."""
+        """Draw a complete or partial map; the axes change only if its limits changed."""
         self.show_range(picture.frequency_hz, picture.amplitude_m)
         (left, right), (low, high) = picture.frequency_hz, picture.amplitude_m
         self.image.setImage(COLOURINGS[quantity](picture), autoLevels=False, levels=(0, 255))
@@ -80,7 +80,7 @@ class MapPlot(QWidget):
         self.plot.with_hint("")
 
     def show_range(self, frequency_hz: tuple[float, float], amplitude_m: tuple[float, float]) -> None:
-        """Set the visible ranges; repeated calls with the same ranges keep the user's zoom."""
+        """Set the visible ranges; a repeated call with the same ranges keeps the user's zoom."""
         if self._range != (frequency_hz, amplitude_m):
             self._range = (frequency_hz, amplitude_m)
             low, high = amplitude_m
@@ -88,17 +88,17 @@ class MapPlot(QWidget):
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
     def clear(self) -> None:
-        """Remove the map; the next map sets the axes to its whole range."""
+        """Remove the map; the next map sets the axes to its own range."""
         self._range = None
         self.image.clear()
         self.plot.with_hint(HINT)
 
     def mark(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Mark the point whose motion is shown."""
+        """Mark the point whose motion is shown below."""
         self._mark.setData([frequency_hz], [amplitude_m])
 
     def show_level(self, level: RecordedLevel, number: int) -> None:
-        """Draw the level of a recording over the map."""
+        """Draw the base level of a recording, over frequency, on the map."""
         while len(self._levels) <= number:
             self._levels.append(self.plot.curve(ON_TOP))
         frequency_hz, amplitude_m = np.array(level.pairs).T
@@ -116,12 +116,12 @@ class MapPlot(QWidget):
 
 def _class_colours(picture: MapPicture) -> NDArray[np.uint8]:
     colours = [(*pg.mkColor(colour).getRgb()[:3], 255) for _, colour in MOTION_CLASSES]
-    # The last row is the colour of class -1, which means not computed yet.
+    # The last row is the colour of class -1, for points that are not computed yet.
     return np.array([*colours, UNKNOWN], dtype=np.uint8)[picture.classes]
 
 
 def _spread(values: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return RGBA colours of values, scaled between a low and a high quantile."""
+    """Return RGBA colours of values, on a scale from a low to a high quantile."""
     known = values[np.isfinite(values)]
     low, high = np.quantile(known, [1.0 - SHARPEST, SHARPEST]) if known.size else (0.0, 1.0)
     share = np.clip((values - low) / max(float(high - low), 1e-12), 0.0, 1.0)
@@ -136,7 +136,7 @@ COLOURINGS: dict[str, Callable[[MapPicture], NDArray[np.uint8]]] = {
     "Response I": lambda picture: _spread(np.log10(picture.response_i)),
     "motions found": lambda picture: _spread(picture.motions),
 }
-"""Quantities that the map's colours can show."""
+"""Quantities that the colours can show, with functions that compute the colours."""
 
 
 RELATIVE = PlotAxis("p = y - z", "m", short="p")
@@ -147,7 +147,7 @@ HIGHEST_MULTIPLE = 6.0
 
 
 class MotionView(QWidget):
-    """Three plots of a motion side by side, with a summary in words."""
+    """Three plots of a motion, side by side, with a summary in words."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -162,7 +162,7 @@ class MotionView(QWidget):
         fill_box(QVBoxLayout(self), self.caption, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
 
     def show_nothing(self, why: str) -> None:
-        """Clear the plots and show the reason."""
+        """Clear the plots and show why."""
         self.caption.setText(why)
         for curve in self.curves:
             curve.clear()
@@ -183,13 +183,13 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Height of the map, in thousandths of the page; the plots of the motion take the rest."""
+"""Height of the map, in thousandths of the page; the plots of the motion have the rest."""
 DIGITS = 5
-"""Significant digits of the ranges that a zoom enters in the form."""
+"""Significant digits of the ranges that a zoom writes into the form."""
 
 
 class MapsPage(Page):
-    """Page that computes one map at a time; outdated requests are dropped."""
+    """Page that computes one map at a time; starting another one cancels it."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -225,7 +225,7 @@ class MapsPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The map and the motion, with their requests as inputs."""
+        """The map and the motion, each with its request as input."""
         return (
             DisplayedResult(self.map, self._request, self.form.value),
             DisplayedResult(self.motion, self._motion_of, self._motion_wanted),
@@ -245,13 +245,13 @@ class MapsPage(Page):
         )
 
     def refresh(self) -> None:
-        """Draw the results received since the last tick."""
+        """Draw the results that arrived since the last tick."""
         if self._is_stale and self.picture is not None:
             self._is_stale = False
             self.map.show_picture(self.picture, self.quantity.currentText())
 
     def begin(self) -> None:
-        """Compute the map of the form."""
+        """Compute the map described by the form."""
         request = self.form.value
         if request is None:
             return
@@ -261,7 +261,7 @@ class MapsPage(Page):
         self.simulator.begin(request)
 
     def begin_in_sight(self) -> None:
-        """Compute the visible part with as many points as the whole map."""
+        """Compute the visible part of the map, with as many points as the whole map."""
         request = self.form.value
         if request is None:
             return
@@ -272,7 +272,7 @@ class MapsPage(Page):
         self.begin()
 
     def pick(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Show the motion at a point of the map."""
+        """Compute and show the motion at a point of the map."""
         if self.form.value is None or frequency_hz <= 0.0:
             return
         self._point = (frequency_hz, amplitude_m)
@@ -289,7 +289,7 @@ class MapsPage(Page):
         )
 
     def add_recordings(self, paths: object) -> None:
-        """Draw the levels of recordings over the map, if a recording has a level over frequency."""
+        """Draw the base levels of recordings on the map, if they have a level over frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
             self.context.background.ask(recorded_response, self._show_level, _ignore, Path(path))
 
@@ -360,10 +360,10 @@ class MapsPage(Page):
 
 
 def _legend_entry(name: str, colour: str) -> str:
-    """Return a coloured square and a name; the square is framed, as some colours equal the background."""
+    """Return a coloured square and a name; the frame shows squares that have the background's colour."""
     unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 
 
 def _ignore(_error: BaseException) -> None:
-    """Ignore errors: noise and dwells have no level over frequency; Compare reports unreadable files."""
+    """Ignore an error: noise and dwells have no level over frequency; Compare reports unreadable files."""

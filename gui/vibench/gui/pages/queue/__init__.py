@@ -1,4 +1,4 @@
-"""The Queue page: a campaign as a table, its sweeps, and the state of each point.
+"""The Queue page: a campaign as a table, its sweeps, and the state of each recording.
 
-An edit is refused unless it gives a complete, valid campaign. Another process computes duration and size.
+An edit that would make the campaign invalid is refused. Another process computes duration and size.
 """

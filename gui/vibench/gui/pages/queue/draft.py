@@ -1,4 +1,4 @@
-"""Edits of a campaign; an edit is refused unless it gives a complete, valid campaign."""
+"""Edits of a campaign; an edit that would make the campaign invalid is refused."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ USUAL_NAME = "queue"
 
 
 def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Campaign:
-    """Return the campaign with a test added at the end, under an unused name."""
+    """Return the campaign with a test added at the end, under a name that is not used yet."""
     if campaign is None:
         return Campaign(name=USUAL_NAME, measurements=(measurement,))
     taken = {name.lower() for name in campaign.recording_names()}
@@ -37,10 +37,10 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
 def with_sweep(
     campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range, rig: Rig | None
 ) -> Campaign:
-    """Return the campaign with a sweep of a test along an axis.
+    """Return the campaign with a sweep added, which repeats a test along an axis.
 
     Raises ConfigurationError when a point of the sweep is not allowed. Limits that need a simulation (loads
-    of shaker and specimen) are checked when the campaign is armed.
+    of shaker and specimen) are checked later, when the campaign is armed.
     """
     taken = set() if campaign is None else {sweep.name.lower() for sweep in campaign.sweeps}
     template = _dump(measurement)
@@ -59,7 +59,7 @@ def with_sweep(
 
 
 def without(campaign: Campaign, number: int) -> Campaign | None:
-    """Return the campaign without one entry; None when no entry is left."""
+    """Return the campaign without one of its entries; None if no entry is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
@@ -70,7 +70,7 @@ def without(campaign: Campaign, number: int) -> Campaign | None:
 
 
 def move_up(campaign: Campaign, number: int) -> Campaign:
-    """Return the campaign with one entry moved up by one place; tests stay before sweeps."""
+    """Return the campaign with one entry moved up by one row; tests stay before sweeps."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     kind, place = (
         (measurements, number) if number < len(measurements) else (sweeps, number - len(measurements))
@@ -122,7 +122,7 @@ SYMBOLS = {
 
 
 def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
-    """Return one row per test and sweep: name, excitation, number of recordings, duration."""
+    """Return a row per test and sweep: name, excitation, number of recordings, duration."""
     places = campaign.places
     rows = [
         (
@@ -145,7 +145,7 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
 def point_rows(
     preview: "CampaignPreview | None", rows: Sequence[RowStatus], state: EngineState
 ) -> list[tuple[str, str, str, str]]:
-    """Return the state of each recording, from the engine's rows or from the files in the folder."""
+    """Return a row per recording with its state, known from the engine or from files in the folder."""
     levels: Mapping[str, str] = {} if preview is None else preview.levels
     known = {row.name for row in rows}
     if state in DRIVING or state is EngineState.ARMED or (levels and set(levels) == known):
@@ -167,20 +167,20 @@ def point_rows(
 
 @dataclass(frozen=True)
 class CampaignPreview:
-    """Summary of a campaign: rows, levels, existing recordings, duration and size."""
+    """Summary of a campaign: entries, levels, existing recordings, duration and size."""
 
     rows: tuple[tuple[str, str, str, str], ...]
     levels: Mapping[str, str]
-    """Level in words, by recording."""
+    """Level of each recording, as text."""
     complete: frozenset[str]
-    """Recordings that exist in the folder."""
+    """Recordings that are complete in the folder."""
     duration_s: float
     size_bytes: float | None
-    """Size [bytes]; None without a rig, which defines the sample rate."""
+    """Size of the files [bytes]; None without a rig, which defines the sample rate."""
 
 
 def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
-    """Return duration, size and levels of a campaign, and the recordings that exist in its folder."""
+    """Return entries, levels, duration and size of a campaign, and which recordings exist in its folder."""
     campaign, rig, folder = request
     size = None if rig is None else campaign.size_bytes(rig.daq.sample_rate_hz, len(rig.daq.channels))
     rows = tuple(entry_rows(campaign))
@@ -190,6 +190,6 @@ def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPrev
     try:
         planned = planned_recordings(campaign, folder, ExistingRecordings.RESUME)
         complete = frozenset(each.name for each in planned if each.is_complete)
-    except AcquisitionError:  # recorded with another plan; arming reports it
+    except AcquisitionError:  # recorded with another plan; arming will report it
         complete = frozenset()
     return CampaignPreview(rows, levels, complete, campaign.duration_s, size)

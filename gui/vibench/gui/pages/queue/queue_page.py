@@ -57,7 +57,7 @@ _AXES = {
 
 
 class SweepForm(QGroupBox):
-    """Form to add a sweep of the test on the Test page."""
+    """Form that adds a sweep of the test on the Test page."""
 
     wanted = Signal(object, object)
     """`SweepAxis` and `Range` of the requested sweep."""
@@ -84,7 +84,7 @@ class SweepForm(QGroupBox):
         self._turn()
 
     def _turn(self, *_: object) -> None:
-        """Show the unit and typical values of the selected axis."""
+        """Show the unit and usual values of the selected axis."""
         _word, unit, low, high = list(_AXES.values())[self.axis.currentIndex()]
         for edit, value in ((self.start, low), (self.stop, high)):
             edit.show_unit(unit)
@@ -119,11 +119,11 @@ class SweepForm(QGroupBox):
 
 
 LOOK_MS = 50
-"""Delay between the last edit of the campaign and its preview [ms]."""
+"""Delay from the last edit of the campaign to its preview [ms]."""
 
 
 class QueuePage(Page):
-    """Page that edits the next campaign and shows the running one."""
+    """Page that edits the next campaign and shows the one that runs."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -135,15 +135,15 @@ class QueuePage(Page):
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
-            ("entry", "what", "recordings", "takes"),
+            ("entry", "kind", "recordings", "duration"),
             "Load a campaign above, or add the test of the Test page, once or as a sweep.",
             wide=1,
         )
-        # The excitation column takes the remaining width, and would otherwise be only a few letters wide.
+        # The second column has the remaining width, which otherwise would be only a few letters.
         self.entries.setMinimumWidth(25 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",
-            ("", "recording", "level", "how it stands"),
+            ("", "recording", "level", "state"),
             "Each recording of the campaign is listed here, with its state.",
         )
         self.sweep = SweepForm()
@@ -181,7 +181,7 @@ class QueuePage(Page):
         return len(rows) > 1 and all(row.state in ("recorded", "kept") for row in rows)
 
     def refresh(self) -> None:
-        """Update the states of the recordings."""
+        """Update the states of the recordings and the progress."""
         status = self.context.bridge.status
         state = self.context.bridge.state
         campaign = self.context.selection.campaign
@@ -201,7 +201,7 @@ class QueuePage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The summary and the rows, with their campaign as input."""
+        """Summary and entries, with their campaign and rig as inputs."""
         wanted = (self.context.selection.campaign, self.context.selection.rig)
         return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 
@@ -284,7 +284,7 @@ class QueuePage(Page):
 
     @property
     def _chosen_entry(self) -> int:
-        """Number of the selected row; -1 if none is selected or the rows belong to an earlier campaign."""
+        """Row number of the selected entry; -1 if none is selected, or the rows are outdated."""
         return self.entries.currentRow() if self.entries.isEnabled() else -1
 
     def _remove(self) -> None:

@@ -1,4 +1,4 @@
-"""The Rig page: select a configuration, list the instruments, confirm the knobs, open, check."""
+"""The Rig page: select a configuration, list the instruments, confirm the knobs, open and check."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -51,14 +51,14 @@ class RigChoice(QWidget):
 
     chosen = Signal()
     refused = Signal(object)
-    """The ConfigurationError of a file that cannot be read."""
+    """`ConfigurationError` of a file that cannot be read."""
 
     def __init__(self) -> None:
         super().__init__()
         self._paths: list[Path] = []
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
-        """Error and warnings about the selected file; each text is empty if there is none."""
+        """Error and warnings about the selected file, as text; empty if there are none."""
         self._box, self.pace = Choice(), Choice(items=PACES.values())
         self._box.setToolTip("A real bench needs its instruments; a simulated rig needs none")
         self.pace.setToolTip("Speed of the simulated instruments; a real bench runs in real time")
@@ -80,14 +80,14 @@ class RigChoice(QWidget):
 
     @property
     def rig(self) -> Rig | None:
-        """The selected rig, at the selected pace."""
+        """The selected rig; a simulated one runs at the selected pace."""
         if self._rig is None or self._rig.virtual is None:
             return self._rig
         pace = list(PACES)[self.pace.currentIndex()]
         return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
 
     def choose(self, path: Path) -> None:
-        """Select a file, and add it to the list if it is new."""
+        """Select a file, after adding it to the list if it is not in it."""
         if path not in self._paths:
             self._add(path)
         row = self._paths.index(path)
@@ -123,7 +123,7 @@ class RigChoice(QWidget):
 
 
 class KnobSheetForm(QGroupBox):
-    """Form with a check box for every knob, and the name of the operator."""
+    """Form with a check box per knob, which the user must confirm, and the name of the operator."""
 
     changed = Signal()
 
@@ -139,7 +139,7 @@ class KnobSheetForm(QGroupBox):
         self._layout = QVBoxLayout(self)
         self._layout.addWidget(self._note)
         form = QFormLayout()
-        form.addRow(label_for("Seen by", self.operator_field, "Who has looked"), self.operator_field)
+        form.addRow(label_for("Checked by", self.operator_field, "Operator"), self.operator_field)
         self._layout.addLayout(form)
 
     @property
@@ -148,7 +148,7 @@ class KnobSheetForm(QGroupBox):
         return tuple(self._ticks.values())
 
     def show_rig(self, rig: Rig | None) -> None:
-        """Show the knobs of another rig, all unconfirmed."""
+        """Show the knobs of a rig, none of them confirmed."""
         for tick in self._ticks.values():
             self._layout.removeWidget(tick)
             tick.deleteLater()
@@ -157,7 +157,7 @@ class KnobSheetForm(QGroupBox):
         self.setVisible(bool(knobs))
 
     def sheet(self) -> KnobSheet | None:
-        """Return the confirmations; None while a knob or the name is missing."""
+        """Return the confirmations; None if a knob is not confirmed or the name is missing."""
         operator = self.operator_field.text().strip()
         if not self._ticks or not operator or not all(tick.isChecked() for tick in self.ticks):
             return None
@@ -167,13 +167,13 @@ class KnobSheetForm(QGroupBox):
         text = f"{knob.instrument}: {knob.setting} at {knob.value}"
         tick = tick_box(text, "Tick when you have checked this setting", lambda _: self.changed.emit())
         tick.setAccessibleName(f"{knob.instrument}: {knob.setting} is at {knob.value}")
-        # Insert between the note and the name.
+        # Insert above the name.
         self._layout.insertWidget(self._layout.count() - 1, tick)
         return tick
 
 
 def finding_name(finding: Finding) -> str:
-    """Return the name of a finding: ``"noise of drive voltage"``."""
+    """Return the name of a finding as text: ``"noise of drive voltage"``."""
     return finding.name.replace("_", " ")
 
 
@@ -190,7 +190,7 @@ def measured_text(finding: Finding) -> str:
 
 
 def expected_text(finding: Finding) -> str:
-    """Return the expected value, and advice for the case that the measured value differs."""
+    """Return the expected value, with advice what to do if the measured value differs."""
     advice = finding.advice
     return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
 
@@ -204,7 +204,7 @@ VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ f
 
 
 class RigPage(Page):
-    """The first step: select a configuration, open the bench and check it."""
+    """First page: select a configuration, open the bench and check it."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -224,7 +224,7 @@ class RigPage(Page):
         self.find_button = push_button("Find instruments", "List all instruments found", self._find)
         self.instruments = ReadTable(
             "Instruments",
-            ("part", "what answered"),
+            ("part", "instrument"),
             "The instruments are listed here once a bench is open.",
         )
         self.findings = ReadTable(
@@ -249,7 +249,7 @@ class RigPage(Page):
         return status.check is None or status.check.verdict is not Verdict.FAIL
 
     def refresh(self) -> None:
-        """Show the open instruments and the findings of the check."""
+        """Show instruments and findings of the open bench."""
         status = self.context.bridge.status
         state = self.context.bridge.state
         may_open = state in (EngineState.CLOSED, EngineState.FAULT)
@@ -265,13 +265,13 @@ class RigPage(Page):
         self._show_check(status)
 
     def enter(self) -> None:
-        """Focus the widget of the next step."""
+        """Focus the button for the next step."""
         if self.open_button.isEnabled():
             self.open_button.setFocus()
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens hardware configurations; it refuses while a bench is open."""
+        """Function that opens hardware configurations; while a bench is open, it refuses."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:
@@ -285,7 +285,7 @@ class RigPage(Page):
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.context.selection.choose_rig(rig)  # an adopted engine may have changed the rig
+            self.context.selection.choose_rig(rig)  # taking over another window's engine may have changed it
             self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:

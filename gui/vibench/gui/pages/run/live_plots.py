@@ -1,4 +1,4 @@
-"""Live plots of a run: time histories, spectra, responses, phase portrait and hidden motion."""
+"""Live plots of a run: time histories, spectra, responses, phase portrait and motion of m1."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -23,11 +23,11 @@ from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
 
 Curves = Mapping[str, pg.PlotDataItem]
-"""Curves, by the name of the result field that each curve shows."""
+"""Curves, by the name of the field of a result that each curve shows."""
 
 
 def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
-    """Draw fields of a prediction over frequency; None clears the curves."""
+    """Draw the results of a prediction over frequency; None clears the curves."""
     for name, curve in curves.items():
         if seen is None:
             curve.clear()
@@ -36,7 +36,7 @@ def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
 
 
 class SweepPlot(QWidget):
-    """Responses of a dwell, steps or a sweep over the actual drive frequency."""
+    """Responses during a dwell, steps or a sweep, over the drive frequency at that time."""
 
     def __init__(self, tab: str, plot: Plot) -> None:
         super().__init__()
@@ -48,7 +48,7 @@ class SweepPlot(QWidget):
         fill_box(QVBoxLayout(self), plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw all points in time order."""
+        """Draw all points so far, in the order of time."""
         history = view.history()
         if len(history.time_s) == self._shown:
             return
@@ -57,12 +57,12 @@ class SweepPlot(QWidget):
             curve.setData(history.frequency_hz, getattr(history, name))
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        """Draw a prediction and its collision regions behind the points; None clears them."""
+        """Draw a prediction, with frequency ranges of collisions, behind the points; None clears it."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         show_predicted(self.predicted, seen)
 
     def clear(self) -> None:
-        """Clear the plot."""
+        """Remove the measured points."""
         self._shown = 0
         for curve in self.measured.values():
             curve.clear()
@@ -87,7 +87,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
 
 
 def sweep_envelope(theme: Theme) -> SweepPlot:
-    """Return the plot of the largest and smallest velocity of m0."""
+    """Return the plot of the largest and smallest velocity of m0 over the drive frequency."""
     plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "m/s"), theme).with_legend()
     plot.with_hint("Largest and smallest velocity of m0 during a sweep.")
     made = SweepPlot("Envelope", plot)
@@ -108,7 +108,7 @@ _SHORT = {"amplifier_voltage": "amp."}
 
 
 def channel_word(role: str) -> str:
-    """Return a short name of a channel."""
+    """Return a short name of a channel, given by its role."""
     return _WORDS.get(role, role.replace("_", " "))
 
 
@@ -118,16 +118,16 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""Time axis; it is fixed, because a scrolling axis would be repainted in every frame."""
+"""Time axis. It does not scroll, because a scrolling axis would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Limits of the number of columns of a plot; one column per pixel leaves no gap."""
+"""Limits of the number of columns in which a signal is drawn; one per pixel leaves no gap."""
 UP_EM = 4.0
 USUAL_SPAN_S = 2.0
-"""Time range shown at first [s]."""
+"""Time range shown when the window opens [s]."""
 
 
 class TimeHistoryPlots(PlotStack):
-    """Plots over one time axis, rebuilt when the channels change."""
+    """Plots over a common time axis, rebuilt when the channels change."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
@@ -136,13 +136,13 @@ class TimeHistoryPlots(PlotStack):
         self._channels: tuple[tuple[str, str], ...] = ()
 
     def show_channels(self, channels: tuple[tuple[str, str], ...]) -> None:
-        """Show one plot per channel, given by role and unit."""
+        """Show one plot per channel; channels are given as (role, unit)."""
         if channels != self._channels:
             self._build(channels)
             self._channels = channels
 
     def show_view(self, view: LiveView, span_s: float) -> None:
-        """Draw the newest ``span_s`` seconds."""
+        """Draw the newest ``span_s`` seconds of every channel."""
         self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
         if not self.plots:
             return
@@ -161,7 +161,7 @@ class TimeHistoryPlots(PlotStack):
         self._span_s = span_s
 
     def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
-        """Create the missing plots and reuse the others, because creating a plot is slow."""
+        """Create missing plots and reuse the others, because creating a plot is slow."""
         for plot in self.plots[len(channels) :]:
             self._layout.removeWidget(plot)
             plot.deleteLater()
@@ -203,14 +203,14 @@ class TransmissibilityPlot(QWidget):
         shade = LineStyle(lambda theme: theme.traces[0], fill_opacity=0.25)
         self._band = self.magnitude.band(shade, MEASURED)
         self._predicted = {
-            "response_i": self.magnitude.curve(PREDICTED, "I under sines, simulated"),
+            "response_i": self.magnitude.curve(PREDICTED, "Response I to sines, simulated"),
             "linear": self.magnitude.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
         }
         self._measured = self.magnitude.curve(curve_style(0), MEASURED)
         self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.3)
         self.coherence.setXLink(self.magnitude)
-        # The lower plot labels the frequency axis of both.
+        # The lower plot labels the frequency axis for both.
         self.magnitude.across.show_nothing()
         fill_box(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
 
@@ -238,7 +238,7 @@ _LEAST = 1e-12
 
 
 class SpectrumPlot(QWidget):
-    """Plot of the spectra of all channels over one frequency axis."""
+    """Spectra of all channels over a common frequency axis."""
 
     title = "Spectral density of every channel"
     tab = "Spectrum"
@@ -268,7 +268,7 @@ class SpectrumPlot(QWidget):
             curve.setData(found.frequency_hz[1:], unit.per_si * np.maximum(density[1:], _LEAST))
 
     def _redraw(self) -> None:
-        """Redraw all curves after a change of units, since each curve has its channel's unit."""
+        """Redraw all curves after a change of units, because each curve has the unit of its channel."""
         self.plot.wipe()
         self._curves.clear()
         if self._view is not None:
@@ -291,7 +291,7 @@ def extent(values: NDArray[np.floating]) -> tuple[float, float]:
 
 
 class PortraitPlot(QWidget):
-    """Phase portrait on the left, Poincaré section on the right."""
+    """Phase portrait of m0 on the left, Poincaré section on the right."""
 
     title = "Phase portrait and Poincaré section"
     tab = "Phase portrait, Poincaré"
@@ -331,7 +331,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Number of shades of a forecast; the faintest is at its end, where the error is a quarter of the gap."""
+"""Number of shades of the forecast; the faintest is where its error reaches a quarter of the gap."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "Motion p of m1 between its stops; shown while a test runs with the live twin."
@@ -343,7 +343,7 @@ def _faded(number: int, theme: Theme) -> Colour:
 
 
 class HiddenMotionPlot(QWidget):
-    """Plot of the newest 50 ms of the estimated p, with its forecast and the estimated parameters."""
+    """Estimated motion p of m1 in the newest 50 ms, with forecast and estimated parameters."""
 
     title = "Hidden motion: m1 between its stops"
     tab = "Hidden motion"
@@ -363,7 +363,7 @@ class HiddenMotionPlot(QWidget):
         self.clear()
 
     def show_status(self, status: EngineStatus | None) -> None:
-        """Draw the twin's newest status if it has changed."""
+        """Draw the newest estimate of the live twin, if there is a newer one."""
         twin = None if status is None else status.twin
         if twin is None:
             self.clear()
@@ -381,7 +381,7 @@ class HiddenMotionPlot(QWidget):
         self.plot.keep_in_view(up=(-reach, reach))
 
     def clear(self) -> None:
-        """Clear the plot when the twin is off or a new run begins."""
+        """Clear the plot, because the live twin is off or a new run begins."""
         for curve in (self.tracked, *self.forecast):
             curve.setData([], [])
         for line in self._stops:
@@ -390,14 +390,14 @@ class HiddenMotionPlot(QWidget):
         self._end = (0, -1)
 
     def _draw_forecast(self, twin: TwinStatus) -> None:
-        """Draw the forecast in pieces; the larger the error, the fainter the piece."""
+        """Draw the forecast in pieces, which are fainter where the error is larger."""
         p, error = np.array(twin.forecast_m), np.array(twin.forecast_error_m)
         time_s = np.arange(1, p.size + 1) * twin.step_s
         worth = _WORTH_OF_GAP * min(map(abs, twin.stops_m))
         shade = np.minimum(_SHADES * error / worth, _SHADES - 1).astype(int) if p.size else np.empty(0)
         for number, curve in enumerate(self.forecast):
             here = np.flatnonzero(shade == number)
-            # Start each piece at the last point of the piece before.
+            # Each piece begins at the last point of the piece before, so that no gap is visible.
             part = slice(max(here[0] - 1, 0), here[-1] + 1) if here.size else slice(0, 0)
             curve.setData(time_s[part], p[part])
 

@@ -1,4 +1,4 @@
-"""The Run page: arm, start and watch a test; the pictures show the newest samples."""
+"""The Run page: arm, start and watch a test; plots show the newest samples."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -59,11 +59,11 @@ from .live_plots import (
 
 
 class LivePicture(Enum):
-    """A picture of the Run page that is updated during a run."""
+    """Plot of the Run page that is updated during a run."""
 
     FREQUENCY_RESPONSE = auto()
     HISTORY = auto()
-    """Responses against the actual drive frequency."""
+    """Responses over the drive frequency at that time."""
     ENVELOPE = auto()
     SPECTRUM = auto()
     PORTRAIT = auto()
@@ -71,7 +71,7 @@ class LivePicture(Enum):
 
 @dataclass(frozen=True)
 class KindView:
-    """The two pictures shown when a run with one kind of excitation starts."""
+    """The two plots that are shown first in a run with one kind of excitation."""
 
     left: LivePicture
     right: LivePicture
@@ -88,15 +88,15 @@ KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
     },
     {},
 )
-"""Live pictures by kind of excitation; the second table is for kinds that differ from their family."""
+"""Live plots by kind of excitation; the second table has kinds that differ from their family."""
 
 _ROW = 1.9
-"""Height of a level meter, in font heights."""
+"""Height of the meter of one channel, in font heights."""
 _WORDS = {LevelVerdict.OVER: "✖ over", LevelVerdict.GOOD: "", LevelVerdict.QUIET: "⚠ quiet"}
 
 
 class LevelMeters(QWidget):
-    """Level meters, one row per channel."""
+    """Level meters, one row per channel, with peak and limit."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -123,7 +123,7 @@ class LevelMeters(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the size for at least four channels, the usual number."""
+        """Return the size for the number of channels, at least four."""
         height = self.fontMetrics().height()
         return QSize(12 * height, round(_ROW * height * max(4, len(self._rows))))
 
@@ -161,15 +161,15 @@ class LevelMeters(QWidget):
 
 
 SPANS_S = (0.05, 0.2, 1.0, 2.0, 5.0, 10.0)
-"""Time ranges of the time histories [s]."""
+"""Time ranges of the time histories that can be chosen [s]."""
 
 
 class WatchCard(QGroupBox):
-    """Box with progress, averages, impacts, time range, marks and the switch of the live twin."""
+    """Box with progress, averages, impacts, time range, marks, and a switch for the live twin."""
 
     mark_wanted = Signal(str)
     reject_requested = Signal()
-    """Request to exclude the current average of noise from all results."""
+    """Request to exclude the current average of a noise test from all results."""
     twin_requested = Signal(object)
 
     def __init__(self, theme: Theme) -> None:
@@ -211,18 +211,18 @@ class WatchCard(QGroupBox):
         return SPANS_S[self.span.currentIndex()]
 
     def wish_mark(self) -> None:
-        """Request a mark with the text of the field."""
+        """Request a mark in the recording, with the text of the field."""
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
     def show_status(self, status: EngineStatus | None, averages: int) -> None:
-        """Show the state of the run; ``averages`` is the planned number for noise, else 0."""
+        """Show the state of the run; ``averages`` is the planned number in a noise test, else 0."""
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)
         if run is None or not is_running or not averages:
             self._begun = 0
         else:
-            # Count the previous average while the next one settles.
+            # The number in the status still is that of the average before, while the next one settles.
             self._begun = int(run.numbers.get("realisation", self._begun - 1)) + 1
         self.reject_button.setEnabled(self._begun > 0)
         self.averages.setText(f"{self._begun} of {averages}" if self._begun else "–")
@@ -269,14 +269,14 @@ UNREAD = "Read to the end  (PgDn)"
 
 
 class ArmCard(QGroupBox):
-    """Buttons to arm, start, cancel, hold and resume, with the description of the armed plan."""
+    """Buttons to arm, start, cancel and hold, with the description of the armed plan."""
 
     arm_wanted = Signal()
     start_wanted = Signal()
     cancel_wanted = Signal()
     hold_wanted = Signal()
     news = Signal()
-    """Emitted when another plan was armed, so that its description is shown from the beginning."""
+    """Emitted when another plan was armed, whose description must be shown from its beginning."""
 
     def __init__(self) -> None:
         super().__init__("What will happen")
@@ -293,13 +293,13 @@ class ArmCard(QGroupBox):
         )
         """Buttons, which do not scroll with the description."""
         self._armed: tuple[str, ...] = ()
-        """Description of the armed plan; empty when nothing is armed."""
+        """Description of the armed plan; empty if nothing is armed."""
         self._read: tuple[str, ...] = ()
-        """Description whose end was displayed."""
+        """Description whose end was visible, so that the user may have read it."""
 
     @property
     def is_read(self) -> bool:
-        """Whether the end of the description was displayed; starting requires it."""
+        """Whether the end of the description was visible, which is required for starting."""
         words = self._words
         end = QPoint(0, words.height() - 1)
         is_whole = words.height() >= words.heightForWidth(words.width())
@@ -309,11 +309,11 @@ class ArmCard(QGroupBox):
 
     @property
     def words(self) -> str:
-        """The displayed text."""
+        """Text that is displayed."""
         return self._words.text()
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
-        """Show the possible commands; ``reason`` is why the test cannot be armed, empty if it can."""
+        """Show the possible commands; ``reason`` says why the test cannot be armed, empty if it can."""
         state = EngineState.CLOSED if status is None else status.state
         armed = None if status is None else status.armed
         is_armed = state is EngineState.ARMED and armed is not None
@@ -335,7 +335,7 @@ class ArmCard(QGroupBox):
         if words != self._armed:
             self._armed, self._read = words, ()
             if words:
-                # Focus Cancel, so that the key that armed the plan cannot also start it.
+                # Focus Cancel, so that the key that armed the plan cannot start it as well.
                 self.cancel_button.setFocus()
                 self.news.emit()
         self.start_button.setEnabled(self.is_read)
@@ -347,12 +347,12 @@ class ArmCard(QGroupBox):
 
 
 LAYOUT_ROUNDS = 4
-"""Number of layout passes until the scroll bar fits the wrapped text."""
+"""Number of layout passes after which the scroll bar fits the wrapped text."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
 class RunPage(Page):
-    """Page that displays the engine's run; it stores no data of the run."""
+    """Page that displays the engine's run; it keeps no data of the run itself."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -383,11 +383,11 @@ class RunPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Whether something was recorded since the window opened."""
+        """Whether a recording was made since the window opened."""
         return self._ended is not None
 
     def refresh(self) -> None:
-        """Draw the newest samples, unless the picture is frozen."""
+        """Draw the newest samples, unless the user has frozen the plots."""
         status = self.context.bridge.status
         measurement = self.context.selection.measurement
         test = (
@@ -398,7 +398,7 @@ class RunPage(Page):
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
-            # The focused button is now hidden; without this call, Qt would move the focus to the next list.
+            # The focused button was just hidden. Without this call, Qt would move the focus to the next list.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
         played = self._played
@@ -426,7 +426,7 @@ class RunPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Pictures and numbers, with their run as input; none while the picture is frozen or hidden."""
+        """Plots and numbers, with their run as input; none while they are frozen or hidden."""
         if self.watch_card.freeze.isChecked() or not self.isVisible():
             return ()
         return tuple(DisplayedResult(each, self._view, self.context.bridge.view) for each in self._of_the_run)
@@ -461,7 +461,7 @@ class RunPage(Page):
         }
 
     def _begin(self, view: LiveView) -> None:
-        """Clear the pictures, show the run's prediction, and select the pictures of its excitation."""
+        """Clear the plots, show the run's prediction, and select the plots for its excitation."""
         self._view = view
         measurement = self._played
         prediction = self.context.selection.prediction
@@ -491,7 +491,7 @@ class RunPage(Page):
         self.look_button.show()
 
     def _show_channels(self) -> None:
-        """Create the plots before the run, because creating them during the run would delay it."""
+        """Create the plots before a run, because creating them during the run would delay the display."""
         rig = self.context.selection.rig
         if rig is not None:
             self.time_histories.show_channels(
@@ -525,7 +525,7 @@ class RunPage(Page):
             self.right_tabs.setCurrentWidget(self.hidden_motion)
 
     def _is_armed_read(self) -> bool:
-        """Return whether the description was read, after finishing the layout of a new description."""
+        """Return whether the description was read; first finish the layout of a new description."""
         self.refresh()
         for _ in range(LAYOUT_ROUNDS):
             QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
@@ -540,7 +540,7 @@ class RunPage(Page):
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
         self.watch_card.reject_requested.connect(self._reject)
-        # Until the next tick, the pictures of a finished run would look like pictures of this run.
+        # Redraw at once: until the next tick, plots of a finished run would look like those of this run.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_requested.connect(self._turn_twin)
         self.context.recording_made.connect(self._recorded)

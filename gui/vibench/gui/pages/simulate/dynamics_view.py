@@ -1,4 +1,4 @@
-"""A tab of the Simulate page: a form, the growing result, and its cost and error."""
+"""Tab of the Simulate page: a form, the result so far, and its computing time and error."""
 
 import time
 from collections.abc import Callable
@@ -33,7 +33,7 @@ Shown_contra = TypeVar("Shown_contra", contravariant=True)
 
 
 class AnswerPicture(Protocol[Shown_contra]):
-    """Plots that can draw a complete or partial result."""
+    """Plots that can draw a result, complete or partial."""
 
     @property
     def widget(self) -> QWidget:
@@ -45,16 +45,16 @@ class AnswerPicture(Protocol[Shown_contra]):
 
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
-    """Request type of a tab, and functions that describe its result."""
+    """Kind of tab: type of its request, and functions that describe the result."""
 
     name: str
     request: type[Request]
     hidden: frozenset[str]
-    """Fields of the request without an editor."""
+    """Fields of the request that the form does not show."""
     answer: Callable[..., Answer]
-    """Class of the result, built from request, pieces so far and elapsed time [s]."""
+    """Class of the result, built from request, partial results and elapsed time [s]."""
     before: str
-    """Text about cost and error that is shown before a result exists."""
+    """Text about computing time and error, shown until there is a result."""
     curves: Callable[[Answer], tuple[Curve, ...]] = lambda _: ()
 
 
@@ -67,7 +67,7 @@ class _Course:
 
 
 class DynamicsView(QWidget, Generic[Request, Answer]):
-    """The form on the left; on the right the plots, with cost and error below."""
+    """Form on the left; on the right the plots, with computing time and error below."""
 
     def __init__(
         self, context: AppContext, kind: DynamicsKind[Request, Answer], picture: AnswerPicture[Answer]
@@ -98,7 +98,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return DisplayedResult(self.picture.widget, request, self.form.value)
 
     def refresh(self) -> None:
-        """Draw the pieces received since the last tick."""
+        """Draw the partial results that arrived since the last tick."""
         if self._is_stale and self.answer is not None:
             self._is_stale = False
             self.picture.show_answer(self.answer)
@@ -159,14 +159,14 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _buttons(self) -> QLayout:
         self._begin = push_button("Find", "Start the computation in a separate process", self.begin, "first")
-        self.simulator.cancel_button.setText("Cancel")  # Alt+C is taken by another tab of the page
+        self.simulator.cancel_button.setText("Cancel")  # without Alt+C, which another tab uses
         return row((self._begin, 1), self.simulator.cancel_button)
 
     def _right(self) -> QWidget:
         self._state = SentenceLabel("Nothing has been computed yet.")
         self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
         self._compare = push_button(
-            "Lay over recordings", "Overlay these curves on recordings (Compare page)", self._hand_to_compare
+            "Overlay on recordings", "Show these curves on the Compare page", self._hand_to_compare
         )
         self._compare.setEnabled(False)
         return column((self.picture.widget, 1), row((self._state, 1), self._compare))

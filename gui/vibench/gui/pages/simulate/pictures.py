@@ -1,4 +1,4 @@
-"""Plots of simulations: branches, exponents, chains, responses, motion and similarity."""
+"""Plots of simulations: branches, exponents, chains, responses, motions and similarity."""
 
 import math
 from collections.abc import Callable
@@ -32,11 +32,11 @@ DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
 _FIRST_SPECIAL_COLOUR = 1
-"""Colour of the first kind of special points; colour 0 is for motions of one drive period."""
+"""Colour number of the first kind of event; colour 0 is for motions with the drive's period."""
 
 
 class _PairPicture:
-    """Two pairs of plots, one over frequency and one over level; one pair is visible."""
+    """Two pairs of plots, one pair over frequency and one over level, of which one pair is visible."""
 
     def __init__(self, theme: Theme, titles: tuple[str, str], axes: tuple[PlotAxis, PlotAxis], hint: str):
         self.widget = QStackedWidget()
@@ -55,7 +55,7 @@ class _PairPicture:
         return self._pairs[along]
 
     def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Clear and show the pair of plots over a parameter, and return the pair."""
+        """Clear and show the pair of plots over a parameter; return the pair."""
         self.widget.setCurrentIndex(list(ACROSS).index(along))
         pair = self.plots(along)
         for plot in pair:
@@ -64,7 +64,7 @@ class _PairPicture:
 
 
 class BranchPicture(_PairPicture):
-    """Plots of branches: stable solid, unstable dashed, coloured by period, special points marked."""
+    """Branches: stable parts solid, unstable ones dashed, coloured by period, with events marked."""
 
     def __init__(self, theme: Theme) -> None:
         axes = RESPONSES[0][1], RESPONSES[1][1]
@@ -96,7 +96,7 @@ class BranchPicture(_PairPicture):
 
 
 class SpectrumPicture(_PairPicture):
-    """Plots of the six Lyapunov exponents and of the dimension, with their intervals."""
+    """The six Lyapunov exponents and the dimension, with their confidence intervals."""
 
     def __init__(self, theme: Theme) -> None:
         hint = "All six Lyapunov exponents with their intervals, drawn when found."
@@ -144,15 +144,15 @@ PLACE = PlotAxis("Cell, from the base", short="Cell")
 ENERGY = PlotAxis("Mean energy of a cell", "µJ", factor=1e6, short="Energy", scale=Scale.LOGARITHMIC)
 _GAP = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _SMALLEST = 1e-8
-"""Smaller transmissibilities are drawn at this value."""
+"""Value at which smaller transmissibilities are drawn."""
 _MOST_TRACES = 32
-"""Largest number of traces; in longer chains, only evenly spaced cells are shown."""
+"""Largest number of cells whose motion is drawn; in longer chains, evenly spaced cells."""
 _HEIGHT = 0.45
-"""Height of the largest motion, in cells."""
+"""Height of the largest motion, over the distance of two cells."""
 
 
 class ChainPicture:
-    """Three plots of a chain, redrawn as runs finish."""
+    """Three plots of a chain, drawn again whenever a run is finished."""
 
     def __init__(self, theme: Theme) -> None:
         self.across = Plot("Transmission along the chain over frequency", FREQUENCY, ALONG_CHAIN, theme)
@@ -226,11 +226,11 @@ _HINTS = (
     "Difference of the two models, where both are known.",
 )
 _SMALLEST_DIFFERENCE = 1e-6
-"""Smaller differences are drawn at this value, because zero has no logarithm."""
+"""Value at which smaller differences are drawn, because zero has no logarithm."""
 
 
 class AnswerPlots(QWidget):
-    """Four plots of a simulation, redrawn as results arrive."""
+    """Four plots of a simulation, drawn again as results arrive."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -257,7 +257,7 @@ class AnswerPlots(QWidget):
             step()
 
     def steps(self, progress: SimulationProgress | None) -> list[Callable[[], None]]:
-        """Return one drawing function per plot, because drawing all takes longer than a frame."""
+        """Return one drawing function per plot, because drawing all of them takes longer than a frame."""
         draws = (self._responses, self._motion, self._exponents, self._likeness)
         return [
             partial(_draw_anew, plot, draw, progress) for plot, draw in zip(self.plots, draws, strict=True)

@@ -1,4 +1,4 @@
-"""The Simulate page: a form for the scene, its cost, and curves that grow while they are computed."""
+"""The Simulate page: a form for the scene, its computing time, and curves drawn while computed."""
 
 import json
 import os
@@ -27,11 +27,11 @@ from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
 from .pictures import AnswerPlots, BranchPicture, ChainPicture, SpectrumPicture
 
 _LINES = 6
-"""Lines of the table of motions, including the heading."""
+"""Number of visible lines of the table of motions, with the heading."""
 
 
 class SimulatePage(Page):
-    """The form on the left, the results on the right."""
+    """Form on the left, results on the right."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -51,7 +51,7 @@ class SimulatePage(Page):
         self._build()
         self.form.changed.connect(self._say_cost)
         context.scene_requested.connect(self.show_scene)
-        with suppress(ValueError):  # stored by another version or edited by hand
+        with suppress(ValueError):  # the text may be from another version, or edited by hand
             self.form.form.show_content(dict(json.loads(context.settings.text(SettingKey.SCENES))))
         if self.form.value is None:
             self.form.form.show_content({})
@@ -64,11 +64,11 @@ class SimulatePage(Page):
         return self.progress is not None and not self.simulator.is_busy and self.progress.done > 0
 
     def refresh(self) -> None:
-        """Draw the results received since the last tick, one plot per tick."""
+        """Draw the results that arrived since the last tick, one plot per tick."""
         if self._is_stale and not self._undrawn:
             self._is_stale = False
             self._undrawn = self.plots.steps(self.progress)
-            # The table lists points with several motions; without such points it is hidden.
+            # The table lists points with several motions, and is hidden if there are none.
             rows = () if self.progress is None else self.progress.motion_rows
             self.motions.show_rows(rows)
             self.motions.setVisible(bool(rows))
@@ -91,11 +91,11 @@ class SimulatePage(Page):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """The tabs; each tab has as many widgets as a page."""
+        """The tabs, because each of them has as many widgets as a page."""
         return (self._parts, *self._views)
 
     def begin(self) -> None:
-        """Simulate the scene of the form."""
+        """Simulate the scene described by the form."""
         request = self.form.value
         if request is None:
             return
@@ -111,7 +111,7 @@ class SimulatePage(Page):
         self.simulator.begin(request)
 
     def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Set the form to a frequency range around a drive, and to the time signal at that drive."""
+        """Set the form to frequencies around a drive frequency [Hz], and the time signal to that one."""
         content = {**self.form.form.content(), "amplitude_m": amplitude_m, "signal_hz": frequency_hz}
         content |= {"start_hz": 0.9 * frequency_hz, "stop_hz": 1.1 * frequency_hz}
         content["step_hz"] = 0.01 * frequency_hz
@@ -183,7 +183,7 @@ class SimulatePage(Page):
         self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance(letters))
         self._state = SentenceLabel()
         self._compare = push_button(
-            "&Lay over recordings", "Overlay these curves (Compare page)", self._hand_to_compare
+            "Over&lay on recordings", "Show these curves on the Compare page", self._hand_to_compare
         )
         self.motions = ReadTable(
             "Motions of points that depend sensitively on the start, and their shares", MOTION_COLUMNS

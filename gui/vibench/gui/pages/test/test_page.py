@@ -1,4 +1,4 @@
-"""The Test page: a form of the next test, with preview and prediction."""
+"""The Test page: a form for the next test, with preview and predicted response."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -80,7 +80,7 @@ USUAL = {
     "spectrum": [{"frequency_hz": 40.0, "density": 1e-3}, {"frequency_hz": 600.0, "density": 1e-3}],
     "accelerations_m_per_s2": [0.3, 0.6],
 }
-"""Starting values of required fields for every kind of test."""
+"""Starting values of required fields, the same for every kind of test."""
 
 FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
     {
@@ -91,11 +91,11 @@ FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
     },
     {},
 )
-"""Starting values by kind, used in place of the values of the previous kind."""
+"""Starting values by kind of test; they replace the values of the kind before."""
 
 
 class TestForm(ValidatedForm[Measurement]):
-    """Form of a measurement; `value` is None while it is not valid."""
+    """Form for a measurement; `value` is None if the input is not valid."""
 
     def __init__(self) -> None:
         super().__init__(Measurement, "test", frozenset({"repeats"}))
@@ -111,27 +111,27 @@ class TestForm(ValidatedForm[Measurement]):
         choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
 
     def _rename(self, kind: str) -> None:
-        """Rename the test after a change of kind, because the old name describes the old kind."""
+        """Rename the test after a change of kind, because its name was that of the former kind."""
         self.form.editors["name"].show_content(kind)
         self.form.changed.emit()
 
 
 FIRST = "quick"
-"""Name of the campaign whose tests are listed first."""
+"""Name of the campaign whose tests come first in the list."""
 MOST_OF_ONE = 12
-"""Largest number of tests listed from one campaign, because a sweep has hundreds."""
+"""Largest number of tests listed from one campaign; a sweep may have hundreds."""
 
 
 @dataclass(frozen=True)
 class NamedTest:
-    """A test, with a label that names its origin."""
+    """Test with a label that names its origin."""
 
     label: str
     measurement: Measurement
 
 
 def shipped_tests() -> tuple[NamedTest, ...]:
-    """Return the tests of shipped campaigns; campaigns that cannot be loaded are skipped."""
+    """Return the tests of the campaigns that come with vibench; skip those that cannot be loaded."""
     campaigns = [campaign for _, campaign in _readable(all_shipped("campaigns"), load_campaign)]
     return tuple(
         NamedTest(f"{campaign.name} / {each.name}", each)
@@ -141,7 +141,7 @@ def shipped_tests() -> tuple[NamedTest, ...]:
 
 
 def own_tests(folder: Path) -> tuple[NamedTest, ...]:
-    """Return the tests saved in a folder; unreadable files are skipped."""
+    """Return the tests saved in a folder; skip files that cannot be read."""
     found = _readable(sorted(folder.glob("*.toml")), load_test)
     return tuple(NamedTest(f"own / {path.stem}", test) for path, test in found)
 
@@ -153,7 +153,7 @@ def _readable(paths: Iterable[Path], load: Callable[[Path], Any]) -> Iterator[tu
 
 
 def load_test(path: Path) -> Measurement:
-    """Return the test of a file; raises ConfigurationError with file, key and allowed values."""
+    """Return the test in a file; raise ConfigurationError with file, key and allowed values."""
     return load_toml(path, Measurement)
 
 
@@ -161,7 +161,7 @@ COLLISION = LineStyle(lambda theme: theme.traces[3], fill_opacity=0.18)
 
 
 class PredictionPlot(Plot):
-    """Plot of the simulated response: dashed or dotted lines, with stripes where the masses collide."""
+    """Plot of the simulated response: dashed and dotted lines, with stripes where m1 hits its stops."""
 
     def __init__(self, theme: Theme) -> None:
         up = PlotAxis("Response", "x / A0", scale=Scale.LOGARITHMIC)
@@ -192,7 +192,7 @@ class PredictionPlot(Plot):
 
 
 _FLOOR = 1e-5
-"""Relative level below which spectral lines are rounding errors."""
+"""Level over the strongest spectral line below which lines are rounding errors."""
 _LEAST_HZ = 1.0
 """Lower end of the displayed spectrum [Hz]; shakers do not move at lower frequencies."""
 _LEAST_LINES = 9
@@ -200,7 +200,7 @@ _LEAST_LINES = 9
 
 
 class PreviewPlots(QWidget):
-    """Two plots side by side; zooming into the time signal shows its samples."""
+    """Two plots of the signal side by side, over time and frequency; zooming in time shows samples."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -232,7 +232,7 @@ _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 
 
 class LimitTable(ReadTable):
-    """Table of limits, one row per limit; a bar shows how much of the limit is used."""
+    """Table with one row per limit of the rig; a bar shows which share of the limit the test uses."""
 
     def __init__(self) -> None:
         super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
@@ -283,9 +283,9 @@ _SHOWN = {
 
 
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
-    """Return a summary in words: excitation, loads and their limits, duration and file size.
+    """Return a summary in words: excitation, loads with their limits, duration and file size.
 
-    ``refusal`` is the reason why feedback control would not hold the motion, or empty.
+    ``refusal`` says why feedback control would not hold the motion; it is empty if it would.
     """
     parts = [excitation_text(seen.measurement.excitation)]
     parts += [
@@ -317,13 +317,13 @@ def _load(check: LimitCheck, name: str) -> str:
 
 Asked = tuple[Measurement | None, Rig | None] | None
 NAMELESS = {"name": "test", "notes": ""}
-"""Fixed name and notes for predictions, because these do not depend on name and notes."""
+"""Name and notes used in predictions, because a prediction does not depend on them."""
 LOOK_MS, PREDICT_MS = 200, 900
-"""Delays between the last edit and preview or simulation [ms]."""
+"""Delays from the last edit to the preview, and to the simulation [ms]."""
 
 
 class TestPage(Page):
-    """Page that edits the next test; the Arm button arms it."""
+    """Page that edits the next test; its Arm button arms this test."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -363,7 +363,7 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Whether the test is valid and within all limits, and feedback control is expected to hold it."""
+        """Whether the test is valid and within all limits, and feedback would hold its motion."""
         return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
@@ -378,7 +378,7 @@ class TestPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Loads, plots and prediction, each with its test and rig as inputs."""
+        """Loads, plots and prediction, each with test and rig as inputs."""
         wanted = self._inputs
         return (
             DisplayedResult(self.summary, self._summary_of, wanted),
@@ -406,7 +406,7 @@ class TestPage(Page):
         if measurement is not None:
             self.edits.note(measurement)
             if inputs == self._requested_inputs:
-                # Only name or notes changed, so the prediction stays valid.
+                # Only name or notes have changed, so the prediction is still valid.
                 self.context.selection.prediction = seen
                 return
         self._preview, self._refusal = None, ""
@@ -456,7 +456,7 @@ class TestPage(Page):
         )
         sentences = [each.sentence for each in prediction.expected]
         known = [each.sentence for each in prediction.expected if each.scatter is not None]
-        text = f"Will be known: {known[0]} …" if known and sentences[1:] else "".join(sentences[:1])
+        text = f"Expected uncertainty: {known[0]} …" if known and sentences[1:] else "".join(sentences[:1])
         if prediction.recorded_s is not None:
             text = f"Records until the results are known, about {prediction.recorded_s:.3g} s. {text}"
         self.expectation.setText(text)
@@ -496,7 +496,7 @@ class TestPage(Page):
             self.save_as(measurement, Path(given))
 
     def save_as(self, measurement: Measurement, path: Path) -> None:
-        """Save a test; a test saved in the folder of tests appears in the list."""
+        """Save a test; if it is in the folder of tests, it appears in the list."""
         try:
             save_toml(measurement, path)
         except ConfigurationError as error:
@@ -536,7 +536,7 @@ class TestPage(Page):
         cells = QGridLayout(grid)
         cells.addWidget(self.summary, 0, 0, 1, 2)
         cells.addWidget(titled_box("What will be played", (self.plots, 1)), 1, 0, 1, 2)
-        cells.addWidget(titled_box("Against the limits", (self.limits, 1)), 2, 0)
+        cells.addWidget(titled_box("Loads and limits", (self.limits, 1)), 2, 0)
         cells.addWidget(
             titled_box(
                 "Predicted response of the specimen",
@@ -557,7 +557,7 @@ class TestPage(Page):
 
 
 def _stored_test(text: str) -> Measurement | None:
-    """Return a stored test; None if it is not valid in this version."""
+    """Return the test from stored text; None if it is not valid in this version."""
     try:
         return validated(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):

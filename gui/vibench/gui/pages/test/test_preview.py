@@ -1,4 +1,4 @@
-"""Preview and prediction of a test, computed in another process."""
+"""Preview and prediction of a test, which run in another process."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TestPreview:
-    """A test and the rig on which it will run."""
+    """A test, and the rig on which it will run."""
 
     measurement: Measurement
     rig: Rig
@@ -27,14 +27,14 @@ def preview_test(test: TestPreview) -> MeasurementPreview:
 
 @dataclass(frozen=True, eq=False)
 class TestPrediction:
-    """Predicted response of a test, with the expected uncertainty of its results."""
+    """Predicted response to a test, with the expected uncertainty of its results."""
 
     motion: "MeasurementPrediction"
     expected: tuple["Expected", ...]
     recorded_s: float | None
-    """Predicted recording time of a test with `until` [s]; None if unknown or without `until`."""
+    """Predicted recording time of a test with `until` [s]; None if unknown, or without `until`."""
     refusal: str
-    """Why feedback on the rig would not hold the motion; empty if it would."""
+    """Why feedback on this rig would not hold the motion; empty if it would."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:
