@@ -36,12 +36,12 @@ ELSEWHERE = "or run without a window: QT_QPA_PLATFORM=offscreen"
 
 
 def display_trouble() -> str:
-    """Return one sentence: why no window can be shown, and what to do; empty if a window can be shown."""
+    """Return why no window can be shown, and what to do, as a sentence; empty if a window is possible."""
     try:
-        import PySide6.QtWidgets  # noqa: F401, PLC0415 - whether it loads is the question
+        import PySide6.QtWidgets  # noqa: F401, PLC0415 - tests whether Qt can be loaded
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    # A variable, because a type checker for another system would report the rest as unreachable.
+    # A variable, because a type checker for another operating system would call the rest unreachable.
     system: str = sys.platform
     if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""
@@ -56,7 +56,7 @@ def display_trouble() -> str:
 
 
 def _plugin_trouble() -> str:
-    """Load Qt's X11 plugin to find out which library is missing; Qt reports only the failure."""
+    """Load Qt's X11 plugin to name a missing library; Qt itself reports only the failure."""
     found = find_spec("PySide6")
     folders = [] if found is None else list(found.submodule_search_locations or [])
     for plugin in (Path(folder, "Qt", "plugins", "platforms", "libqxcb.so") for folder in folders):
@@ -71,7 +71,7 @@ def _plugin_trouble() -> str:
 
 
 def _server_trouble() -> str:
-    """Connect to the X server first, because Qt would end the process if it does not answer."""
+    """Connect to the X server before Qt does, because Qt ends the process if the server does not answer."""
     try:
         xcb = ctypes.CDLL("libxcb.so.1")
     except OSError:
@@ -90,9 +90,9 @@ NO_WINDOW = 1
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Open the window and return the exit code when it is closed."""
+    """Open the window; return the exit code after it is closed."""
     options = _options(arguments)
-    # Use PySide6 in pyqtgraph too, and one thread for linear algebra, because the matrices are small.
+    # Make pyqtgraph use PySide6 too. One thread for linear algebra suffices, because matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     trouble = display_trouble()
@@ -116,7 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _sign_of_life() -> "QLabel":
-    """Return a "starting" label, shown first because loading the window takes seconds on a busy computer."""
+    """Show a "starting" label at once and return it; loading the window takes seconds on a busy computer."""
     from PySide6.QtCore import Qt  # noqa: PLC0415
     from PySide6.QtWidgets import QApplication, QLabel  # noqa: PLC0415
 

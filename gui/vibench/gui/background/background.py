@@ -10,20 +10,20 @@ from vibench.sim.background import Job, Pool
 
 POLL_MS = 20
 LONGEST_S = 900.0
-"""Longest duration of a job, after which it is abandoned [s]."""
+"""Longest duration of a job [s]; then it is stopped."""
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 
 
 def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
-    """Call a step in the next pass of the event loop, so that drawing and input are handled first."""
-    # Not 0 ms, because Qt would then call two steps before it serves another timer.
+    """Call ``step`` in the next pass of the event loop, so that drawing and input are handled first."""
+    # Not 0 ms: Qt would then call two steps before it serves another timer.
     QTimer.singleShot(1, receiver, step)
 
 
 class Background(Pool, QObject):
-    """Pool of spawned processes without Qt; answers are delivered in the window's thread."""
+    """Pool of spawned processes without Qt; results are delivered in the window's thread."""
 
     def __init__(self, workers: int, parent: QObject | None = None) -> None:
         QObject.__init__(self, parent)
@@ -32,26 +32,26 @@ class Background(Pool, QObject):
         self._timer.timeout.connect(self.poll)
 
     def prepare(self) -> None:
-        """Start all worker processes now, because starting them during a run would delay frames."""
+        """Start all worker processes now, because starting them during a run would delay the display."""
         super().prepare()
         for beside in self.findChildren(Background):
             beside.prepare()
 
     def begin(self, job: Job) -> Job:
-        """Run a job as soon as a process is free."""
+        """Run a job as soon as a worker process is free."""
         begun = super().begin(job)
         if self.is_busy:
             self._timer.start()
         return begun
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Deliver the answers that have arrived."""
+        """Deliver the results that have arrived."""
         super().poll(wait_s)
         if not self.is_busy:
             self._timer.stop()
 
     def close(self) -> None:
-        """End all worker processes; unanswered jobs are dropped."""
+        """End all worker processes and drop unfinished jobs."""
         for beside in self.findChildren(Background):
             beside.close()
         self._timer.stop()
@@ -59,7 +59,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Queue of one question, which is submitted after a short pause; a newer question replaces it."""
+    """Computes the newest of many requests: each is started after a short pause, unless replaced before."""
 
     def __init__(
         self,
@@ -80,16 +80,16 @@ class LatestRequest(QObject, Generic[Question, Answer]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether the newest question is still unanswered."""
+        """Whether the newest request has no result yet."""
         return self._wanted is not None or self._job is not None
 
     def ask(self, question: Question) -> None:
-        """Replace the waiting question by this one."""
+        """Request this instead of the request that is waiting."""
         self._wanted = question
         self._timer.start()
 
     def drop(self) -> None:
-        """Cancel the waiting question and drop the running one."""
+        """Cancel the waiting and the running request."""
         self._wanted = None
         self._timer.stop()
         if self._job is not None:

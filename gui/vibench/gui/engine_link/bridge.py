@@ -41,7 +41,7 @@ from ..background.background import in_next_pass
 from ..widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
-"""Displayed band when the plan is unknown because another window armed it."""
+"""Frequency band displayed if the plan is unknown, because another window armed it."""
 WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
@@ -59,7 +59,7 @@ def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, nam
 
 
 def warm_up() -> None:
-    """Process a short test signal, so that libraries are loaded and window functions are computed."""
+    """Process a test signal of 3 s, so that libraries are loaded before the first plot of a run."""
     roles = ("drive_voltage", "base_acceleration", "m0_velocity")
     channels = [LiveChannel(role, "V", 1.0, 1.0) for role in roles]
     view = LiveView(channels, WARM_RATE_HZ, band_hz=WHOLE_BAND_HZ)
@@ -73,7 +73,7 @@ def warm_up() -> None:
 
 
 def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:
-    """Return the campaign's measurement to which a recording belongs."""
+    """Return the measurement of the campaign that makes the recording ``name``; None if there is none."""
     if campaign is None:
         return None
     return next((each for recording, each in campaign.recordings() if recording == name), None)
@@ -85,7 +85,7 @@ Listener = Callable[[Any], None]
 
 
 class Urgency(IntEnum):
-    """Order in which waiting requests are sent."""
+    """Order in which waiting requests are sent; the smallest number first."""
 
     STOP = 0
     ORDER = 1
@@ -106,7 +106,7 @@ class _Call:
 class EngineLine:
     """Thread without Qt that starts an engine and sends requests; `drain` delivers the answers.
 
-    Requests are sent only when the window makes them, so the engine notices a frozen window.
+    It sends only requests that the window has just made, so the engine notices if the window freezes.
     """
 
     def __init__(self, start: Starter = start_engine) -> None:
@@ -116,13 +116,13 @@ class EngineLine:
         self._numbers = count()
         self._engine: EngineProcess | AdoptedEngine | None = None
         self.attendant: Attendant | None = None
-        """Object that reports to the engine that the window is alive; None before an engine exists."""
+        """Reports to the engine that the window is alive; None before an engine exists."""
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
     @property
     def pid(self) -> int | None:
-        """Process id of the engine; None before it runs."""
+        """Process id of the engine; None before there is an engine."""
         return None if self._engine is None else self._engine.pid
 
     def ask(
@@ -136,7 +136,7 @@ class EngineLine:
         self._calls.put(_Call(urgency, next(self._numbers), question, on_answer, on_refusal))
 
     def drain(self) -> None:
-        """Call the listeners of all answers received so far, in the caller's thread."""
+        """Call, in this thread, the listeners of all answers received so far."""
         while True:
             try:
                 tell = self._answers.get_nowait()
@@ -145,11 +145,11 @@ class EngineLine:
             tell()
 
     def leave(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave it running; do not wait for this."""
+        """End the engine after a ramp-down, or leave it running; return without waiting."""
         self._calls.put(_Call(how, next(self._numbers), _ignore, _ignore, _ignore))
 
     def close(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave it running; wait until this is done."""
+        """End the engine after a ramp-down, or leave it running; return when this is done."""
         self.leave(how)
         self._thread.join()
 
@@ -179,14 +179,14 @@ class EngineLine:
 
 
 def _ignore(_: object) -> None:
-    """Ignore an answer; the next status shows the effect of an order."""
+    """Ignore an answer; the next status shows what a command has changed."""
 
 
 CATCH_UP_S = 2.0
-"""Longest part fetched after a pause [s]; older samples are only in the file, not in the display."""
+"""Longest part of the signal that is fetched after a pause [s]; older samples are only in the file."""
 
 PIECE_S = 0.2
-"""Duration of the samples processed in one step [s], four times what an instrument delivers per frame."""
+"""Duration of the samples that are processed at once [s], four times the arrivals between two frames."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
@@ -195,16 +195,16 @@ Snapshot = tuple[EngineStatus, SampleSlice | None]
 class Bridge(QObject):
     """The only connection between the window and the engine.
 
-    It stores only values that the engine reported last. The window's timer calls `tick`, which fetches
-    answers and sends new requests. The engine takes these requests as the sign that the window is alive.
+    It stores only values that the engine reported last. The window's timer calls `tick`, which delivers
+    answers and sends new requests. From these requests the engine sees that the window is alive.
     """
 
     noticed = Signal(object)
     armed = Signal(object)
     adopted = Signal(object)
-    """`CampaignRequest` of a running engine, emitted after it was taken over from another window."""
+    """`CampaignRequest` of a running engine that was taken over from another window."""
     advanced = Signal()
-    """Emitted when a requested step is done: a bench is open, a plan is armed, or a run has started."""
+    """Emitted when a requested step is done: bench opened, plan armed, or run started."""
     recording_ended = Signal(object)
     """Path of a recording that has just ended."""
 
@@ -213,9 +213,9 @@ class Bridge(QObject):
         self._start = start
         self._line: EngineLine | None = None
         self.status: EngineStatus | None = None
-        """The newest status of the engine; None without an engine."""
+        """Newest status of the engine; None without an engine."""
         self.view: LiveView | None = None
-        """The newest samples of the run; None before the first run and after another plan was armed."""
+        """Newest samples of the run; None before the first run and after another plan was armed."""
         self._view_run = 0
         self.rig: Rig | None = None
         self.campaign: Campaign | None = None
@@ -227,26 +227,26 @@ class Bridge(QObject):
 
     @property
     def state(self) -> EngineState:
-        """State of the engine; closed without an engine."""
+        """State of the engine; `CLOSED` without an engine."""
         return EngineState.CLOSED if self.status is None else self.status.state
 
     @property
     def is_ordering(self) -> bool:
-        """Whether an order is being carried out; checking a campaign against the limits may take seconds."""
+        """Whether a command is still running; checking a campaign against the limits may take seconds."""
         return self._orders > 0
 
     @property
     def is_driving(self) -> bool:
-        """Whether the drive may be on."""
+        """Whether the generator may be driving the shaker."""
         return self.state in DRIVING
 
     @property
     def engine_pid(self) -> int | None:
-        """Process id of the engine."""
+        """Process id of the engine; None without one."""
         return None if self._line is None else self._line.pid
 
     def tick(self) -> None:
-        """Deliver the answers received, then request status and samples again."""
+        """Deliver the answers received, then request the next status and samples."""
         if self._line is None:
             return
         self.beat()
@@ -256,20 +256,20 @@ class Bridge(QObject):
             self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
 
     def beat(self) -> None:
-        """Record that the window's thread is alive; a separate process reports it to the engine."""
+        """Report that the window's thread is alive; a separate process passes this to the engine."""
         attendant = None if self._line is None else self._line.attendant
         if attendant is not None:
             attendant.live()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
-        """Open the bench of a rig; start an engine if there is none."""
+        """Open the bench of a rig, after starting an engine if there is none."""
         if self._line is None:
             self._line = EngineLine(self._start)
         self.rig = rig
         self._order(lambda client: _open(client, rig, confirmations))
 
     def adopt(self, announcement: Announcement | None) -> None:
-        """Take over an engine that another window left running, and its campaign; then emit `adopted`."""
+        """Take over an engine, with its campaign, that another window left running; then emit `adopted`."""
         if announcement is None or self._line is not None:
             return
         self._line = EngineLine(lambda: AdoptedEngine(announcement))
@@ -299,7 +299,7 @@ class Bridge(QObject):
         self._order(lambda client: client.arm_request(request), keep)
 
     def stop(self, level: StopLevel, reason: str) -> None:
-        """Hold or end the run; this request is sent before all waiting requests."""
+        """Hold or end the run; this request overtakes all waiting requests."""
         if self._line is not None:
             self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._refused)
 
@@ -327,7 +327,7 @@ class Bridge(QObject):
         line = self._line
 
         def over() -> None:
-            if self._line is line:  # the orders of an ended engine are no longer counted
+            if self._line is line:  # do not count down commands of an engine that has ended
                 self._orders -= 1
 
         def answered(answer: Any) -> None:
@@ -372,7 +372,7 @@ class Bridge(QObject):
         self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
-        """Process one piece and schedule the rest; processing all at once would block the event loop."""
+        """Process one piece and schedule the next; all pieces at once would block the event loop."""
         view.add(first_sample, volts[:, :size])
         rest = volts[:, size:]
         if rest.shape[1] == 0:
@@ -409,7 +409,7 @@ class Bridge(QObject):
             return
         line, self._line = self._line, None
         self.status, self._last_message, self._ended = None, 0, frozenset()
-        self._orders = self._view_run = 0  # a new engine counts its runs from 1
+        self._orders = self._view_run = 0  # a new engine numbers its runs from 1
         line.leave()
         if isinstance(error, EngineSilent):
             self.noticed.emit(notice_of(error, "Then open the bench again on the Rig page."))

@@ -40,14 +40,14 @@ class SettingKey(StrEnum):
 
 
 class Settings:
-    """The settings file, in INI format; users may read and delete it."""
+    """Settings file of the window, in INI format; users may read and delete it."""
 
     def __init__(self, path: Path) -> None:
         self._store = QSettings(str(path), QSettings.Format.IniFormat)
 
     @property
     def complaint(self) -> str:
-        """Message that the file cannot be written; empty if all settings are stored."""
+        """Message that the file cannot be written; empty if it can."""
         self._store.sync()
         if self._store.status() is QSettings.Status.NoError:
             return ""
@@ -62,7 +62,7 @@ class Settings:
         return value if isinstance(value, str) and value else otherwise
 
     def number(self, key: SettingKey, otherwise: float, low: float, high: float) -> float:
-        """Return a stored number, limited to its bounds; ``otherwise`` without a valid number."""
+        """Return a stored number, limited to ``low`` and ``high``; ``otherwise`` if none is valid."""
         try:
             return min(max(float(self.text(key)), low), high)
         except ValueError:
@@ -94,7 +94,7 @@ def default_settings_path() -> Path:
 
 
 class Selection(QObject):
-    """Values shared by several pages; each is complete and valid, or None."""
+    """Objects edited or shown by several pages; each is complete and valid, or None."""
 
     rig_changed = Signal()
     measurement_changed = Signal()
@@ -103,12 +103,12 @@ class Selection(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.rig: Rig | None = None
-        """The selected rig; its bench need not be open."""
+        """Selected rig; its bench need not be open."""
         self.measurement: Measurement | None = None
-        """The test on the Test page; None while it is not valid."""
+        """Test on the Test page; None while it is not valid."""
         self.campaign: Campaign | None = None
         self.prediction: MeasurementPrediction | None = None
-        """Predicted response of the specimen to the test; None until it is computed."""
+        """Predicted response of the specimen to this test; None until it is computed."""
 
     def choose_rig(self, rig: Rig | None) -> None:
         """Select another rig."""
@@ -132,17 +132,17 @@ class Selection(QObject):
 USUAL_PATIENCE_S = 2.0
 MOST_RECENT = 12
 WORKERS = 2
-"""Worker processes for long jobs: predictions, analyses, overviews, exports."""
+"""Number of worker processes for long jobs: predictions, analyses, overviews, exports."""
 
 
 class AppContext(QObject):
     """Services of every page; pages refer to each other by name only."""
 
     folder_chosen = Signal(object)
-    """Folder of new recordings, emitted when it changes."""
+    """Folder of new recordings, after it was changed."""
     noticed = Signal(object)
     page_requested = Signal(str)
-    """Name of a page to show."""
+    """Name of the page to show."""
     recording_requested = Signal(object)
     """Path of a recording to open on the Files page."""
     recording_made = Signal(object)
@@ -161,16 +161,16 @@ class AppContext(QObject):
         super().__init__(parent)
         self.settings = settings
         self.first_bench: Path | None = None
-        """Configuration named on the command line; stored only after it could be used."""
+        """Configuration named on the command line; stored in the settings only after it was opened."""
         self.is_armed_read: Callable[[], bool] = lambda: True
-        """Function that returns whether the description of the armed test was read; set by the Run page."""
+        """Whether the user has read the description of the armed test; set by the Run page."""
         self.selection = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)
         self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
-        """Worker for previews, short jobs that must not wait behind long jobs."""
+        """Worker for previews, which must not wait behind long jobs."""
         UNITS.choose(dict(zip(CHOICES, settings.text(SettingKey.UNITS).split(), strict=False)))
         self.theme = THEMES.get(settings.text(SettingKey.THEME), LIGHT)
 
@@ -181,13 +181,13 @@ class AppContext(QObject):
         self.theme_changed.emit(theme)
 
     def choose_units(self, chosen: Mapping[str, str]) -> None:
-        """Change the units of quantities, given by SI unit, and store the choice."""
+        """Change the displayed unit of each quantity, keyed by its SI unit, and store the choice."""
         UNITS.choose(chosen)
         self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen.values()))
 
     @property
     def patience_s(self) -> float:
-        """Time for which a run far from all limits may continue while the window does not respond [s]."""
+        """Time for which a run far from all limits may continue if the window does not respond [s]."""
         return self.settings.number(
             SettingKey.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
         )
@@ -204,11 +204,11 @@ class AppContext(QObject):
 
     @property
     def recent_files(self) -> tuple[Path, ...]:
-        """Files opened or saved last, the newest first."""
+        """Latest opened or saved files, the newest first."""
         return tuple(Path(each) for each in self.settings.text(SettingKey.RECENT).split("\n") if each)
 
     def note_file(self, path: Path) -> None:
-        """Add a file to the recent files."""
+        """Put a file first in the list of recent files."""
         known = [str(each) for each in self.recent_files if each != path]
         self.settings.keep_text(SettingKey.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
 

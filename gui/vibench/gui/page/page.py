@@ -1,4 +1,4 @@
-"""Base class of the pages, the layout in two parts, and the undo history."""
+"""Base class of the pages, their layout in two parts, and the undo history."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from .app_context import AppContext, SettingKey
 
 
 class FileKind(Enum):
-    """Kinds of files that the window can open; each page states which of them it opens."""
+    """Kind of file that the window can open; each page declares which kinds it opens."""
 
     FOLDER = auto()
     RECORDING = auto()
@@ -35,18 +35,18 @@ _TABLES = {
     "sweeps": FileKind.CAMPAIGN,
     "generator": FileKind.RIG,
 }
-"""TOML keys by which a file's kind is recognised."""
+"""Keys of a TOML file that identify its kind."""
 
 
 def file_kind(path: Path) -> FileKind:
-    """Return the kind of a file or folder; raises ConfigurationError if the window cannot open it."""
+    """Return the kind of a file or folder; raise ConfigurationError if the window cannot open it."""
     if path.is_dir():
         return FileKind.FOLDER
     if path.name.endswith((".h5", ".h5.part")):
         try:
             open_recording(path).close()
         except RecordingError:
-            # Accepted here; Compare reads the file or reports why it cannot.
+            # Accepted here; the Compare page opens the file, or says why it cannot.
             return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
         return FileKind.RECORDING
     allowed = "open a recording (.h5), or a test, campaign or hardware configuration (.toml)"
@@ -64,10 +64,10 @@ def file_kind(path: Path) -> FileKind:
 
 @dataclass(frozen=True)
 class DisplayedResult:
-    """A displayed result, and the inputs from which it was computed.
+    """Displayed result, with the inputs from which it was computed.
 
-    ``inputs`` are None while nothing is shown. While they differ from ``wanted``, the widget is disabled to
-    mark the result as outdated.
+    ``inputs`` are None if nothing is shown. If they differ from ``wanted``, the widget must be disabled,
+    which marks the result as outdated.
     """
 
     widget: QWidget
@@ -76,7 +76,7 @@ class DisplayedResult:
 
     @property
     def is_current(self) -> bool:
-        """Whether the result is current, absent, or marked as outdated."""
+        """Whether the result is up to date, absent, or marked as outdated."""
         return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
 
 
@@ -88,13 +88,13 @@ class Themed(Protocol):
 
 
 class Page(QWidget):
-    """A page of the window. It stores no run state: every tick reads the bridge again."""
+    """Page of the window. It keeps no state of a run; every tick reads the bridge again."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__()
         self.context = context
         self.edits: History[Any] = History(lambda _plan: None)
-        """Edits of the plan; empty on pages without a plan."""
+        """Undo history of the plan; empty on pages without a plan."""
 
     @property
     def is_done(self) -> bool:
@@ -116,25 +116,25 @@ class Page(QWidget):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """Parts to restyle one after another; restyling the whole page would block the event loop."""
+        """Parts that are restyled one after another; restyling the whole page would block the event loop."""
         return (self,)
 
     def retheme(self, theme: Theme) -> None:
         """Change the colours of plots; other widgets follow the palette."""
         for part in self.findChildren(QWidget):
-            # A page has hundreds of parts, and isinstance with a protocol takes 80 µs.
+            # Faster than isinstance: a page has hundreds of parts, and a protocol check takes 80 µs each.
             if hasattr(type(part), "retheme"):
                 cast(Themed, part).retheme(theme)
 
     def enter(self) -> None:
-        """Prepare to be shown."""
+        """Prepare the page to be shown."""
 
     def left(self) -> None:
-        """Store the user's input; called when another page is shown and when the window closes."""
+        """Store the user's input; called when another page is shown or the window closes."""
 
 
 class PageParts(QSplitter):
-    """Two parts of a page with a movable divider; its position is stored when the parts are hidden."""
+    """Two parts of a page with a movable divider, whose position is stored when the page is hidden."""
 
     def __init__(self, context: AppContext, page: str, orientation: Qt.Orientation) -> None:
         super().__init__(orientation)
@@ -143,7 +143,7 @@ class PageParts(QSplitter):
         self.setChildrenCollapsible(False)
 
     def show_parts(self, first: QWidget, second: QWidget, sizes: tuple[int, int] = (0, 0)) -> None:
-        """Add the parts with the user's last sizes, otherwise ``sizes``; zeros mean natural sizes."""
+        """Add the parts with the user's last sizes, or with ``sizes``; zeros mean natural sizes."""
         self.addWidget(first)
         self.addWidget(second)
         if any(sizes):
@@ -164,7 +164,7 @@ class PageParts(QSplitter):
 
 
 class SideAndPicture(PageParts):
-    """A page in two scrolling parts.
+    """Page in two scrolling parts: choices on the left, plots on the right.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class SideAndPicture(PageParts):
     """
 
     WIDEST_SIDE = 0.55
-    """Largest default share of the width for the left part."""
+    """Largest default share of the page's width for the left part."""
 
     def __init__(
         self,
@@ -204,9 +204,9 @@ class SideAndPicture(PageParts):
         self._divide()
 
     def event(self, event: QEvent) -> bool:
-        """Follow a change of the font, also while the page is hidden."""
+        """Adapt the width to a new font, even while the page is hidden."""
         if event.type() in (QEvent.Type.FontChange, QEvent.Type.Show):
-            # Deferred, because the child widgets receive the change later.
+            # Deferred, because the child widgets receive the new font later.
             QTimer.singleShot(0, self, self._divide)
         return super().event(event)
 
@@ -221,7 +221,7 @@ MOST_KEPT = 200
 
 
 class History(Generic[State]):
-    """Undo history: the states of a plan and the current position; ``show`` is called with a state."""
+    """Undo history: states of a plan and the current position; ``show`` displays a state."""
 
     def __init__(self, show: Callable[[State], None]) -> None:
         self._show = show
@@ -229,7 +229,7 @@ class History(Generic[State]):
         self._now = -1
 
     def note(self, state: State) -> None:
-        """Append a state and discard the undone ones."""
+        """Append a state; states that were undone are discarded."""
         if self._states and self._states[self._now] == state:
             return
         self._states = [*self._states[: self._now + 1], state][-MOST_KEPT:]

@@ -1,4 +1,4 @@
-"""Simulations for a page, run in one process; partial results are shown, and the page can cancel them."""
+"""Simulations for a page, in a separate process; partial results are shown, and the user can cancel."""
 
 from collections.abc import Callable
 
@@ -16,10 +16,10 @@ from .app_context import AppContext
 
 
 class Simulator(QObject):
-    """Process that computes the newest request of a page, and runs until the page is deleted.
+    """Process that computes the newest request of a page; it ends when the page is deleted.
 
-    ``grown`` receives partial results, ``ended`` is called after the last one, and ``said`` receives
-    messages about all other events.
+    ``grown`` receives the results so far, ``ended`` is called after the last one, and ``said`` receives
+    messages about starting, cancelling and failures.
     """
 
     def __init__(
@@ -41,18 +41,18 @@ class Simulator(QObject):
 
     @property
     def is_busy(self) -> bool:
-        """Whether an answer is incomplete."""
+        """Whether a request is still being computed."""
         return self._job is not None and not self._job.is_over
 
     def begin(self, request: Asked) -> None:
-        """Start a request; the answer to an earlier one is dropped."""
+        """Start a request; an earlier one is cancelled."""
         self._drop()
         self._job = self.background.stream(answer, self._grown, self._end, self._die, request)
         self.cancel_button.setEnabled(True)
         self._said("Computing; the first result appears once the program is loaded…")
 
     def cancel(self) -> None:
-        """Cancel the request; the results so far stay."""
+        """Cancel the request; results so far stay on the page."""
         self._drop()
         self._said("Cancelled; the results so far are shown.")
 
@@ -69,4 +69,4 @@ class Simulator(QObject):
         self.cancel_button.setEnabled(False)
         what, done = f"The simulation failed: {error}.", "The results so far are shown."
         self._context.say(Notice(NoticeKind.FAULT, what, done, "Compute again.", "SIMULATOR"))
-        self._said("It broke off.")
+        self._said("The simulation failed.")

@@ -19,20 +19,20 @@ LONGEST_NAME = 60
 
 
 class UserActions(QObject):
-    """The user's commands; a command that is not possible gives a message with the reason."""
+    """Commands of the user; a command that is not possible now shows a message with the reason."""
 
     def __init__(self, context: AppContext, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._context = context
 
     def check(self, *, new_reference: bool = False) -> None:
-        """Check the bench; with ``new_reference``, store the result as the reference of later checks."""
+        """Check the bench; ``new_reference`` makes the result the reference of later checks."""
         if not self._may("check the bench", EngineState.READY):
             return
         self._context.bridge.order(EngineClient.check, self._context.folder, new_reference=new_reference)
 
     def complete_test(self) -> Measurement | None:
-        """Return the test of the Test page; without a complete one, give a message and None."""
+        """Return the test of the Test page; if it is not complete, show a message and return None."""
         measurement = self._context.selection.measurement
         if measurement is None:
             next_step = "Correct the marked fields on the Test page (Ctrl+2)."
@@ -40,7 +40,7 @@ class UserActions(QObject):
         return measurement
 
     def arm_test(self) -> None:
-        """Arm the test of the Test page, under an unused name."""
+        """Arm the test of the Test page, under a name that is not used in the folder."""
         measurement = self.complete_test()
         if measurement is None:
             return
@@ -53,7 +53,7 @@ class UserActions(QObject):
         existing: ExistingRecordings = ExistingRecordings.REFUSE,
         attendance: Supervision | None = None,
     ) -> None:
-        """Arm the campaign of the Queue page, in a folder with its name."""
+        """Arm the campaign of the Queue page; recordings go into a folder with its name."""
         campaign = self._context.selection.campaign
         if campaign is None:
             self._context.warn("There is no campaign.", next_step="Open a campaign on the Queue page.")
@@ -86,12 +86,12 @@ class UserActions(QObject):
             self._context.page_requested.emit(RUN)
 
     def stop(self) -> None:
-        """Ramp down as planned; a second call during the ramp uses the fastest ramp of the shaker."""
+        """Ramp down as planned; a second call during the ramp uses the shaker's fastest ramp."""
         is_ramping = self._context.bridge.state is EngineState.RAMPING_DOWN
         self._context.bridge.stop(StopLevel.ABORT if is_ramping else StopLevel.RAMP, OPERATOR_STOP)
 
     def abort(self) -> None:
-        """Ramp down with the fastest ramp of the shaker."""
+        """Ramp down with the shaker's fastest ramp."""
         self._context.bridge.stop(StopLevel.ABORT, ABORT_KEY)
 
     def hold_or_resume(self) -> None:
@@ -102,7 +102,7 @@ class UserActions(QObject):
             self._context.bridge.stop(StopLevel.HOLD, "held by the operator, in the window")
 
     def _may(self, verb: str, *states: EngineState) -> bool:
-        """Return whether an order is possible now; if not, warn before the engine refuses it as an error."""
+        """Return whether a command is possible now; if not, warn before the engine reports an error."""
         bridge = self._context.bridge
         if bridge.is_ordering:
             self._context.warn(
@@ -141,7 +141,7 @@ _NEXT = {
 
 
 def free_name(folder: Path, measurement: Measurement) -> str:
-    """Return an unused file name for a test: ``dwell_003``."""
+    """Return a file name for a test that is not used in the folder, such as ``dwell_003``."""
     stem = measurement.name[:LONGEST_NAME]
     number = 1
     while any(folder.glob(f"{stem}_{number:03}*")):

@@ -34,11 +34,11 @@ from .notice import clock
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
 Part = Content | tuple[Content, int] | int
-"""A widget or layout, alone or with its share of the free space; a number adds an empty share."""
+"""Widget or layout, alone or with its share of the free space; a number alone is an empty share."""
 
 
 def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
-    """Add parts to a box in order; without ``margin`` [pixels], the margin of the style is used."""
+    """Add parts to a box, in order; ``margin`` in pixels, by default that of the style."""
     if margin is not None:
         box.setContentsMargins(margin, margin, margin, margin)
     for part in parts:
@@ -57,19 +57,19 @@ def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
 
 
 def row(*parts: Part) -> QHBoxLayout:
-    """Return a layout of parts side by side."""
+    """Return a layout with the parts side by side."""
     return fill_box(QHBoxLayout(), *parts)
 
 
 def column(*parts: Part) -> QWidget:
-    """Return a widget with parts below one another and no margin."""
+    """Return a widget with the parts below one another, without a margin."""
     whole = QWidget()
     fill_box(QVBoxLayout(whole), *parts, margin=0)
     return whole
 
 
 def titled_box(title: str, *parts: Part) -> QGroupBox:
-    """Return a titled frame with parts below one another."""
+    """Return a titled frame with the parts below one another."""
     frame = QGroupBox(title)
     fill_box(QVBoxLayout(frame), *parts)
     return frame
@@ -83,7 +83,7 @@ def title_of(page: str) -> QLabel:
 
 
 class ScrollArea(QScrollArea):
-    """A scrolling part of a page, which never widens the window.
+    """Scrolling part of a page, which never widens the window.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class ScrollArea(QScrollArea):
 
 
 def push_button(text: str, tip: str, act: Callable[[], object], rank: str = "") -> QPushButton:
-    """Return a button; ``act`` is called without Qt's arguments."""
+    """Return a button that calls ``act`` without arguments."""
     button = QPushButton(text)
     button.setProperty("rank", rank)
     button.setToolTip(tip)
@@ -126,7 +126,7 @@ def push_button(text: str, tip: str, act: Callable[[], object], rank: str = "") 
 
 
 def tick_box(text: str, tip: str, act: Callable[[bool], object]) -> QCheckBox:
-    """Return a check box; ``act`` is called with its new state."""
+    """Return a check box that calls ``act`` with its new state."""
     box = QCheckBox(text)
     box.setToolTip(tip)
     box.toggled.connect(act)
@@ -134,7 +134,7 @@ def tick_box(text: str, tip: str, act: Callable[[bool], object]) -> QCheckBox:
 
 
 def label_for(text: str, field: QWidget, name: str = "") -> QLabel:
-    """Return the label of a field, whose shortcut moves the focus there; ``name`` is for screen readers."""
+    """Return a label whose shortcut moves the focus to ``field``; ``name`` is for screen readers."""
     label = QLabel(text)
     label.setBuddy(field)
     field.setAccessibleName(name or text.replace("&", ""))
@@ -158,21 +158,21 @@ def splitter(
 
 
 def keep_space(widget: QWidget) -> None:
-    """Keep the space of a widget while it is hidden, so that nothing moves."""
+    """Keep the space of a widget while it is hidden, so that nothing around it moves."""
     policy = widget.sizePolicy()
     policy.setRetainSizeWhenHidden(True)
     widget.setSizePolicy(policy)
 
 
 def set_tone(widget: QWidget, tone: str) -> None:
-    """Give a widget the colours of a tone; an empty text removes them."""
+    """Give a widget the colours of a `Tone`; an empty text removes them."""
     if (widget.property("tone") or "") != tone:
         widget.setProperty("tone", tone)
         widget.style().polish(widget)
 
 
 def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | None:
-    """Ask for the path of a new file; a missing suffix is taken from the selected filter."""
+    """Ask for the path of a new file; if it has no suffix, add that of the selected filter."""
     options = QFileDialog.Option.DontConfirmOverwrite
     given, kind = QFileDialog.getSaveFileName(parent, title, str(wish), filters, options=options)
     if not given:
@@ -182,7 +182,7 @@ def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | No
 
 
 _WIDEST = 0.8
-"""Largest width of a hint, as a share of its area."""
+"""Largest width of a hint, over the width of its area."""
 
 
 def hint_in_list(view: QAbstractItemView, text: str) -> None:
@@ -200,18 +200,18 @@ def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) 
 
 
 def plain_lines(text: str) -> str:
-    """Return the text without control characters, line by line."""
+    """Return the text without control characters; line breaks are kept."""
     return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
 def plain_tip(text: str) -> str:
-    """Return a tooltip with its markup escaped."""
+    """Return a tooltip in which markup is shown as plain text."""
     lines = plain_lines(text)
     return f"<p style='white-space:pre-wrap'>{escape(lines)}</p>" if "<" in lines else lines
 
 
 class ElidedLabel(QLabel):
-    """A label of one line that is shortened with dots if space is missing; its tooltip has the whole text."""
+    """Label of one line, which is cut off with dots if space is missing; the tooltip shows all."""
 
     LETTERS = 3
 
@@ -230,13 +230,13 @@ class ElidedLabel(QLabel):
         super().setToolTip(plain_tip(text))
 
     def minimumSizeHint(self) -> QSize:
-        """Return room for a few letters, so that a long text does not widen the window."""
+        """Return the width of a few letters, so that a long text does not widen the window."""
         hint = super().minimumSizeHint()
         least = self.LETTERS * self.fontMetrics().averageCharWidth()
         return QSize(min(hint.width(), least), hint.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the text, shortened if necessary."""
+        """Draw the text, cut off if necessary."""
         room = self.contentsRect()
         if self.sizeHint().width() <= self.width() or room.width() <= 0:
             super().paintEvent(event)
@@ -252,11 +252,11 @@ class ElidedLabel(QLabel):
 
 
 LEAST_S = 1.0
-"""Elapsed time after which the remaining time is estimated [s]."""
+"""Elapsed time from which on the remaining time is estimated [s]."""
 
 
 class ProgressBar(QProgressBar):
-    """A progress bar whose text is shortened with dots; its tooltip has the whole text."""
+    """Progress bar whose text is cut off with dots if space is missing; the tooltip shows all."""
 
     def __init__(self, name: str, text: str = "") -> None:
         super().__init__()
@@ -265,7 +265,7 @@ class ProgressBar(QProgressBar):
         self.show_share(0.0, text)
 
     def show_share(self, share: float, text: str) -> None:
-        """Show the finished share, with a text; more than the whole counts as the whole."""
+        """Show the finished share, 0 to 1 (more counts as 1), with a text."""
         self.setValue(round(1000 * min(1.0, share)))
         self.setFormat(text)
 
@@ -279,7 +279,7 @@ class ProgressBar(QProgressBar):
 
 
 class TimedBar(ProgressBar):
-    """A progress bar that estimates the remaining time from the finished pieces."""
+    """Progress bar that estimates the remaining time from the number of finished pieces."""
 
     def __init__(self, name: str, pieces: str) -> None:
         super().__init__(name)
@@ -293,7 +293,7 @@ class TimedBar(ProgressBar):
         self._begun_s = monotonic()
 
     def show_done(self, done: int, total: int) -> None:
-        """Show the number of finished pieces; ``total`` is 0 when nothing was started."""
+        """Show the number of finished pieces; ``total`` is 0 if nothing was started."""
         if total and not self._total:
             self.begin()
         self._total = total

@@ -17,7 +17,7 @@ class NoticeKind(StrEnum):
 
 @dataclass(frozen=True)
 class Notice:
-    """A message; empty parts are not shown."""
+    """Message to the user; empty parts are not shown."""
 
     kind: NoticeKind
     what: str
@@ -25,7 +25,7 @@ class Notice:
     done: str = ""
     """What was done about it."""
     next_step: str = ""
-    """What to do."""
+    """What the user should do next."""
     code: str = ""
     """Error class, to search for in the documentation."""
     details: str = ""
@@ -39,7 +39,7 @@ class Notice:
 
 
 def notice_of(error: BaseException, next_step: str = "") -> Notice:
-    """Return the notice of an error; the error's message already has all parts."""
+    """Return an error as a notice; the error's message already contains all parts."""
     return Notice(
         NoticeKind.FAULT,
         printable(str(error)) or type(error).__name__,
@@ -65,7 +65,7 @@ def moment_text(utc: str) -> str:
 
 
 def outcome_text(state: str, reason: str) -> str:
-    """Return state and reason as text: ``"stopped by the operator"``, ``"failed: the laser was lost"``."""
+    """Return state and reason as one text: ``"stopped by the operator"``, ``"failed: no laser signal"``."""
     return reason if reason.startswith(state) else f"{state}: {reason}" if reason else state
 
 

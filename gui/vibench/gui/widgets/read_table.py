@@ -1,4 +1,4 @@
-"""A read-only table whose cells can be copied."""
+"""Read-only table whose cells can be copied."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -13,7 +13,7 @@ Cell = QModelIndex | QPersistentModelIndex
 
 
 def make_readable(table: QTableView, name: str) -> None:
-    """Make a table read-only, with actions to copy the selected cells, or all with the headings."""
+    """Make a table read-only; add actions that copy the selected cells, or all cells with headings."""
     table.setAccessibleName(name)
     table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
     table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -32,12 +32,12 @@ def make_readable(table: QTableView, name: str) -> None:
 
 
 def chosen_text(table: QTableView) -> str:
-    """Return the selected cells as lines; without a selection, the whole table."""
+    """Return the selected cells, one line per row; without a selection, the whole table."""
     return _lines(table.selectionModel().selectedIndexes()) or whole_text(table.model())
 
 
 def whole_text(model: QAbstractItemModel) -> str:
-    """Return the headings and all cells as text."""
+    """Return headings and all cells as text, separated by tabs."""
     rows, columns = range(model.rowCount()), range(model.columnCount())
     headings = (str(model.headerData(column, Qt.Orientation.Horizontal) or "") for column in columns)
     return "\t".join(headings) + "\n" + _lines(model.index(row, column) for row in rows for column in columns)
@@ -58,15 +58,15 @@ def _offered(table: QTableView, text: str, clipboard_text: Callable[[], str]) ->
 
 
 _WIDEST_LETTERS = 36
-"""Largest width of a column that fits its content, in letters; longer text is wrapped."""
+"""Largest width of the columns that fit their content, in letters; longer text is wrapped."""
 _LEAST_LETTERS = 14
-"""Smallest width of the wide column, in letters; narrower tables scroll."""
+"""Smallest width of the wide column, in letters; if there is less space, the table scrolls."""
 _ROW_ROOM = 8
 """Extra height of rows with several lines [pixels], so that neighbouring rows do not touch."""
 
 
 class ReadTable(QTableWidget):
-    """A read-only table. One column takes the remaining width and wraps its text.
+    """Read-only table. One column takes the remaining width and wraps its text.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class ReadTable(QTableWidget):
     columns
         Headings.
     hint
-        Text of an empty table.
+        Text shown while the table is empty.
     wide
         Number of the column that takes the remaining width; by default the last one.
     """
@@ -97,7 +97,7 @@ class ReadTable(QTableWidget):
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
         UNITS.on_change(self._write)
-        # The width changes in many steps; fit the row heights only once, after the last step.
+        # The width changes in many steps. Fit the row heights once, after the last step.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._fit)
 

@@ -13,7 +13,7 @@ Colour = str
 
 
 class Tone(StrEnum):
-    """Importance of a state, shown by colour together with a word or a symbol."""
+    """Importance of a state, shown by a colour and also by a word or a symbol."""
 
     CALM = "calm"
     GOOD = "good"
@@ -24,7 +24,7 @@ class Tone(StrEnum):
 
 @dataclass(frozen=True)
 class Paint:
-    """Background and text colour with a contrast of at least 4.5."""
+    """Background and text colour, with a contrast ratio of at least 4.5."""
 
     ground: Colour
     letters: Colour
@@ -42,15 +42,15 @@ class Theme:
     line: Colour
     """Borders of groups and grids."""
     edge: Colour
-    """Borders of input fields, with a contrast of at least 3."""
+    """Borders of input fields, with a contrast ratio of at least 3."""
     text: Colour
     muted: Colour
     accent: Colour
     tones: Mapping[Tone, Paint]
     traces: tuple[Colour, ...]
-    """Curve colours in order of use: the colours of Okabe and Ito, adapted to this background."""
+    """Colours of curves in order of use: those of Okabe and Ito, adapted to the background."""
     predicted: Colour
-    """Colour of simulated curves, which are also dashed."""
+    """Colour of simulated curves, which are dashed as well."""
 
 
 LIGHT = Theme(
@@ -97,7 +97,7 @@ THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 def palette(theme: Theme) -> QPalette:
-    """Return the palette of Qt's widgets; unlike a colour scheme, it works on every desktop."""
+    """Return the palette of a theme for Qt's widgets; works on every desktop, unlike a colour scheme."""
     role = QPalette.ColorRole
     colours = QPalette()
     for where, colour in (
@@ -123,9 +123,9 @@ def palette(theme: Theme) -> QPalette:
 
 
 def style_sheet(theme: Theme) -> str:
-    """Return style rules beyond the palette: panels, navigation bar, banner; sizes follow the font.
+    """Return the style rules beyond the palette: panels, navigation bar, banner; sizes follow the font.
 
-    A table shows its focus by its frame, because a shaded cell would be harder to read.
+    A table with focus has a coloured frame, because a shaded cell would be harder to read.
     """
     tones = "".join(
         f'*[tone="{tone.value}"] {{ background: {paint.ground}; color: {paint.letters}; }}\n'

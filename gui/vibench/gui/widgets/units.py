@@ -1,7 +1,7 @@
 """Displayed units: one choice per quantity for axes, fields, tables and sentences.
 
-Values are in SI units, and sentences of other packages use the paper's units (µm, m/s²). Only this module
-converts to the chosen units; files and reports are not affected.
+Values are in SI units; sentences from other packages use the paper's units (µm, m/s²). Only this module
+converts to the units that the user has chosen. Files and reports are not affected.
 """
 
 import re
@@ -21,18 +21,18 @@ from .boxes import plain_lines, plain_tip
 STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²]; ISO 80000-3."""
 AUTOMATIC = "automatic"
-"""Choice that shows displacements in µm on axes, and elsewhere with a prefix that suits the value."""
+"""Choice that shows displacements in µm on axes, elsewhere with a prefix that suits the value."""
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "m": (AUTOMATIC, "µm", "mm", "m"),
     "m/s": ("mm/s", "m/s"),
     "m/s²": ("m/s²", "g"),
 }
-"""Units to choose from, by SI unit; the first is the default."""
+"""Units that the user can choose, by SI unit; the first is the default."""
 POWERS = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3, "M": 6}
-"""Powers of ten by prefix; "micro" is written with any of three characters."""
+"""Powers of ten by prefix; three characters are used for "micro"."""
 _FITTED = ("p", "n", "µ", "m", "", "k", "M")
 PREFIXED = frozenset({"m", "V", "Vpp", "s", "A", "N", "Hz", "W"})
-"""Units that receive a prefix for small and large values."""
+"""Units that get a prefix for small and large values."""
 _PLAIN_FROM, _PLAIN_TO = 0.1, 1e5
 _SPELLED = {"m s-1": "m/s", "m s-2": "m/s²", "m/s2": "m/s²", "um": "µm"}
 """Other spellings of units in files and sentences."""
@@ -51,7 +51,7 @@ _LONG_FROM, _LONG_TO = Decimal("1e-6"), Decimal("1e7")
 
 @dataclass(frozen=True)
 class ShownUnit:
-    """A displayed unit, and the factor from the SI unit to it."""
+    """Unit in which a quantity is displayed, and its factor from SI."""
 
     name: str
     per_si: float = 1.0
@@ -59,7 +59,7 @@ class ShownUnit:
     def text(self, value: float, digits: int = 3) -> str:
         """Return an SI value in this unit as text."""
         shown = value * self.per_si
-        # Counts are not rounded: 8192 points, not 8190.
+        # A number of points is not rounded: 8192 points, not 8190.
         number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
         return f"{_number_text(Decimal(number))} {self.name}".strip()
 
@@ -70,7 +70,7 @@ def plain_unit(unit: str) -> str:
 
 
 def prefixed_unit(unit: str, value: float) -> ShownUnit:
-    """Return a unit with the prefix that suits the value, regardless of the user's choice."""
+    """Return a unit with the prefix that suits the value, whatever unit the user has chosen."""
     si = plain_unit(unit)
     is_plain = si not in PREFIXED or value == 0.0 or _PLAIN_FROM <= abs(value) < _PLAIN_TO
     place = 0 if is_plain else floor(log10(abs(value)) / 3)
@@ -79,11 +79,11 @@ def prefixed_unit(unit: str, value: float) -> ShownUnit:
 
 
 class DisplayUnits:
-    """The chosen unit of each quantity; widgets register to be called after a change."""
+    """Units chosen for display; widgets register a method that is called after a change."""
 
     def __init__(self) -> None:
         self._chosen = {si: choices[0] for si, choices in CHOICES.items()}
-        # Weak references, because this object outlives every window and must not call a closed widget.
+        # Weak references: this object outlives every window and must not call a closed widget.
         self._listeners: dict[WeakMethod[Callable[[], None]], None] = {}
 
     def on_change(self, listener: Callable[[], None]) -> None:
@@ -99,7 +99,7 @@ class DisplayUnits:
         return MappingProxyType(self._chosen)
 
     def choose(self, chosen: Mapping[str, str]) -> None:
-        """Set the units; a missing or unknown choice selects the default."""
+        """Choose the units, by SI unit; a missing or unknown unit selects the default."""
         names = {si: chosen.get(si, "") for si in CHOICES}
         wanted = {si: name if name in CHOICES[si] else CHOICES[si][0] for si, name in names.items()}
         if wanted != self._chosen:
@@ -110,7 +110,7 @@ class DisplayUnits:
                     listener()
 
     def on_axis(self, unit: str) -> ShownUnit:
-        """Return the unit of an axis or a column, independent of the value."""
+        """Return the unit of an axis or a column, which does not depend on the value."""
         si = plain_unit(unit)
         name = self._chosen.get(si, si)
         return _shown(si, "µm" if name == AUTOMATIC else name)
@@ -121,11 +121,11 @@ class DisplayUnits:
         return prefixed_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
 
     def in_field(self, unit: str) -> str:
-        """Return the unit assumed for a number typed without a unit into an empty field."""
+        """Return the unit in which a number typed without unit into an empty field is read."""
         return self.on_axis(unit).name
 
     def convert(self, sentence: str) -> str:
-        """Return a sentence with displacements, velocities and accelerations in the chosen units."""
+        """Return a sentence in which displacements, velocities and accelerations have the chosen units."""
         return _QUANTITY.sub(self._convert_match, sentence)
 
     def _convert_match(self, found: re.Match[str]) -> str:
@@ -144,7 +144,7 @@ def _shown(si: str, name: str) -> ShownUnit:
 
 
 def _scale_number(number: str, factor: float) -> str:
-    """Scale a number in a text; a power of ten shifts the decimal point and keeps every digit."""
+    """Multiply a number in a text; for a power of ten, shift the decimal point and keep all digits."""
     power = round(log10(factor))
     if factor == 1.0:
         return number
@@ -170,7 +170,7 @@ UNITS = DisplayUnits()
 
 
 class SentenceLabel(QLabel):
-    """A wrapped text that shows its quantities in the chosen units."""
+    """Wrapped text in which quantities are shown in the chosen units."""
 
     def __init__(self, text: str = "", rank: str = "", name: str = "") -> None:
         super().__init__()
@@ -198,6 +198,6 @@ class SentenceLabel(QLabel):
         return super().text().replace(_BREAK, "")
 
     def _show_converted(self) -> None:
-        # Allow breaks in long words such as paths, because Qt would cut them off.
+        # Allow breaks in long words such as paths; Qt would cut them off.
         super().setText(_LONG_WORD.sub(_with_breaks, UNITS.convert(plain_lines(self.sentence))))
         super().setToolTip(plain_tip(UNITS.convert(self._tip)))

@@ -18,7 +18,7 @@ from ..widgets.units import SentenceLabel
 
 
 class StatusField(StrEnum):
-    """Fields of the status line, from left to right."""
+    """Field of the status line, from left to right."""
 
     RIG = "rig"
     OVERRUNS = "overruns"
@@ -29,7 +29,7 @@ class StatusField(StrEnum):
 
 
 class StatusLine(QFrame):
-    """The status line; fields that need attention have a symbol and a colour."""
+    """Status line; a field that needs attention has a symbol and a colour."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -48,7 +48,7 @@ class StatusLine(QFrame):
         frames = self.labels[StatusField.FRAMES]
         frames.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self._fit()
-        # The file field takes the remaining width and shrinks first.
+        # The field with the file name takes the remaining width and is the first to shrink.
         self.labels[StatusField.FILE].setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         layout.setStretchFactor(self.labels[StatusField.FILE], 1)
 
@@ -59,7 +59,7 @@ class StatusLine(QFrame):
             self._fit()
 
     def _fit(self) -> None:
-        """Give the last field its largest width, so that changing numbers do not move other fields."""
+        """Give the last field its largest width, so that other fields do not move when numbers change."""
         frames = self.labels[StatusField.FRAMES]
         frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
 
@@ -71,7 +71,7 @@ class StatusLine(QFrame):
     def show_fields(
         self, texts: Mapping[StatusField, str], marked: frozenset[StatusField] = frozenset()
     ) -> None:
-        """Show texts; ``marked`` fields need attention."""
+        """Show a text in each field; ``marked`` fields need attention."""
         for field, label in self.labels.items():
             text = texts.get(field, "")
             tone = Tone.CAUTION.value if field in marked else ""
@@ -85,15 +85,15 @@ class StatusLine(QFrame):
 
 @dataclass(frozen=True)
 class StateIndicator:
-    """Symbol, word, colour and details that the banner shows for a state."""
+    """Symbol, word, colour and details with which the banner shows a state."""
 
     symbol: str
     word: str
     tone: Tone
     detail: str = ""
-    """Text that changes during the state, such as elapsed time and level."""
+    """Text that changes while the state lasts, such as elapsed time and level."""
     is_ramping: bool = False
-    """Whether the drive is ramping down, so that STOP can only make the ramp faster."""
+    """Whether the drive is already ramping down, so that STOP can only shorten the ramp."""
 
 
 STOP_TEXT, AT_ONCE_TEXT = "■ STOP: ramp down   (Esc: abort)", "■ STOP: at once   (Esc: abort)"
@@ -101,10 +101,10 @@ CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open a bench on the Rig p
 
 
 class Banner(QFrame):
-    """The banner with the state and STOP; a change of state is announced to screen readers."""
+    """Banner with state and STOP; a change of state is announced to screen readers."""
 
     stop_requested = Signal()
-    """Request to ramp down as planned; a second press requests the fastest ramp."""
+    """Request to ramp down as planned; during the ramp, a second press requests the fastest ramp."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -137,7 +137,7 @@ class Banner(QFrame):
             self._fit()
 
     def _fit(self) -> None:
-        """Give STOP its largest width, so that it does not move under the pointer."""
+        """Give STOP the width of its longest text, so that it does not move under the pointer."""
         shown, widths = self._stop.text(), []
         for text in (STOP_TEXT, AT_ONCE_TEXT):
             self._stop.setText(text)
@@ -146,7 +146,7 @@ class Banner(QFrame):
         self._stop.setMinimumWidth(max(widths))
 
     def show_indicator(self, indicator: StateIndicator) -> None:
-        """Show a state; an unchanged state is not repainted."""
+        """Show a state; if it has not changed, nothing is repainted."""
         if indicator == self.indicator:
             return
         announced = indicator.word != self.indicator.word
@@ -196,8 +196,8 @@ _LITTLE_ROOM_S = 3600.0
 ORDERED = "Limits, folder and instruments are being checked"
 
 
-def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a fact
-    """Return the indicator of the engine's state."""
+def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a state
+    """Return the indicator for the engine's state; ``is_ordering``: a command is still running."""
     if status is None:
         return OPENING if is_ordering else CLOSED
     if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):
@@ -222,7 +222,7 @@ def _detail(status: EngineStatus) -> str:
 
 
 def run_text(run: RunStatus | None) -> str:
-    """Return the progress of a run as text."""
+    """Return the progress of a run, as text."""
     if run is None:
         return "Beginning"
     parts = [f"{run.name} ({run.number} of {run.count})" if run.count > 1 else run.name]
@@ -274,8 +274,8 @@ _DETAIL_LINES = 14
 class MessageStrip(QFrame):
     """Strip with the newest message: what happened, what was done, what to do next.
 
-    Its height is constant, so that nothing below moves. Without a message it shows the next step. The
-    Details button opens a list of earlier messages over the page.
+    Its height is constant, so that nothing below it moves. If there is no message, it shows the next step.
+    The Details button opens the list of all messages over the page.
     """
 
     def __init__(self) -> None:
@@ -312,7 +312,7 @@ class MessageStrip(QFrame):
         return tuple(self._notices)
 
     def say(self, notice: Notice) -> None:
-        """Show a message; earlier ones stay in Details."""
+        """Show a message; earlier messages remain in Details."""
         self._notices = [*self._notices, notice][-MOST_KEPT:]
         sentences = "  ▸ ".join(part for part in (notice.what, notice.done, notice.next_step) if part)
         self._details.setPlainText("\n\n".join(each.text for each in reversed(self._notices)))
@@ -322,14 +322,14 @@ class MessageStrip(QFrame):
         self._text.setToolTip(notice.text)
 
     def hint(self, text: str) -> None:
-        """Set the next step, which is shown while there is no message."""
+        """Set the next step, which is shown if there is no message."""
         if text != self._hint:
             self._hint = text
             if not self.is_said:
                 self._text.setText(text)
 
     def dismiss(self) -> None:
-        """Remove the message; it stays in Details."""
+        """Remove the message from the strip; it remains in Details."""
         self.is_said = False
         self._more.setChecked(False)
         self._show(self._hint, "")

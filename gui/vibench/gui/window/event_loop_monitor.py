@@ -1,4 +1,4 @@
-"""Monitor of the event loop: measures continuously how long the window does not respond."""
+"""Monitor of the event loop: measures for how long the window does not respond."""
 
 import os
 from collections import deque
@@ -13,31 +13,31 @@ from vibench.sim.operating_system.this import read_at
 
 EVERY_MS = 20
 BOUND_S = 0.1
-"""Delay that users notice; longer delays are logged [s]."""
+"""Delay from which on users notice it; longer delays are logged [s]."""
 SPAN_S = 10.0
-"""Time range over which the longest delay is reported [s]."""
+"""Period for which the longest delay is reported [s]."""
 MOST_NOTED = 20
 _DELAYS = "/proc/thread-self/schedstat"
-"""File of Linux with the time that this thread waited for a processor [ns]."""
+"""File of Linux with the time for which this thread waited for a processor [ns]."""
 
 
 @dataclass(frozen=True)
 class Wait:
-    """One delay of the event loop."""
+    """A delay of the event loop."""
 
     own_s: float
-    """Delay [s], less the time spent waiting for a processor if the system reports that."""
+    """Delay [s], without the time of waiting for a processor if the operating system reports that."""
     busy_s: float
-    """Processor time of this thread during the delay [s]; it does not depend on other programs."""
+    """Processor time of this thread during the delay [s], which does not depend on other programs."""
     at: datetime
     about: str
 
 
 class EventLoopMonitor(QObject):
-    """A timer that measures its own delays.
+    """Timer that measures its own delays.
 
-    Work, file access, locks and other Python threads delay the timer. Waiting for a processor is subtracted,
-    so that load by other programs does not count.
+    Work, file access, locks and other Python threads delay the timer. The time of waiting for a processor is
+    subtracted, so that other programs on the computer do not count.
     """
 
     def __init__(self, about: Callable[[], str], parent: QObject | None = None) -> None:
@@ -53,13 +53,13 @@ class EventLoopMonitor(QObject):
 
     @property
     def longest_s(self) -> float:
-        """The longest delay in the last `SPAN_S`, without waiting for a processor [s]."""
+        """Longest delay in the last `SPAN_S`, without waiting for a processor [s]."""
         self._forget()
         return max((own_s for _, own_s, _ in self._waits), default=0.0)
 
     @property
     def busiest_s(self) -> float:
-        """The longest processor time between two timer events in the last `SPAN_S` [s]."""
+        """Largest processor time between two timer events in the last `SPAN_S` [s]."""
         self._forget()
         return max((busy_s for _, _, busy_s in self._waits), default=0.0)
 
@@ -71,11 +71,11 @@ class EventLoopMonitor(QObject):
 
     @property
     def noted(self) -> tuple[Wait, ...]:
-        """Delays above the bound, the newest last."""
+        """Delays above `BOUND_S`, the newest last."""
         return tuple(self._noted)
 
     def begin(self) -> None:
-        """Restart the measurement."""
+        """Discard all delays and measure again."""
         self._waits.clear()
         self._noted.clear()
         self._before = self._clocks()
@@ -87,7 +87,7 @@ class EventLoopMonitor(QObject):
 
     @property
     def text(self) -> str:
-        """Return the logged delays, the newest first."""
+        """Longest delay, and the logged delays with the newest first, as text."""
         lines = [f"Longest wait for the window in the last {SPAN_S:.0f} s: {1e3 * self.longest_s:.0f} ms."]
         lines += [
             f"{each.at:%H:%M:%S}  {each.about}: {1e3 * each.own_s:.0f} ms" for each in reversed(self._noted)
@@ -104,7 +104,7 @@ class EventLoopMonitor(QObject):
             self._noted.append(Wait(own_s, busy_s, datetime.now().astimezone(), self._about()))
 
     def _clocks(self) -> tuple[float, float, float]:
-        """Return time, this thread's processor time, and its waiting time for a processor [s]."""
+        """Return time, processor time of this thread, and its time of waiting for a processor [s]."""
         return monotonic(), thread_time(), self._delays.read_s()
 
     def _forget(self) -> None:
@@ -114,7 +114,7 @@ class EventLoopMonitor(QObject):
 
 
 class _Delays:
-    """Reader of the time that this thread waited for a processor; zero if the system does not report it."""
+    """Reads for how long this thread waited for a processor; zero if the operating system does not say."""
 
     def __init__(self) -> None:
         try:
@@ -123,7 +123,7 @@ class _Delays:
             self._file = -1
 
     def read_s(self) -> float:
-        """Return the waiting time since the start of the thread [s]."""
+        """Return this waiting time since the start of the thread [s]."""
         if self._file < 0:
             return 0.0
         return 1e-9 * int(read_at(self._file, 100, 0).split()[1])

@@ -1,4 +1,4 @@
-"""The menus, the list of keys (F1), settings and information dialogs, and the abort key."""
+"""The menus, the list of keys (F1), dialogs for settings and information, and the abort key."""
 
 import subprocess
 import sys
@@ -38,27 +38,27 @@ if TYPE_CHECKING:
 
 
 def whole_path(folder: str) -> str:
-    """Return an absolute path; raises ValueError for a path relative to the working directory."""
+    """Return an absolute path; raise ValueError for a path relative to the working directory."""
     if not Path(folder).expanduser().is_absolute():
         raise ValueError(f"{folder!r} is not an absolute path; give {Path.home() / 'vibench'}, for example")
     return folder
 
 
 class Preferences(FrozenModel):
-    """The user's settings."""
+    """Settings of the user."""
 
     theme: Literal["light", "dark"]
-    """Colours of the window; exported figures are always light."""
+    """Colours of the window; exported figures always have light colours."""
     font_pt: Annotated[int, Field(ge=7, le=24)]
     """Font size."""
     displacements_in: Literal["automatic", "µm", "mm", "m"]
-    """Unit of displacements in the window, not in files and reports. Fields accept any unit."""
+    """Unit of displacements in the window, not in files and reports. Any unit may be typed into fields."""
     velocities_in: Literal["mm/s", "m/s"]
-    """Unit of velocities on axes, in tables and sentences."""
+    """Unit of velocities on axes, in tables and in sentences."""
     accelerations_in: Literal["m/s²", "g"]
     """Unit of accelerations; g is 9.80665 m/s²."""
     patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
-    """How long a test far from every limit may continue while the window does not answer."""
+    """How long a test far from all limits may continue if the window does not respond."""
     recordings_folder: Annotated[str, AfterValidator(whole_path)]
     """Folder of new recordings."""
 
@@ -116,11 +116,11 @@ class SettingsDialog(QDialog):
 
 
 LONGEST_S = 60
-"""Longest time to collect the versions [s]."""
+"""Longest time that collecting the versions may take [s]."""
 
 
 class Reader(QDialog):
-    """A text in a separate window, which does not block the main window; Ctrl+C copies the selection."""
+    """Window with a text, which does not block the main window; Ctrl+C copies the selection."""
 
     def __init__(self, title: str, parent: QWidget) -> None:
         super().__init__(parent)
@@ -138,7 +138,7 @@ class Reader(QDialog):
         self.resize(50 * em, 38 * em)
 
     def _fit(self, *_: object) -> None:
-        """Wrap lines of code also, so that the manual needs no horizontal scrolling."""
+        """Wrap also the lines of code, so that the manual needs no horizontal scrolling."""
         block = self.browser.document().begin()
         while block.isValid():
             wrapped = block.blockFormat()
@@ -148,7 +148,7 @@ class Reader(QDialog):
 
 
 def show_manual(parent: QWidget) -> Reader:
-    """Show the manual page on the window; its links lead to other pages."""
+    """Show the page of the manual about the window; its links lead to other pages."""
     reader = Reader("Manual", parent)
     try:
         page = shipped_folder("docs") / "gui.md"
@@ -171,7 +171,7 @@ def installation_text() -> str:
 
 
 def show_about(parent: QWidget, context: AppContext) -> Reader:
-    """Show the versions of this installation, which can be copied into a report."""
+    """Show the versions of this installation, as text that can be copied into a report."""
     reader = Reader("About vibench", parent)
     reader.browser.setPlainText("collecting the versions…")
 
@@ -180,7 +180,7 @@ def show_about(parent: QWidget, context: AppContext) -> Reader:
         reader.browser.copy()
 
     reader.buttons.addButton(
-        push_button("&Copy", "Copy all of it", copy), QDialogButtonBox.ButtonRole.ActionRole
+        push_button("&Copy", "Copy the whole text", copy), QDialogButtonBox.ButtonRole.ActionRole
     )
     job = context.background.ask(installation_text, reader.browser.setPlainText, context.fail)
     reader.finished.connect(lambda _result: job.drop())
@@ -192,9 +192,9 @@ ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
 
 
 class AbortKey(QObject):
-    """Filter that detects the abort key before any widget receives the key press.
+    """Event filter that detects the abort key before any widget receives it.
 
-    Unlike a shortcut, an event filter of the application also works while a modal dialog is open. The key is
+    Unlike a shortcut, a filter of the whole application also works while a modal dialog is open. The key is
     passed on to the focused widget, so that Esc still closes a dialog.
     """
 
@@ -206,7 +206,7 @@ class AbortKey(QObject):
         application.installEventFilter(self)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Emit `pressed` for an abort key, and let every event pass."""
+        """Emit `pressed` for an abort key; let every event pass."""
         kind = event.type()
         if kind is QEvent.Type.KeyRelease:
             self._last_seen = None
@@ -217,7 +217,7 @@ class AbortKey(QObject):
         return False
 
     def _is_new(self, event: QKeyEvent) -> bool:
-        """Return whether this is a new key press; Qt delivers one press several times."""
+        """Return whether this is another key press; Qt delivers one press several times."""
         seen = (event.timestamp(), event.key())
         is_new = seen != self._last_seen
         self._last_seen = seen
@@ -226,7 +226,7 @@ class AbortKey(QObject):
 
 @dataclass(frozen=True)
 class MenuAction:
-    """A menu entry: its menu, its key, and its description in the list of keys."""
+    """Menu entry: its menu, its key, and what the list of keys says about it."""
 
     menu: str
     text: str
@@ -246,12 +246,12 @@ OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("Menu key", "context menu of the focused plot or table"),
     ("F4, Alt+Down", "open the list of a choice"),
 )
-"""Keys without a menu entry; no single letter starts the drive."""
+"""Keys without a menu entry. No single letter starts the drive."""
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
 
 
 def key_text(actions: tuple[MenuAction, ...]) -> str:
-    """Return the keys as rows of a table in rich text."""
+    """Return the keys as a table in rich text."""
     keys = (
         *OTHER_KEYS,
         *((each.key, each.about or each.text.replace("&", "")) for each in actions if each.key),
@@ -271,7 +271,7 @@ def menu_actions(window: "Window") -> tuple[MenuAction, ...]:
         ),
         MenuAction("&File", "&Quit", window.close, "Ctrl+Q"),
         MenuAction("Edit", "&Undo", window.undo, "Ctrl+Z", "undo an edit of the test or campaign"),
-        MenuAction("Edit", "&Redo", window.redo, "Ctrl+Shift+Z", "make it again"),
+        MenuAction("Edit", "&Redo", window.redo, "Ctrl+Shift+Z", "redo an undone edit"),
         MenuAction("&Test", "&Check the bench", actions.check, "F6"),
         MenuAction("&Test", "Check as a new &reference", partial(actions.check, new_reference=True)),
         MenuAction("&Test", "&Arm the test", actions.arm_test, "Ctrl+Return", "arm"),

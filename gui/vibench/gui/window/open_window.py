@@ -22,7 +22,7 @@ SMALLEST_POINTS, LARGEST_POINTS = 7, 24
 
 
 def application(arguments: list[str]) -> QApplication:
-    """Return the application, with the same style and font on every machine."""
+    """Return the application, with the same style and font on every computer."""
     existing = QCoreApplication.instance()
     if existing is None:
         QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
@@ -35,7 +35,7 @@ def application(arguments: list[str]) -> QApplication:
 
 
 def _font() -> QFont:
-    """Return DejaVu Sans, which has all the characters needed and is installed with matplotlib."""
+    """Return DejaVu Sans, which has all characters that are needed and is installed with matplotlib."""
     folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
     for name in FONT_FILES:
         QFontDatabase.addApplicationFont(str(folder / name))
@@ -43,7 +43,7 @@ def _font() -> QFont:
 
 
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
-    """Show the window until it is closed and return the exit code; ``starting`` is the label to close."""
+    """Show the window until it is closed; return the exit code. ``starting`` is closed when it is shown."""
     app = application(["vibench"])
     stored = Settings(settings or default_settings_path())
     context = AppContext(stored)
@@ -52,7 +52,7 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
     font.setPointSize(int(stored.number(SettingKey.FONT, FONT_POINTS, SMALLEST_POINTS, LARGEST_POINTS)))
     app.setFont(font)
     window = Window(context, PAGES)
-    # Exclude existing objects from garbage collection, which would block the event loop.
+    # Exempt existing objects from garbage collection, which would block the event loop.
     gc.freeze()
     window.show()
     if starting is not None:
@@ -68,6 +68,6 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
 
 
 def load_ahead() -> None:
-    """Import the modules for the first prediction and curves, after the window was painted."""
+    """Import the modules for the first prediction and its curves, after the window was painted."""
     import_module("scipy.signal")
     getattr(import_module("vibench.analysis"), "MeasurementPrediction")  # noqa: B009

@@ -1,4 +1,4 @@
-"""Screenshots of every page, in both themes and several sizes, during a measurement."""
+"""Screenshots of every page during a measurement, in both themes and several sizes."""
 
 import gc
 import sys
@@ -32,11 +32,11 @@ from .window import PAGES, Window
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
-"""The smallest supported size and a common one; pictures of each size have their own folder."""
+"""Smallest supported size and a common one [pixels]; each size has a folder for its pictures."""
 PATIENCE_S = 3600.0
-"""Longest wait for the window to be ready [s]; long, because a busy computer is slow."""
+"""Longest wait for the window to be ready [s]; long, because the computer may be busy."""
 STILL_MS = 1200
-"""Waiting time until the frame rate in the status line is steady [ms]."""
+"""Waiting time after which the frame rate in the status line is steady [ms]."""
 _SMALLEST_FILE = 0
 SHOWN = Measurement(
     name="sweep",
@@ -46,7 +46,7 @@ SHOWN = Measurement(
         amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=20, settle_s=0.5, hold=Hold.DISPLACEMENT
     ),
 )
-"""The paper's sweep through the impacting region, ten times as fast."""
+"""The paper's sweep through the range with impacts, ten times as fast."""
 SHOWN_AT_S = 17.0
 SHOWN_TOO = Measurement(
     name="dwell",
@@ -57,24 +57,24 @@ SHOWN_TOO = Measurement(
 CAMPAIGN = "campaigns/paper.toml"
 MAP = {"columns": 61, "rows": 41}
 MOTION = (300.0, 20e-6)
-"""Frequency [Hz] and amplitude [m] of the motion beside the map."""
+"""Frequency [Hz] and amplitude [m] of the motion shown beside the map."""
 BRANCHES = {"start": 88.0, "stop": 101.0, "places": 3}
-"""Frequency range of the branches, around the first resonance."""
+"""Search for branches: frequency range [Hz] around the first resonance, and number of frequencies."""
 CHAIN = {"start_hz": 200.0, "stop_hz": 220.0, "step_hz": 10.0, "duration_s": 1.0, "settle_s": 1.0}
 
 
 def make_screenshots(bench: Path | None, folder: Path) -> int:
-    """Run a measurement, save pictures of the pages, and return the exit code."""
+    """Run a measurement, save pictures of all pages, and return the exit code."""
     application(["vibench"])
     with TemporaryDirectory(prefix="vibench_") as scratch:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
             settings.keep_text(SettingKey.BENCH, str(bench.resolve()))
-        # Unattended, because changing the theme and saving pictures takes longer than an attended run allows.
+        # Unattended, because changing the theme and saving pictures would exceed the time of an attended run.
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)
-        # As in `open_window`, so that the pictures match the real window.
+        # As in `open_window`, so that the pictures look like the real window.
         gc.freeze()
         window.resize(*SIZE)
         window.show()
@@ -107,7 +107,7 @@ def _open_and_check(window: Window) -> None:
 
 
 def _measure(window: Window, measurement: Measurement, during: Callable[[], None]) -> None:
-    """Arm and start a measurement; call ``during`` when the masses collide."""
+    """Arm and start a measurement; call ``during`` once the masses collide."""
     bridge, test = window.context.bridge, window.pages[TEST]
     assert isinstance(test, TestPage)
     test.form.show_value(measurement)
@@ -127,13 +127,13 @@ def _elapsed_s(window: Window) -> float:
 
 
 def _fill(window: Window) -> None:
-    """Simulate and map the default scenes, overlay them on the measurement, and load a campaign."""
+    """Simulate and map the default scenes, overlay them on the measurement, and open a campaign."""
     compare, simulation, queue, maps = (window.pages[name] for name in (COMPARE, SIMULATE, QUEUE, MAPS))
     assert isinstance(compare, ComparePage)
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
     assert isinstance(maps, MapsPage)
-    # Compute one after another, so that the displayed computing times are realistic.
+    # One after the other, so that the displayed computing times are realistic.
     for view, content in (
         (simulation, {}),
         (maps, MAP),
@@ -195,7 +195,7 @@ def _save(window: Window, folder: Path, name: str) -> None:
 
 
 def _write(picture: QImage, path: Path) -> None:
-    """Save an image with 32 shades per colour, which halves the file size without visible loss."""
+    """Save a picture with 32 shades per colour, which halves the file size without a visible loss."""
     picture = picture.convertToFormat(QImage.Format.Format_RGB32)
     shades = np.frombuffer(picture.constBits(), np.uint8) & 0xF8
     small = QImage(

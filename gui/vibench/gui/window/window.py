@@ -64,7 +64,7 @@ PAGES: Mapping[str, Callable[[AppContext], Page]] = {
     QUEUE: QueuePage,
     MAPS: MapsPage,
 }
-"""The pages in the order of the navigation bar; Ctrl and a number selects one."""
+"""Pages in the order of the navigation bar; Ctrl and a number selects one."""
 
 
 DONE = "✔"
@@ -92,15 +92,15 @@ class NavigationBar(QListWidget):
 
     @property
     def chosen_name(self) -> str:
-        """The selected page."""
+        """Name of the selected page; empty if there is none."""
         return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
 
     def choose(self, name: str) -> None:
-        """Select the page that is shown."""
+        """Select the page ``name``, which is shown already."""
         self.setCurrentRow(self._names.index(name))
 
     def show_done(self, done: dict[str, bool]) -> None:
-        """Tick the finished pages."""
+        """Show a tick beside each finished page."""
         if done == self._done and self.item(0).text():
             return
         self._done = done
@@ -118,7 +118,7 @@ class NavigationBar(QListWidget):
             self._fit()
 
     def _fit(self) -> None:
-        """Fit the width to the longest name in bold with a tick, as shown for a selected page."""
+        """Fit the width to the longest name in bold with a tick, as for a selected page."""
         bold = self.font()
         bold.setBold(True)
         metrics = self.fontMetrics()
@@ -134,9 +134,9 @@ class NavigationBar(QListWidget):
 SPAN_S = 1.0
 """Averaging time of the frame rate [s]."""
 MOST_DROPPED = 20
-"""Most files opened by one drop."""
+"""Largest number of files that are opened when dropped together."""
 TICK_MS = 50
-"""Interval between updates [ms]; a shorter interval would use a whole core, a longer one looks jerky."""
+"""Interval between updates [ms]; a shorter one would use a whole core, a longer one looks jerky."""
 
 
 class Window(QMainWindow):
@@ -177,7 +177,7 @@ class Window(QMainWindow):
         return page
 
     def show_page(self, name: str) -> None:
-        """Show a page."""
+        """Show the page ``name`` and store the choice."""
         page = self.pages.get(name)
         if page is None or page is self._stack.currentWidget():
             return
@@ -219,11 +219,11 @@ class Window(QMainWindow):
         super().closeEvent(event)
 
     def look_for_left_campaign(self) -> None:
-        """Take over the engine of a campaign that another window left, if there is one."""
+        """Take over an engine and its campaign that another window left running, if there is one."""
         self.context.background.ask(left_alone, self.context.bridge.adopt, self.context.fail)
 
     def _show_adopted(self, request: CampaignRequest) -> None:
-        """Show a campaign that was taken over as if it had been armed in this window."""
+        """Show a campaign that was taken over, as if it had been armed in this window."""
         self.context.selection.choose_rig(self.context.bridge.rig)
         self.context.selection.choose_campaign(request.campaign)
         self.context.say(
@@ -237,7 +237,7 @@ class Window(QMainWindow):
         self.show_page(RUN)
 
     def _how_to_close(self) -> Urgency | None:
-        """Ask how to close while a measurement runs; return None to keep the window open."""
+        """Ask how to close while a measurement runs; None means that the window stays open."""
         if not self.context.bridge.is_driving:
             return Urgency.END
         box = QMessageBox(QMessageBox.Icon.Question, "A measurement is running", "", parent=self)
@@ -293,7 +293,7 @@ class Window(QMainWindow):
             self._unthemed.pop(0)()
 
     def _retheme(self, theme: Theme) -> None:
-        """Change the colours: first the frame, then page by page, so that the window stays responsive."""
+        """Change the colours: first of the frame, then page by page, so that the window stays responsive."""
         self._prepare_theme(theme)
         in_next_pass(self, self._theme_next)
 
@@ -302,12 +302,12 @@ class Window(QMainWindow):
         assert isinstance(application, QApplication)
         application.setPalette(palette(theme))
         sheet = style_sheet(theme)
-        # Set part by part: a style sheet for the whole application would block the event loop for 0.3 s.
+        # Set part by part: one style sheet for the whole application would block the event loop for 0.3 s.
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         in_sight = self._stack.currentWidget()
         assert in_sight is not None
-        # Paint once at the end, not after each step.
+        # Paint once at the end instead of after every step.
         in_sight.setUpdatesEnabled(False)
         pages = sorted(self.pages.values(), key=lambda each: each is not in_sight)
         self._unthemed = [
@@ -322,7 +322,7 @@ class Window(QMainWindow):
 
     @property
     def is_themed(self) -> bool:
-        """Whether every page has its colours."""
+        """Whether all pages have the colours of the theme."""
         return not self._unthemed
 
     def _theme_next(self) -> None:
@@ -332,13 +332,13 @@ class Window(QMainWindow):
             in_next_pass(self, self._theme_next)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Focus the next step of the visible page, so that STOP does not have the focus."""
+        """Focus the next step on the visible page, because otherwise STOP would have the focus."""
         super().showEvent(event)
         self.navigation.setFocus()
         self.page.enter()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Apply a change of the font; parts with a style sheet need a new sheet for this."""
+        """Apply a change of the font; parts with a style sheet need a new style sheet for this."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.isVisible():
             self._retheme(self.context.theme)
@@ -352,7 +352,7 @@ class Window(QMainWindow):
         self.page.edits.redo()
 
     def open_path(self, path: Path) -> None:
-        """Open a file or folder on the page for its kind."""
+        """Open a file or folder on the page that opens its kind."""
         try:
             kind = file_kind(path)
         except ConfigurationError as error:
