@@ -36,7 +36,7 @@ def calm_at_1um_continuous(r: Reading) -> Values:
 
 @claim("3.1, Fig. 4(c)", "Maximum over the grid.", at_least("largest exponent", "1/s", SEVERE_PER_S))
 def severe_at_5um(r: Reading) -> Values:
-    """At 5 µm the exponent exceeds 100 per second at some frequency."""
+    """At 5 µm the largest exponent exceeds 100 per second."""
     return (np.nanmax(r.exponents(MODERATE_M)),)
 
 
