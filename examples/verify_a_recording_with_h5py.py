@@ -52,9 +52,9 @@ with h5py.File(sys.argv[1]) as file:
 
 changed = sorted(path for path in manifest.keys() | found.keys() if manifest.get(path) != found.get(path))
 if changed:
-    sys.exit(print("not as it was sealed:", ", ".join(changed)) or 1)
+    sys.exit(print("changed since it was sealed:", ", ".join(changed)) or 1)
 if len(sys.argv) > 2:
     key = Path(sys.argv[2]).read_bytes().strip()
     if marks.get("hmac_sha256") != hmac.new(key, text, hashlib.sha256).hexdigest():
         sys.exit(print("not signed with this key") or 1)
-print("as it was sealed:", marks["sha256"])
+print("unchanged since it was sealed:", marks["sha256"])

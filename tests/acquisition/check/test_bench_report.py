@@ -212,7 +212,7 @@ def test_a_bench_with_an_output_for_sines_is_checked_through_that_output(tmp_pat
     assert report["drive over setting"].number == pytest.approx(1.0, abs=2e-3)
     # One oscillator for both: the generator's would be 17 ppm off.
     assert abs(report["drive's clock"].number) < 5 * report["drive's clock"].uncertainty + 0.01
-    assert "time of one setting" not in [finding.name for finding in report.findings]
+    assert "time per command" not in [finding.name for finding in report.findings]
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def test_all_limit_violations_are_in_one_message(rig):
         )
     text = str(refused.value)
     for quantity in (
-        "the generator's setting",
+        "the generator voltage",
         "the highest frequency",
         "the ramp",
         "the amplifier's voltage",

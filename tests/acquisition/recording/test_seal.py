@@ -88,10 +88,10 @@ def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
     path = recorded()
     with open_recording(path) as recording:
         seal = recording.seal
-    assert example_says(path) == (0, f"as it was sealed: {seal}")
+    assert example_says(path) == (0, f"unchanged since it was sealed: {seal}")
     with h5py.File(path, "r+") as file:
         file["m0_velocity"].attrs["delay_s"] = 0.1
-    assert example_says(path) == (1, "not as it was sealed: /m0_velocity")
+    assert example_says(path) == (1, "changed since it was sealed: /m0_velocity")
 
 
 def test_only_the_signing_key_verifies_the_signature(recorded, key_file):

@@ -199,7 +199,7 @@ def _room(bench: Bench, folder: Path) -> Finding:
     there = next(each for each in (folder, *folder.resolve().parents) if each.exists())
     hours = shutil.disk_usage(there).free / bytes_per_s / _SECONDS_PER_HOUR
     return finding_of(
-        "room on the disk",
+        "free space on the disk",
         hours,
         "h",
         f"{-ROOM_H.well:g} h or more",
@@ -224,7 +224,7 @@ def _latency(bench: Bench) -> Finding:
     latency_s = bench.generator.measured_latency_s()
     verdict = LATENCY_S.verdict(latency_s)
     advice = "shorten generator.settle_s, or reduce other traffic on the bus: a stop takes this long too"
-    return finding_of("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
+    return finding_of("time per command", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
 
 
 def _noise(channel: Channel, row: Samples) -> Finding:

@@ -128,9 +128,9 @@ class Approach(StrEnum):
     """Start of the motion at each frequency; where several motions exist, it selects one."""
 
     REST = "from rest"
-    UP = "led upwards"
+    UP = "swept upwards"
     """The motion continues from the final state and phase at the next lower frequency."""
-    DOWN = "led downwards"
+    DOWN = "swept downwards"
 
 
 @dataclass(frozen=True)

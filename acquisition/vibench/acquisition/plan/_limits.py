@@ -177,7 +177,7 @@ def shortest_ramp_s(rig: Rig) -> float:
 def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     excitation = measurement.excitation
     yield LimitCheck(
-        "the generator's setting",
+        "the generator voltage",
         excitation.highest_amplitude_vpp,
         rig.generator.amplitude_limit_vpp,
         "Vpp",

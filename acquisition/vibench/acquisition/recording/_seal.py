@@ -46,7 +46,7 @@ QUICK_BYTES = 65_536
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Environment variable with the path of the key's file; used by all commands and programs."""
 SHORTEST_KEY = 16
-AS_SEALED = "as it was sealed"
+AS_SEALED = "unchanged since it was sealed"
 
 
 Manifest = dict[str, dict[str, str]]
@@ -238,7 +238,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
         require_reachable(group.file, error)
         return SealCheck(SealState.DAMAGED, f"it cannot be read to check its seal ({error})", "")
     if _sha256(text.encode()) != checksum:
-        return SealCheck(SealState.DAMAGED, "not as it was sealed", checksum)
+        return SealCheck(SealState.DAMAGED, "changed since it was sealed", checksum)
     return _signature_check(text, [signature, key_id], key, checksum)
 
 

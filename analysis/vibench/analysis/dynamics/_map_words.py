@@ -76,7 +76,7 @@ def map_caption(results: MapResults) -> str:
     sentences = [
         (
             f"{', '.join((_specimen_words(plan.specimen), *_fixed(plan)))}; {plan.accuracy.value}; motions "
-            f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} start(s)."
+            f"followed for up to {plan.periods} drive periods; starts per point: {len(plan.start_labels)}."
         ),
         f"{results.computed} of {plan.grid.size} points computed.",
     ]

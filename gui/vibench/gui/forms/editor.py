@@ -35,7 +35,7 @@ class Editor(Protocol):
         """Show a value from a file."""
 
 
-_LEFT_OPEN = "left open"
+_LEFT_OPEN = "default"
 """Placeholder of an empty optional field."""
 
 

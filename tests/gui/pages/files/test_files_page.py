@@ -144,10 +144,10 @@ def test_samples_that_differ_from_their_seal_get_a_warning(page, folder, tmp_pat
     with h5py.File(path, "r+") as file:
         file["m0_velocity"][...] = file["m0_velocity"][...] // 2
     page.open_path(path)
-    wait_for(lambda: "as it was sealed, samples not checked" in page._facts.sentence)
+    wait_for(lambda: "unchanged since it was sealed, samples not checked" in page._facts.sentence)
     wait_for(lambda: page._facts.sentence.startswith("✖ damaged: changed since sealing: data of /m0_velo"))
     page.open_path(folder / "whole.h5")
-    wait_for(lambda: "  ·  as it was sealed  ·  " in page._facts.sentence)
+    wait_for(lambda: "  ·  unchanged since it was sealed  ·  " in page._facts.sentence)
 
 
 def test_control_characters_in_names_have_no_effect(page, folder, wait_for, tmp_path):

@@ -157,7 +157,7 @@ class QueuePage(Page):
             "Keep the complete recordings of the folder; record only the missing ones",
             self._arm_missing,
         )
-        self.unattended = QCheckBox("Left alone")
+        self.unattended = QCheckBox("Unattended")
         self.unattended.setToolTip(
             "Ticked: the engine keeps limits, ramps and recordings without the window; use 'vibench watch' "
             "and 'vibench stop'.\nNot ticked: the drive ramps down when the window does not respond."

@@ -535,7 +535,7 @@ class TestPage(Page):
         grid = QWidget()
         cells = QGridLayout(grid)
         cells.addWidget(self.summary, 0, 0, 1, 2)
-        cells.addWidget(titled_box("What will be played", (self.plots, 1)), 1, 0, 1, 2)
+        cells.addWidget(titled_box("Planned drive signal", (self.plots, 1)), 1, 0, 1, 2)
         cells.addWidget(titled_box("Loads and limits", (self.limits, 1)), 2, 0)
         cells.addWidget(
             titled_box(
