@@ -247,8 +247,8 @@ class MotionBenchmark:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
-                    f"`quick` is sufficient: Response I scatters by {self.levels[0].response_i_scatter:.1%} "
-                    "between starts, whatever the level."
+                    "`quick` is sufficient: no level reduces the scatter of Response I between starts "
+                    f"({self.levels[0].response_i_scatter:.1%} at `quick`)."
                 )
 
     @property

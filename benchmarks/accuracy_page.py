@@ -27,8 +27,8 @@ from vibench.sim import Accuracy
 _HEAD = "| level | speed [s/s] | state error | Response I error | Response II error | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
 _LOTTERY_HEAD = (
-    "| scene | motion | Response I | its error | predicted share | share in further runs | in interval "
-    "| end of chaos, rate [1/s] | relative time |"
+    "| case | motion | Response I | relative error | predicted share | share in further runs | in interval "
+    "| chaos ends at the rate [1/s] | relative time |"
 )
 ABSENT = "–"
 
@@ -61,11 +61,11 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "- speed: simulated seconds per second of one core;",
         "- state error: the largest error of the six components, in the units above. The true state is an",
         "  independent solution: scipy's DOP853 at 1e-12, restarted at every contact;",
-        "- errors of the responses, relative to level `reference`;",
+        "- Response I and II errors: relative differences from level `reference`;",
         "- the largest Lyapunov exponent, with its standard error;",
         "- scipy's solvers at a relative tolerance of 1e-6: speed, and in brackets the state error.",
         "",
-        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after some",
+        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after",
         f"{first.solver_span_s:.1g} s.",
     )
     for each in benchmark.motions:
@@ -82,12 +82,12 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "",
         "## Sensitive dependence on the start",
         "",
-        "In these scenes, a tiny change of the initial conditions (the *start*) may lead to another final",
-        "motion. A prediction states the share of starts that reach each motion, with an interval. The table",
-        f"compares this share with {lotteries[0].starts} further runs, from starts a millionth of the gap",
-        "apart. Each run simulates at most 300 s, so a chaotic or undecided motion may still change.",
-        "`periodic, 1` repeats after one drive period. All intervals hold together in 19 of 20 cases, also",
-        "if a motion changes later. The relative time is that of the prediction divided by that of one run.",
+        "In the cases below, a tiny change of the initial conditions (the *start*) may lead to another final",
+        "motion. The table compares the predicted share of starts that reach each motion with",
+        f"{lotteries[0].starts} further runs, from starts a millionth of the gap apart.",
+        "Each run simulates at most 300 s, so a chaotic or undecided motion may still change.",
+        "`periodic, 1` repeats after one drive period. In 19 of 20 predictions, all intervals contain the",
+        "true shares, even if motions change later. Relative time: prediction over single run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -124,14 +124,13 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "",
         "## Transients, from rest",
         "",
-        "In a settled motion, integration errors decay. In a transient, a small error may grow a",
-        "thousandfold. The promise for the state is the promise above times this growth. Cells have four",
-        "numbers:",
+        "In a transient, a small error may grow a thousandfold. The promised state error is the one in",
+        "periodic motion, times this growth. Each cell has four numbers:",
         "",
         "1. state error after 0.1 s, against the independent solution;",
         "2. in brackets, the promised state error;",
-        "3. error of the responses in the second half of the run, relative to level `reference`;",
-        "4. in brackets, the stated error of the responses, from a stricter run.",
+        "3. relative difference of the responses in the second half of the run from level `reference`;",
+        "4. in brackets, the stated error of these responses, from a stricter run.",
         "",
         f"| motion | growth of a small error | {' | '.join(Accuracy)} |",
         "|---|---|---|---|---|",
@@ -205,7 +204,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
         yield from (
             "",
-            f"In these motions, a level reduces the error by less than a factor of {LEAST_GAIN:g}:",
+            f"In these motions, the error falls by less than a factor of {LEAST_GAIN:g} from level to level:",
             "",
             *lines,
         )
