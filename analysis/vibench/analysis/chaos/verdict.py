@@ -131,7 +131,7 @@ SMALL = 0.05
 SLOW = 0.5
 """Largest `slow_share` of the variance; if it is larger, the motion changes slowly."""
 _FEWEST_TURNS = 3.0
-"""Fewest turns of a closed curve in a record; fewer count as a slow change."""
+"""Minimum number of turns of a closed curve in a record; fewer count as a slow change."""
 _LARGEST_HUM = 0.1
 """Largest mains hum relative to the orbit; more may be motion at the mains frequency."""
 _LOW_PERIOD = 4
