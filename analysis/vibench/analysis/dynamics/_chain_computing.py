@@ -50,7 +50,7 @@ DECIBELS = 20.0 / math.log(10.0)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChainRun(Labelled):
-    """Results of one chain under one drive; arrays have one value per cell, counted from the base."""
+    """Results of one chain with one drive; arrays have one value per cell, counted from the base."""
 
     DOCUMENT: ClassVar = (
         "cells frequency_hz over_hz transmission transmission_error impacts observed_s energy_j "
@@ -207,7 +207,7 @@ SWEEP_PARTS = 120
 """Most frequencies of a swept transmission, each averaged over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
-"""Number of segments averaged for the transmission under a recorded motion."""
+"""Number of segments averaged for the transmission with a recorded motion."""
 X, VX = 0, 3
 
 

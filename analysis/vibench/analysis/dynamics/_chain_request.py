@@ -41,7 +41,7 @@ class ChainRequest(SpecimenChoice):
     drive: ChainDrive = ChainDrive.STEADY
     """Drive of the base: none, a steady sine, a sweep, or a recorded motion."""
     amplitude_m: PositiveFloat = 20e-6
-    """Amplitude of the base displacement under a sine."""
+    """Amplitude of the base displacement of a sine."""
     start_hz: PositiveFloat = 220.0
     """First frequency of a sine."""
     stop_hz: PositiveFloat = 220.0
