@@ -17,7 +17,7 @@ SMALLEST_RELATIVE_SD = 1e-6
 """Minimum relative standard deviation, so that weights stay finite for noise-free simulations."""
 LARGEST_DAMPING = 0.5
 RESOLVED_LINES = 4.0
-"""Least half-power bandwidth of a resolved mode, in noise bandwidths of a line."""
+"""Minimum half-power bandwidth of a resolved mode, in noise bandwidths of a line."""
 WELL_FITTED = 1.2
 """Reduced chi-square below which a higher degree of the background would only add uncertainty."""
 
@@ -93,7 +93,7 @@ _FAR_LINES = 12
 _NEAR = 0.05
 """Magnitude of the exponent below which a series is more accurate than the closed form."""
 _LEAST_NOISE = 0.02
-"""Least share of sensor noise in a line's variance, since ringing alone may give a singular matrix."""
+"""Minimum share of sensor noise in a line's variance, since ringing alone may give a singular matrix."""
 
 
 @dataclass(frozen=True)
@@ -444,7 +444,7 @@ def modal_fit(
         share = freedom / left.size
         beside = 2 * float(np.count_nonzero(about)) * share
         nearby = float(np.sum(squares[about])) / beside
-        # Errors by ringing also correlate with conjugates of other errors, which at most doubles the
+        # Errors due to ringing also correlate with conjugates of other errors, which at most doubles the
         # variance of a fitted value.
         widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])

@@ -60,7 +60,7 @@ class NoiseResponse(Labelled):
     )
 
     frequency_response: FrequencyResponse
-    """Requested estimate of the transmission; the default, referenced to the drive, has no bias by noise."""
+    """Requested estimate of the transmission; the default, referenced to the drive, is unbiased."""
     h1: FrequencyResponse
     h2: FrequencyResponse
     resonances: tuple[Resonance, ...]

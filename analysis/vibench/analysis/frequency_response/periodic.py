@@ -26,7 +26,7 @@ from .transmissibility import coherence, steady_relative_sd
 _SHORTFALL = 1e-3
 """Share of a period that may be missing at the end of a record; the record is continued periodically."""
 _WEAKEST_LINE = 1e-3
-"""Least amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
+"""Minimum amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
 _ITERATIONS = 8
 _CONVERGED = 1e-9
 """Relative change of the period at which iteration stops; the remaining error is below a tenth of it."""
@@ -138,9 +138,9 @@ def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
 
 
 _OVER_CHANCE = 8.0
-"""Least ratio of the scatter that a drift explains to the amount expected by chance."""
+"""Minimum ratio of the scatter that a drift explains to the amount expected by chance."""
 _MOST = 0.5
-"""Least share of the scatter beyond noise that a drift must explain."""
+"""Minimum share of the scatter beyond noise that a drift must explain."""
 
 
 _SMALL = 0.03
@@ -290,7 +290,7 @@ def _without_drift(
     off
         Relative deviations of the realisations, shape (realisations, lines).
     value, frequency_hz, noise_variance, sd
-        Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
+        Transmission, frequencies, complex variance due to noise, and relative standard deviation of the mean.
     """
     count = len(off)
     # A common shift of frequencies stretches the displacement ratio, which is value * frequency.
@@ -321,9 +321,9 @@ def _without_drift(
 
 
 _TOGETHER = 0.8
-"""Least share of the scatter that changes common to all lines must explain."""
+"""Minimum share of the scatter that changes common to all lines must explain."""
 _BEYOND_CHANCE = 1.25
-"""Least ratio of the explained share to the largest share expected for independent lines."""
+"""Minimum ratio of the explained share to the largest share expected for independent lines."""
 
 
 def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
@@ -337,7 +337,7 @@ def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
     off
         Relative deviations, shape (lines, realisations).
     by_noise
-        Relative complex variance by noise, shape (lines, 1).
+        Relative complex variance due to noise, shape (lines, 1).
     """
     freedom = off.shape[1] - 1
     variance = np.maximum(np.sum(np.abs(off) ** 2, axis=1, keepdims=True) / freedom, 1e-300)

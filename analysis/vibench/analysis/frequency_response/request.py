@@ -126,7 +126,7 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
 _SEGMENT_S = 4.0
 """Default segment of streamed noise [s]: lines 0.25 Hz apart resolve a bandwidth of 1 Hz."""
 _LEAST_SEGMENTS = 8
-"""Least number of segments by default; a short record gets shorter segments."""
+"""Minimum number of segments by default; a short record gets shorter segments."""
 _PROXY_SAMPLES = 4096
 """Window length for computing overlap correlations; it does not change the result."""
 

@@ -26,13 +26,13 @@ _REACH_BANDWIDTHS = 2.0
 _LEAST_LINES = 8
 """Minimum number of lines for a fit: 8 complex values determine 2 pole and up to 10 linear parameters."""
 _LEAST_RISE = 3.0
-"""Least height of a peak above the valley beside it, in standard deviations of the difference."""
+"""Minimum height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3
 """Maximum number of modes fitted to one peak."""
 _APART = (0.5, 1.5)
 """Initial spacing of poles side by side, in half widths."""
 _LEAST_GAIN = 25.0
-"""Least reduction of chi square that justifies another mode (four parameters). By chance it exceeds 19 once
+"""Minimum reduction of chi square that justifies another mode (four parameters). By chance it exceeds 19 once
 in a thousand cases."""
 _REACH_DAMPING = 4.0
 """Largest change of ln(damping ratio) in a fit."""

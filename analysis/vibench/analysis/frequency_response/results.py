@@ -13,7 +13,7 @@ from ..signals.quantity import Quantity, derivative_factor
 from ..tables import Labelled
 
 LEAST_COHERENCE = 0.1
-"""Least coherence of a significant line."""
+"""Minimum coherence of a significant line."""
 
 
 class Estimator(StrEnum):

@@ -21,7 +21,7 @@ _FEWEST_FREEDOM = 4.0
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
-"""Least variance or shape relative to the mean of its neighbours."""
+"""Minimum variance or shape relative to the mean of its neighbours."""
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
