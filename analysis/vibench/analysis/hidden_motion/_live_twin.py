@@ -162,7 +162,7 @@ class LiveMotion(Labelled):
     p: Reals
     """Relative displacement, NaN without a track [m]."""
     forecast: Forecast | None
-    """Forecast of p; only under a sine."""
+    """Forecast of p; only for a sine drive."""
     gaps_m: tuple[float, float]
     level: float
     """Level of the last block; 1 if only noise remains."""
