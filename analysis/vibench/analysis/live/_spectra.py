@@ -141,7 +141,7 @@ class LiveSpectra:
         ----------
         rows
             Row numbers of base acceleration and response, and optionally of the drive voltage, which gives an
-            estimate without bias by noise.
+            estimate without bias due to noise.
         quantity
             Quantity of the response channel.
         low_hz, high_hz
