@@ -149,7 +149,7 @@ def limits(results: CampaignResults) -> Iterator[str]:
         )
     if results.noise:
         yield (
-            "With collisions, the transmission under noise is the best linear approximation at that level, "
+            "With collisions, the transmission from noise is the best linear approximation at that level, "
             "not a property of the specimen. Bounds contain its scatter over realisations (95 % per line)."
         )
 
