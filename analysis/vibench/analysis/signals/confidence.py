@@ -7,7 +7,7 @@ from .arrays import Complexes, Reals
 
 DEFAULT_CONFIDENCE = 0.95
 _SMALLEST_DEGREES_OF_FREEDOM = 1e-3
-"""Least degrees of freedom, which keeps the quantile finite for few averages."""
+"""Minimum degrees of freedom, which keeps the quantile finite for few averages."""
 
 
 def relative_sd(coherence: Reals, n_eff: float) -> Reals:
