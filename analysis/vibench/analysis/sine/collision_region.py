@@ -12,15 +12,15 @@ from ..tables import Labelled
 from .sweep import SweptMotion
 
 _NOISE_FACTOR = 4.0
-"""Least ratio of residual to noise; the rms of hundreds of samples scatters by a few percent only."""
+"""Minimum ratio of residual to noise; the rms of hundreds of samples scatters by a few percent only."""
 _DISTORTION = 0.02
 """Largest residual of a smooth motion relative to order 1, from high harmonics of amplifier and shaker."""
 _RINGING = 2.0
-"""Least ratio of the residual to the residual simulated without contact in the same sweep."""
+"""Minimum ratio of the residual to the residual simulated without contact in the same sweep."""
 _TOO_FAST = 0.5
 """Residual relative to order 1 that collisions usually exceed; ringing above this can hide collisions."""
 _IMPACTS = 0.1
-"""Least ratio of orders 2 and 3 to order 1 that shows impacts; ringing off modes causes at most 0.05."""
+"""Minimum ratio of orders 2 and 3 to order 1 that shows impacts; ringing off modes causes at most 0.05."""
 _RING_CYCLES = 5_000.0
 """Cycles after which a mode with a damping ratio of 0.02 % has decayed to 1/500."""
 _ENOUGH = 0.25

@@ -132,7 +132,7 @@ def louder(silent: Background, sensor: Background) -> Background:
 
 _BLOCKS_OF_WINDOW = 10
 _LEAST_CYCLES = 4.0
-"""Fewest drive cycles in a block, so that its Hann window excludes other orders."""
+"""Minimum number of drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
 """Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""

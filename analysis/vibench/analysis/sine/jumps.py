@@ -17,7 +17,7 @@ _SIDE = 12
 """Number of intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""Least size of a jump in standard errors, since thousands of steps are tested with rough errors."""
+"""Minimum size of a jump in standard errors, since thousands of steps are tested with rough errors."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
@@ -182,7 +182,7 @@ def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, loga
 
 
 JUMP_FACTOR = 2.0
-"""Least ratio of Response II between two levels for a jump; for a linear specimen the ratio is 1."""
+"""Minimum ratio of Response II between two levels for a jump; for a linear specimen the ratio is 1."""
 
 _UNSTEADY = 0.05
 """Relative uncertainty of Response II above which a step may contain two motions; NaN counts as larger."""

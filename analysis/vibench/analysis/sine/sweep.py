@@ -35,7 +35,7 @@ _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
 _LEAST_SHARE = 0.5
-"""Least share of the channel's power within the drive's band."""
+"""Minimum share of the channel's power within the drive's band."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 
 
 _SAMPLES_PER_CYCLE = 24
-"""Least samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
+"""Minimum samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
 _BAND_BELOW = 0.25
 """High-pass for displacement relative to the lowest drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
