@@ -31,7 +31,7 @@ _ENDS = 2
 _PEAKED = 1.05
 """Ratio of Response I to Response II above which the motion in a step is not a sine."""
 _FEWEST_PERIODS = 20.0
-"""Fewest drive periods in a part, so that its maximum is the largest of many peaks."""
+"""Minimum number of drive periods in a part, so that its maximum is the largest of many peaks."""
 
 
 def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
