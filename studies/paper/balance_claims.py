@@ -123,7 +123,7 @@ def _lowest(r: Reading, amplitude_m: float) -> Reals:
 
 
 def _agreeing(r: Reading, amplitude_m: float) -> Values:
-    """Return the share of frequencies at which a balance solution is within 10 % of each response."""
+    """Return the share of frequencies at which a first-order solution is within 10 % of each response."""
     curve, solutions = r.level(amplitude_m, CONTINUOUS), _solutions(r, amplitude_m)
     return tuple(
         np.mean(

@@ -19,7 +19,7 @@ FIT_M = 1e-6
 """Indentation [m] at which continuous models are fitted to the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Starts other than rest: largest displacement over the gap, and the frequency that sets velocities [Hz]."""
+"""Initial states other than rest: largest displacement over the gap, and frequency for velocities [Hz]."""
 
 
 class ExponentsBy(StrEnum):
@@ -39,7 +39,7 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True)
 class Case(FigureOptions):
-    """Options for the measurement of claims."""
+    """Options with which claims are measured."""
 
     name: str = AS_CHOSEN
     sweep_amplitude_m: float = 5e-6
@@ -54,7 +54,7 @@ class Case(FigureOptions):
     changed: tuple[str, ...] = ()
     """Options that differ from the program's defaults."""
     draw: int = 0
-    """Number of the start: 0 is rest; others start a millionth of the gap away."""
+    """Number of the initial state: 0 is rest; other states are a millionth of the gap away."""
 
     def __post_init__(self) -> None:
         for what, value in (("a base amplitude", self.sweep_amplitude_m), ("an indentation", self.fit_m)):
@@ -86,7 +86,7 @@ class Case(FigureOptions):
         return super().specimen(self.fitted(contact))
 
     def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
-        """Return a study with the start of this case."""
+        """Return a study with the initial state of this case."""
         if self.draw:
             replaced["starts"] = (GivenStart(label=f"draw {self.draw}", state=self.start),)
         return super().study(tuple(map(self.fitted, models)), amplitudes_m, **replaced)
@@ -102,7 +102,7 @@ class Case(FigureOptions):
 
     @property
     def choices(self) -> str:
-        """The defaults of a page in words, with changed options."""
+        """The default options in words, followed by the changed options."""
         chosen = self.sentence.replace("Options:", "Defaults:")
         return f"{chosen} Changed: {'; '.join(self.changed)}." if self.changed else chosen
 

@@ -82,14 +82,14 @@ class Claim:
     measured_by: str
     """Method of measurement, in one sentence."""
     wanted: tuple[Expectation, ...]
-    """Requirements, all of which must be met."""
+    """Requirements; the claim holds if all of them are met."""
     measure: Callable[[Reading], Values]
     tried: tuple[Alternative, ...]
     """Alternatives to test in this order if the claim fails under the defaults."""
     remark: str
     """Comment on a failed claim, without numbers, because the page gives the measured ones."""
     draws: int
-    """Number of starts: several if the numbers depend on the final motion of a chaotic transient."""
+    """Number of initial states: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool
     """Whether the claim is also measured at every damping of the score."""
 
@@ -128,19 +128,19 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """The claim holds under the defaults for some starts only, which depends on chance."""
+    """With the defaults, the claim holds for some initial states only; which of them is chance."""
     HOLDS_UNDER = "holds under"
     FAILS = "does not hold"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The numbers of a claim under one case, from every start; rest comes first."""
+    """Numbers of a claim with the options of one case, for every initial state; rest comes first."""
 
     case: Case
     draws: tuple[tuple[float, ...], ...]
     met: int
-    """Number of starts for which the claim holds."""
+    """Number of initial states for which the claim holds."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -149,30 +149,30 @@ class Finding:
 
     @property
     def is_met(self) -> bool:
-        """Whether every start meets the claim."""
+        """Whether the claim holds for every initial state."""
         return self.met == len(self.draws)
 
     @property
     def is_met_in_part(self) -> bool:
-        """Whether the claim holds for some starts, but not for all."""
+        """Whether the claim holds for some initial states, but not for all."""
         return 0 < self.met < len(self.draws)
 
     def spread(self, number: int) -> tuple[float, float]:
-        """Return smallest and largest value of one number over all starts; NaN if one is missing."""
+        """Return smallest and largest value of one number over the initial states; NaN if one is missing."""
         values = [draw[number] for draw in self.draws]
         return float(np.min(values)), float(np.max(values))
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """All findings on a claim: under the defaults, then under the alternatives tested."""
+    """All findings on a claim: with the default options, then with the alternatives that were tested."""
 
     claim: Claim
     findings: tuple[Finding, ...]
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the claim holds, and how."""
+        """Whether the claim holds, and with which options."""
         if self.findings[0].is_met:
             return Verdict.HOLDS
         if self.findings[0].is_met_in_part:
@@ -186,7 +186,7 @@ class Judgement:
 
 
 def finding(claim: Claim, evidence: Evidence, case: Case) -> Finding:
-    """Measure a claim under one case, from every start.
+    """Measure a claim with the options of one case, from every initial state.
 
     An alternative that fails from rest is measured from rest only.
     Raises InvalidRequest when the number of measured values differs from the number of requirements.
@@ -208,7 +208,7 @@ def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 
 def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
-    """Measure a claim under a case; if it fails, under its alternatives until it holds under one of them."""
+    """Measure a claim with a case's options; if it fails, try its alternatives until one of them holds."""
     findings = [finding(claim, evidence, case)]
     for alternative in claim.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:

@@ -10,9 +10,9 @@ from .options import FigureOptions
 
 _MODELS = ("power:3", "power:5", "power:7", "power:3+5+7", "power:47")
 _REACH = 48.0 / 45.0
-"""Largest displacement shown, over the gap."""
+"""Largest displacement shown, relative to the gap."""
 _HIGHEST = 1.5
-"""Largest force shown, over the largest contact force."""
+"""Largest force shown, relative to the largest contact force."""
 
 
 def studies(_: FigureOptions) -> tuple[Study, ...]:

@@ -1,4 +1,4 @@
-"""Fig. 4: linear and colliding motion at 5 um: response, p, exponent, and motion at 260 Hz."""
+"""Fig. 4: linear and colliding motion at 5 um: response, p, exponent, and time signal at 260 Hz."""
 
 import numpy as np
 

@@ -7,7 +7,7 @@ from .options import FigureOptions
 from .responses import finish, responses
 
 GAPS_M = (5e-6, 15e-6, 30e-6, 45e-6, 60e-6)
-"""Gaps, our choice [m]; our copy of the paper's text does not give them."""
+"""Gaps [m]; chosen for this figure, because the text of the paper does not give them."""
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:

@@ -1,4 +1,4 @@
-"""Options for everything that the paper leaves open in its figures; stored with each figure."""
+"""Options for choices that the paper leaves open in its figures; they are stored with each figure."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
 """Largest damping time, more than fifteen times critical damping in the paper's third mode."""
 _LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
-"""Limits of the gap [m]: a thousandth of the weakest drive, and two hundred times the strongest drive."""
+"""Limits of the gap [m]: a thousandth of the smallest drive amplitude, and 200 times the largest."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 
@@ -54,7 +54,7 @@ class FigureOptions:
     window_s: float = 5.0
     """The paper's window: the last 5 s of 30 s from rest."""
     budget_s: float = 0.0
-    """Time for further starts; zero, because a point of the paper is one run."""
+    """Time for runs from further initial states; zero, because each point of the paper is one run."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:

@@ -1,4 +1,4 @@
-"""Data for the claims: studies, signals and sweeps under one case, each computed once."""
+"""Data for the claims: studies, signals and sweeps with the options of a case, each computed once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -49,7 +49,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Reading:
-    """Results of the simulation under one case."""
+    """Results of simulations with the options of one case."""
 
     evidence: Evidence
     case: Case
@@ -81,7 +81,7 @@ class Reading:
         return self.exponents_of(self.curve(amplitude_m, model, observe=WITH_EXPONENT), amplitude_m, model)
 
     def exponents_of(self, curve: Responses, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
-        """Return the exponents by the method of the case; exact ones where nothing collides."""
+        """Return the exponents by the method of the case; exact exponents where the masses do not collide."""
         if self.case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
             return curve.exponent_per_s
         specimen, settle_s = self.specimen(model), self.case.window_s

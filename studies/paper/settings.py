@@ -111,7 +111,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
 
 
 def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -> report.ReportTable:
-    """Return the claims that hold under each setting, from rest, without those that hold under all."""
+    """Return the claims that hold from rest with each setting, without claims that hold with all settings."""
     settings = [case, *(each.of(case) for each in SETTINGS), CLOSEST.of(case)]
     rows = []
     for claim in claims:

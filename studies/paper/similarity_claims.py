@@ -20,7 +20,7 @@ _HIGH_RATE = 0.8
 """High similarity rate; section 4 of the paper says "more than 80 %"."""
 _CURVE_POINTS = 200
 _DRAWS = 4
-"""Number of starts; the rates depend on the chaotic motion of each model, which differs between starts."""
+"""Number of initial states; they lead to different chaotic motions, on which the rates depend."""
 FITTED = (
     COMPARED_LOWER,
     change("compared", 600.0),
@@ -28,7 +28,7 @@ FITTED = (
     NARROWER_FIT,
     CLOSEST,
 )
-"""Choices of eq. 6, which need no further simulation, and the indentation of the fit."""
+"""Alternatives: choices in eq. 6, which need no further simulation, and the indentation of the fit."""
 _NAMES = ("n = 3", "n = 5", "n = 7", "n = 3+5+7")
 _BOTH = (at_least("increase for Response I", "%", 0.0), at_least("for Response II", "%", 0.0))
 
