@@ -1,4 +1,4 @@
-"""Cost and error of every accuracy level on known motions, for docs/accuracy.md.
+"""Measure cost and error of every accuracy level on known motions, for docs/accuracy.md.
 
 There is one motion of each kind, named by contact law and drive. Runs of the levels alternate, so that a busy
 machine slows all alike. Cost is processor time over simulated time. Errors are against
@@ -44,16 +44,16 @@ from vibench.sim.specimen.state import Floats
 from vibench.sim.study import software
 
 SEED = 4242
-"""Seed of the comparison starts; a prediction draws its starts with another seed."""
+"""Seed of the initial states for comparison; a prediction draws its initial states with another seed."""
 PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
-"""Kinds that count as equal, because the kind depends on how long a start was followed."""
+"""Kinds that count as equal, because they depend on how long a motion was followed."""
 SAME = 1e-3
 """Largest relative difference of Response I of equal periodic motions; predictions use the same limit."""
 
 
 @dataclass(frozen=True)
 class Lottery:
-    """A scene with sensitive dependence on the start: chance decides which motion is reached, or when."""
+    """A scene (specimen and drive) in which chance decides which motion is reached, or when."""
 
     about: str
     model: str
@@ -84,14 +84,14 @@ LOTTERIES = (
 
 @dataclass(frozen=True)
 class StatedShare:
-    """A motion with the share that the prediction states, and its share among many more starts."""
+    """A motion with its stated share of initial states, and its share among many more initial states."""
 
     motion: FoundMotion
     of_many: float
 
     @property
     def is_covered(self) -> bool:
-        """Whether the stated interval contains the share among many starts."""
+        """Whether the stated interval contains the share among many initial states."""
         return self.motion.share.low <= self.of_many <= self.motion.share.high
 
 
@@ -103,15 +103,15 @@ class LotteryFigures:
     answered: ScenePrediction
     shares: tuple[StatedShare, ...]
     starts: int
-    """Number of comparison starts."""
+    """Number of initial states for the comparison."""
     cost: float
-    """Processor time of the prediction, over that of a prediction without a budget for other starts."""
+    """Processor time of the prediction, over that without a budget for other initial states."""
 
 
 def measure_attractors(lottery: Lottery, starts: int) -> LotteryFigures:
-    """Predict a scene, and compare the stated shares with those of many more starts.
+    """Predict a scene, and compare the stated shares with those of many more initial states.
 
-    Raises ArithmeticError when the motion does not depend sensitively on the start.
+    Raises ArithmeticError when the motion does not depend sensitively on the initial state.
     """
     scene = lottery.scene
     solve_scene(replace(scene, budget_s=0.0))
@@ -192,7 +192,7 @@ TRANSIENTS = tuple(
 )
 """Motions observed from rest, while a small change grows a thousandfold."""
 LEAST_GAIN = 2.0
-"""Factor by which the error must fall for a level to count as better than the one before."""
+"""Factor by which the error must fall for a level to count as better than the level before."""
 
 
 @dataclass(frozen=True)
@@ -208,9 +208,9 @@ class LevelFigures:
     """Relative error against the reference level; None in chaos."""
     response_ii_error: float | None
     response_i: float
-    """Response I; in chaos, the mean over all starts."""
+    """Response I; in chaos, the mean over all initial states."""
     response_i_scatter: float
-    """Relative standard deviation of Response I over the starts in chaos; 0 otherwise."""
+    """Relative standard deviation of Response I over the initial states in chaos; 0 otherwise."""
     exponent_per_s: float
     exponent_error_per_s: float
     """Statistical standard error of the exponent, which no accuracy level reduces."""
@@ -253,7 +253,7 @@ class MotionBenchmark:
 
     @property
     def without_gain(self) -> tuple[tuple[LevelFigures, LevelFigures], ...]:
-        """Pairs of a level that is no better than the level before it, and that level."""
+        """Pairs of a level and the level before it, if the later level is no better."""
         return tuple(
             (level, before)
             for before, level in pairwise(self.levels)
@@ -297,7 +297,7 @@ class TransientFigures:
 
     @property
     def promise(self) -> float:
-        """Promised error of the level here: that of a settled motion, times the growth of a small change."""
+        """Promised error: that of the level for a settled motion, times the growth of a small change."""
         return self.accuracy.promise * max(1.0, self.growth)
 
 
@@ -323,7 +323,7 @@ Solver = Literal["DOP853", "LSODA", "Radau"]
 SOLVERS: tuple[Solver, ...] = ("DOP853", "LSODA", "Radau")
 SOLVER_RTOL, SOLVER_ATOL = 1e-6, 1e-12
 SETTLE_S = 8.0
-"""Thirty times the slowest decay of the specimen without contact."""
+"""Settling time [s]: thirty times the slowest decay time of the specimen without contact."""
 PERIODS_SEEN = 100
 REPEATS = 3
 TIMED_S = 10.0
@@ -349,7 +349,7 @@ class Thoroughness:
     solver_span_s: float = 0.05
     """Time span for general solvers, which are slow [s]."""
     starts: int = 200
-    """Number of comparison starts of a scene with sensitive dependence on the start."""
+    """Number of initial states for comparison, of a scene with sensitive dependence on them."""
 
 
 def measure_accuracy(
@@ -398,7 +398,7 @@ def measure_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmar
 
 
 def measure_transient(motion: Motion) -> tuple[TransientFigures, ...]:
-    """Measure the error of every level on a motion from rest, beside the error that it states."""
+    """Measure the error of every level on a motion from rest, and the error that the prediction states."""
     rest = np.zeros(6)
     truth = independent_state(motion.specimen, motion.drive, TRANSIENT_S, rest)
     duration = FixedDuration(TRANSIENT_S, 0.5 * TRANSIENT_S)
@@ -457,7 +457,7 @@ def _run_time_s(run: Callable[[], object]) -> float:
 
 
 def _costs(motion: Motion, start: Floats) -> dict[Accuracy, float]:
-    """Return the least processor time over simulated time of each level, without the first round."""
+    """Return the shortest processor time over simulated time of each level, without the first round."""
     best = dict.fromkeys(LEVELS, math.inf)
     for repeat in range(REPEATS + 1):
         for level in LEVELS:
@@ -472,7 +472,7 @@ def _follow(motion: Motion, level: Accuracy, start: Floats, span_s: float) -> Fl
 
 
 def _responses(motion: Motion, level: Accuracy, start: Floats) -> Floats:
-    """Return Responses I and II from one start, in chaos from several; shape (starts, 2)."""
+    """Return Responses I and II from one initial state, in chaos from several; shape (states, 2)."""
     rng = np.random.default_rng(1)
     starts = STARTS if motion.regime is Regime.CHAOTIC else 1
     found = []

@@ -75,7 +75,7 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
 
 
 def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
-    """Yield the section on stated shares, beside the shares of many starts."""
+    """Yield the section that compares stated shares with the shares of many initial states."""
     if not lotteries:
         return
     yield from (

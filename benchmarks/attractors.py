@@ -1,7 +1,7 @@
-"""Test whether the stated shares of attractors cover those of 400 starts.
+"""Test whether the stated shares of attractors cover those among 400 initial states.
 
-Random scenes are drawn until the requested number has more than one motion. Each of these is then followed
-from other starts, drawn with another seed, until it settles, for at most 300 s.
+Random scenes (specimen and drive) are drawn until the requested number has several motions. Each of these is
+then followed from other initial states, drawn with another seed, until it settles or 300 s have passed.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
-    """Return whether the stated interval of each motion contains its share among many starts.
+    """Return whether the stated interval of each motion contains its share among many initial states.
 
     For a motion that was not found, the interval is zero to the unseen share. Lasting chaos and chaos so far
     count as one kind, because the kind depends on the simulated time.

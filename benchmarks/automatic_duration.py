@@ -1,10 +1,10 @@
 """Test whether `--duration auto` finds the motion in which a run of 300 s ends.
 
 Scenes are drawn at random, and near an edge of chaos. The long run rounds differently, because it is cut at
-other instants; where the motion depends sensitively on the start, it is another draw. A prediction agrees if
-kind, period and responses do. With sensitive dependence, it agrees if the long run ends in one of the motions
-that it names. "chaotic so far" and "undecided" are counted separately. For quasi-periodic scenes, the stated
-errors that cover the long run are counted.
+other instants; if the motion depends sensitively on its initial state, it is another random sample. A
+prediction agrees if kind, period and responses agree. With sensitive dependence, it agrees if the long run
+ends in one of the motions that it names. "chaotic so far" and "undecided" are counted separately. For
+quasi-periodic scenes, the stated errors that cover the long run are counted.
 """
 
 import argparse
@@ -31,7 +31,7 @@ class Compared:
 
     verdict: str
     cost: float
-    """Processor time, over that of the prediction without a budget for other starts."""
+    """Processor time, over that of the prediction without a budget for other initial states."""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Measured backbones of three modes on the virtual rig, over three decades of level, beside the model's.
+"""Measure backbones of three modes on the virtual rig over three decades of level; compare with a model.
 
     python benchmarks/backbones.py [--mode 1] [--spring hardening] [--levels 49] [--periods 150] [--seed 1]
     python benchmarks/backbones.py --superharmonic 2 --spring bumpers [--levels 13]

@@ -1,4 +1,4 @@
-"""Cost of a chain over its length, and against the engine of one cell: ``python benchmarks/chain.py``.
+"""Measure the cost of chains, also against the engine for one cell: ``python benchmarks/chain.py``.
 
 Times are the shortest processor time of a few runs. Every cell starts in motion, so that all have impacts.
 """
@@ -85,7 +85,7 @@ def report_lengths(accuracy):
 
 
 def report_one_cell():
-    """Compare a chain of one cell with its specimen, from rest and settled: time, and whether they agree."""
+    """Compare a chain of one cell with its specimen, from rest and settled: time and final state."""
     print("one cell over its specimen, 2 s, standard: time of responses, of motion (the same motion?)")
     for contact in LAWS:
         for damping_time_s in DAMPINGS_S:
@@ -112,7 +112,7 @@ def one_cell_over_specimen(specimen, drive, state):
 
 
 def report_watching():
-    """Print how much observing responses adds to the cost of a motion, for every contact law."""
+    """Print by how much observing responses increases the cost of a motion, for every contact law."""
     print("responses over the motion alone, 1 s, standard, every cell struck at the start")
     for contact in LAWS:
         row = []

@@ -1,10 +1,10 @@
-"""Cost of a seal, compared with finishing and with reading a recording.
+"""Measure the cost of a recording's seal, compared with finishing and with reading the recording.
 
     python benchmarks/cost_of_seals.py [--minutes 10]
 
 Four channels of noise at 51.2 kS/s are recorded as fast as the disk allows. Finishing is timed with the seal,
-and without it (then only the samples are read back). A quick check, a whole check and plain reading of all
-samples are also timed. The shortest of three runs counts.
+and without it (then only the samples are read back). A quick check and a whole check of the seal, and plain
+reading of all samples, are also timed. The shortest of three runs counts.
 """
 
 import argparse

@@ -37,7 +37,7 @@ from vibench.acquisition.rig import Rig, load_rig
 
 ROOT = Path(__file__).resolve().parent.parent
 LOOK_S = 5.0
-"""Interval between two looks at processes and recordings [s]."""
+"""Interval between two observations of processes and recordings [s]."""
 BLOCKS = 3
 """Number of alternations between dwells and noise in a campaign."""
 SETTLED = 0.25
@@ -204,7 +204,7 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
 
 
 def endure(options: argparse.Namespace, folder: Path) -> Watch:
-    """Run for the requested time, with regular looks."""
+    """Run for the requested time, and observe at regular intervals."""
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": options.pace})})
     recordings = folder / "recordings"

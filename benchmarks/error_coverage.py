@@ -2,13 +2,13 @@
 
 ``python benchmarks/error_coverage.py --seed S --scenes 400 [--shard 1/4] [--levels standard] [--lanes]``.
 Scenes start from rest; contact law, damping time, gaps, frequency and amplitude are drawn from the ranges
-below. Some scenes observe a short transient, the others the end of a longer run. Each is predicted at every
-level, and solved by `plain_motion` with two tolerances. The difference of these two is its own error, which
-is allowed on top of the stated error.
+below. Some scenes observe a short transient, all others the end of a longer run. Each is predicted at every
+level, and solved by `plain_motion` with two tolerances. The difference of these two results is the error of
+`plain_motion`, which is allowed in addition to the stated error.
 
 Three kinds of scene are counted separately. *Settled*: the motion repeats throughout the window. *Transient*:
 it does not, but both tolerances agree. *Scattering*: they differ, because small changes grow too much. The
-prediction is then one sample of several, and is compared with several independent samples, from starts a
+prediction is then one random sample, and is compared with several independent samples, from initial states a
 billionth of the gap apart. Each sample counts as a fraction of a scene.
 
 "Covered" is the mean over the four responses, each with its own error; "all by one" tests all four against
@@ -51,7 +51,7 @@ NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 TIGHT, LOOSE = 1e-13, 1e-11
 """Two relative tolerances of the independent code; the difference of their results is its own error."""
 FORGOTTEN = 1e-3
-"""Relative difference of the two results above which the motion depends sensitively on the start."""
+"""Relative difference of the two results above which the motion depends sensitively on its start."""
 RESOLVED = 5e-11
 """Smallest relative error of the independent code; its peaks of a known motion are 4e-11 too high."""
 DRAWS = 5
@@ -162,7 +162,7 @@ def answer_of(found):
 
 
 def times_off(truth, answer, stated):
-    """Return the difference of each sample in units of the stated error, shape (draws, 4)."""
+    """Return the error of ``answer`` against each sample, in units of the stated error, shape (draws, 4)."""
     return np.maximum(np.abs(truth.answers / answer - 1.0) - truth.own, 0.0) / np.maximum(stated, 1e-300)
 
 

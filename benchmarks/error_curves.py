@@ -1,9 +1,9 @@
-"""Cost of a requested error: three figures and the first section of docs/accuracy.md.
+"""Measure the cost of a requested error: three figures and the first section of docs/accuracy.md.
 
 ``python benchmarks/error_curves.py --markdown docs/accuracy.md`` draws three figures: error over time for the
 paper's four cases; similarity of continuous models over their computing time; error of a mean in chaos over
-window and starts. Times are processor time of one core. Numbers stored in images/NAME.csv are used again;
-remove the file to measure again.
+window and number of initial states. Times are processor time of one core. Numbers stored in images/NAME.csv
+are used again; remove the file to measure again.
 """
 
 import argparse
@@ -162,7 +162,7 @@ def models_figure(rows):
 
 
 def chaos_rows():
-    """Return the stated error of the mean in chaos, as rows of window, starts, error and time."""
+    """Return the stated error of the mean in chaos: rows of window, number of initial states, error, time."""
     drive, rows = Harmonic(PAPER_HZ, AMPLITUDES_M[1]), []
     specimen = gong2025()
     for window_s in WINDOWS_S:

@@ -2,9 +2,9 @@
 
 ``python benchmarks/error_targets.py --seed S --count 200 [--shard 1/4] --save FILE``. Each scene is predicted
 with five requested errors. The true value is computed at level *reference*: for a periodic motion after a
-long run, for one start in a named window from the same window. With sensitive dependence, it is the mean over
-other starts at *quick*. If the true value is less than a hundred times more exact than the stated error, its
-own error is allowed too. An existing file is continued; ``--sum FILES`` combines several.
+long run, for one initial state and a stated window from the same window. With sensitive dependence, it is the
+mean over other initial states at *quick*. If the error of the true value exceeds a hundredth of the stated
+error, it is allowed too. An existing file is continued; ``--sum FILES`` combines several.
 """
 
 import argparse
@@ -53,7 +53,7 @@ TRUE_S = 1.0
 LONG_S = 60.0
 """Time after which a damped motion of these scenes has settled [s]."""
 SHORT, SMALL = 0.1, 1e-3
-"""With sensitive dependence, errors up to SMALL get this share of the time, as no mean reaches them."""
+"""With sensitive dependence, no mean reaches errors up to SMALL; they get the share SHORT of the time."""
 KINDS = ("periodic", "named window", "start lost")
 HEADING, LAST = "## Requested errors", "## Other solvers"
 INTRODUCTION = """Random predictions with a requested error fall into three groups:
@@ -107,7 +107,7 @@ def truth_of(scene, found):
     for push in pushes(scene.specimen, scene.drive, TRUE_STARTS, 99):
         if len(drawn) >= FEWEST_TRUE and time.process_time() - began > TRUE_S:
             break
-        # No accuracy level changes a mean in chaos, and quick gives ten times as many starts.
+        # No accuracy level changes a mean in chaos, and quick allows ten times as many initial states.
         run = FollowedRun(scene.specimen, scene.drive, Accuracy.QUICK.tolerance, push)
         run.follow(first / frequency_hz)
         seen = [

@@ -3,8 +3,8 @@
 ``python benchmarks/extremes.py --seed S --cases 150 [--shard 1/4] [--targets]``. Each case draws a specimen
 and a drive from the ranges below, writes the specimen as a file, and calls ``vibench predict``. A prediction
 is correct when the exit code is 0 and the four responses and their error are finite. A refusal is correct
-when the exit code is 1 and standard error holds one sentence without a traceback. Other results are listed,
-and the script ends with exit code 1. A case that takes too long ends it at once.
+when the exit code is 1 and standard error has one sentence without a traceback. Other results are listed, and
+the script ends with exit code 1. A case that takes too long ends it at once.
 """
 
 import argparse

@@ -51,7 +51,7 @@ class FastSweep:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Analysis of a sweep, beside the true impacts."""
+    """Result of the analysis of a sweep, with the true numbers of impacts."""
 
     seed: int
     rate_hz_per_s: float

@@ -1,4 +1,4 @@
-"""Transcript and duration of a new user's first commands on the virtual rig in real time.
+"""Print transcript and duration of a new user's first commands on the virtual rig in real time.
 
 python benchmarks/first_day.py > transcript.txt
 """

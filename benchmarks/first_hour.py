@@ -1,4 +1,4 @@
-"""Transcript of a new user's first hour, from installation to a measurement, an analysis and a figure.
+"""Print the transcript of a new user's first hour: installation, measurement, analysis and figure.
 
 python benchmarks/first_hour.py [--demo] > transcript.txt
 

@@ -76,7 +76,7 @@ class Count:
     draws: int
     above_noise: int
     refused: int
-    """Number of refused fits: of draws above the noise, or for a right model of all."""
+    """Number of refused fits: among draws above the noise, or for a right model among all draws."""
     named_first: int
     """Number of refused fits that name the right culprit first."""
     intervals: int
@@ -340,7 +340,7 @@ def uneven_gaps(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
 
 
 def _is_told(effect: float, sd: float) -> bool:
-    """Return whether an effect is refused with near certainty at a limit of 3.3 standard deviations."""
+    """Return whether a fit with a limit of 3.3 standard deviations refuses this effect almost certainly."""
     return effect > (3.3 + 1.65) * sd
 
 

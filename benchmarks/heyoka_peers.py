@@ -1,4 +1,4 @@
-"""heyoka on the motions of work_precision.py: a plain formulation, and one tuned for heyoka.
+"""Solve the motions of work_precision.py with heyoka, in plain variables and in variables tuned for it.
 
 The plain formulation has the equations of motion, and an event for each stop and direction. The tuned one
 suits a Taylor series. In contact, the penetration is w^2 and time runs as w, so that Hertz's force is k w^3
@@ -16,9 +16,9 @@ HAIR_M = 1e-11
 """Additional depth at which contact begins: the series of depth^1.5 does not converge at zero."""
 LANES = 8
 APART = 1e-6
-"""Distance between the starts of the lanes, as a share of the gap."""
+"""Distance between the initial states of the SIMD lanes, relative to the gap."""
 SPEED = 2000.0
-"""Unit of speeds, divided by the gap [1/s]; half or twice the value makes no difference."""
+"""Unit of speeds divided by the gap [1/s]; half or twice this value makes no difference."""
 ROOT_M = 1e-3
 """Unit of w [m^0.5]: the value of w at the largest depth of an impact at 0.1 m/s."""
 

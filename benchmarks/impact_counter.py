@@ -1,9 +1,9 @@
-"""Share of the true impacts that the live view counts.
+"""Measure the share of the true impacts that the live view counts.
 
     python benchmarks/impact_counter.py
 
-The specimen is simulated under sines, so that every impact is known. The velocity of m0 gets the noise of the
-virtual rig's vibrometer, and is passed to the counter in blocks of 50 ms, as in a run.
+The specimen is simulated with sine drives, so that every impact is known. The velocity of m0 gets the noise
+of the virtual rig's vibrometer, and is passed to the counter in blocks of 50 ms, as in a run.
 """
 
 import numpy as np

@@ -112,7 +112,7 @@ def independent_state(
 def _phase(
     rates: Rates, place: Place, law: Law, time_s: float, state: Floats, until_s: float, tolerance: float
 ) -> tuple[float, Floats, int | None]:
-    """Integrate until a phase ends; return its time, state and which end, or None at the end of the run."""
+    """Integrate until a phase ends; return time, state, and which end it is (None at the end of the run)."""
     solver = _solver(rates, time_s, state, until_s, tolerance)
     while solver.status == "running":
         before_s, before = solver.t, solver.y

@@ -1,4 +1,4 @@
-"""Effect of a change of the analysis on sound recordings: withheld results, and growth of bounds.
+"""Compare two versions of the analysis on the same recordings: withheld results, and growth of bounds.
 
     python benchmarks/kept_answers.py make FOLDER --count 200 --seed 1 --shard 1/4   # record on random rigs
     python benchmarks/kept_answers.py answers FOLDER --save before.json              # once with each version

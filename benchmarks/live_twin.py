@@ -1,4 +1,4 @@
-"""Cost and lag of the live twin, in a measurement on the virtual rig in real time.
+"""Measure cost and lag of the live twin, in a measurement on the virtual rig in real time.
 
     python benchmarks/live_twin.py                     # a chaotic dwell; its gaps widen by 1 um in the middle
     python benchmarks/live_twin.py --duration 300 --level 2 --widen 0

@@ -1,4 +1,4 @@
-"""Cost of one frame of a live view: 4 channels at 51.2 kS/s, 20 frames a second, 2 s in view.
+"""Measure the cost of one frame of a live view: 4 channels at 51.2 kS/s, 20 frames a second, 2 s in view.
 
     python benchmarks/live_view.py
 

@@ -1,4 +1,4 @@
-"""Speed and memory of the analysis of a long recording, against scipy on the whole arrays.
+"""Compare speed and memory of the analysis of a long recording with scipy on the whole arrays.
 
 Run as ``python benchmarks/long_recording.py [MINUTES]``. The recording has 4 channels at 51.2 kS/s and is
 written by vibench: streamed noise through a resonator, with converter noise on every channel. Each of the two

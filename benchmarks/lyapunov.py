@@ -1,4 +1,4 @@
-"""Cost of Lyapunov exponents, and the paper's Figure 10: ``python benchmarks/lyapunov.py --help``.
+"""Measure the cost of Lyapunov exponents; compute Figure 10: ``python benchmarks/lyapunov.py --help``.
 
 Cost is the ratio to the same run without a tangent; both are timed in turn, and the shortest time counts. The
 amplitudes of the figure are those of the paper's four cases. The paper does not state the frequencies; here

@@ -1,11 +1,11 @@
-"""Test the shares that a basin map states against independent starts, and measure the cost of maps.
+"""Test the shares that a basin map states with independent initial states; measure the cost of maps.
 
-`basin` draws random starts from the rectangle of a basin map, and compares the motions they reach with the
-stated shares. `map` computes a map with the given number of points, and prints processor time, time to the
-first picture, points computed, and the estimate made before; with `--one-by-one` without SIMD lanes. `lanes`
-follows random motions in SIMD lanes and one by one, and prints the time per impact on one core and the error
-of both; with heyoka too, if installed. Then it settles points of a map in both ways. It counts the points
-that reached another motion, and those at which several starts agree.
+`basin` draws random initial states from the rectangle of a basin map, and compares the motions they reach
+with the stated shares. `map` computes a map with the given number of points, and prints processor time, time
+to the first picture, points computed, and the estimate made before; with `--one-by-one` without SIMD lanes.
+`lanes` follows random motions in SIMD lanes and one by one, and prints the time per impact on one core and
+the error of both; with heyoka too, if installed. Then it settles points of a map in both ways. It counts the
+points that reached another motion, and those at which several initial states agree.
 """
 
 import argparse
@@ -33,7 +33,7 @@ FIELDS = ("x_m", "y_m", "z_m", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s")
 
 
 def drawn_scene(plan: Map, rng: np.random.Generator):
-    """Return the scene of a random start in the rectangle of the map."""
+    """Return the scene of a random initial state in the rectangle of the map."""
     state = []
     for name in FIELDS:
         value = getattr(plan, name)
@@ -43,7 +43,7 @@ def drawn_scene(plan: Map, rng: np.random.Generator):
 
 
 def basin(asked: argparse.Namespace) -> int:
-    """Compare the shares of a map with independent starts; return the number of differences."""
+    """Compare the shares of a map with independent initial states; return the number of differences."""
     results = open_map(asked.map)
     rng = np.random.default_rng(asked.seed)
     scenes = [drawn_scene(results.plan, rng) for _ in range(asked.starts)]
@@ -111,7 +111,7 @@ def cost(asked: argparse.Namespace) -> int:
 
 
 ROUNDS = 5
-"""Number of rounds, both ways in turn; the shortest time of each counts."""
+"""Number of rounds, in each of which both methods run in turn; the shortest time of each counts."""
 WANDERED_S = 1.0
 """Simulated time before a motion is timed [s]."""
 COMPARED_S = 0.01
@@ -151,7 +151,7 @@ def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | N
 
 
 def ns_per_impact(follow, runs: list[FollowedRun], periods: list[int]) -> float:
-    """Follow motions in one way, and return the time per impact [ns]."""
+    """Follow motions by one method, and return the time per impact [ns]."""
     began_s = time.thread_time()
     found = follow(runs, periods)
     return 1e9 * (time.thread_time() - began_s) / sum(each.impacts for each in found)
@@ -219,7 +219,7 @@ def peer(runs: list[FollowedRun]) -> None:
 
 
 def labels(asked: argparse.Namespace) -> int:
-    """Settle random points of a map in both ways; return 1 if more motions differ than by chance.
+    """Settle random points of a map by both methods; return 1 if more motions differ than by chance.
 
     The differences by chance are counted one by one, from starts a millionth of a gap away.
     """

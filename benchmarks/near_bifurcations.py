@@ -1,4 +1,4 @@
-"""Test whether predictions near a bifurcation still hold minutes later.
+"""Test whether predictions near a bifurcation are still true minutes later.
 
     python benchmarks/near_bifurcations.py --count 100 --seed 1 [--shard 1/4] [--save FILE.json]
 

@@ -1,4 +1,4 @@
-"""Model of a control loop whose observer includes the stops, beside the usual loop whose observer does not.
+"""Compare the model of a control loop whose observer includes the stops with the usual loop without them.
 
     python benchmarks/observed_stops.py [--latency 3e-4] [--shifted 2e-7]
 
@@ -6,8 +6,8 @@ For the paper's motions with impacts behind their fold (base 1 um), and the rig 
 prints the largest multiplier over a period of table, specimen and control law together. *Linear* is the usual
 law, whose Kalman filter predicts without stops. *Constant* predicts with the slope of the stop force along
 the motion, with the same gain. *Riccati* also updates the gain along the period, as an extended Kalman filter
-does. With ``--shifted`` [m], both assume a p that is larger by this value. Deviations are linearised; the
-result holds for small ones.
+does. With ``--shifted`` [m], both assume a p that is larger by this value. Deviations are linearised, so the
+result is valid for small deviations.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Time to open and draw a recording of half a gigabyte, against reading whole channels.
+"""Measure the time to open and draw a recording of half a gigabyte, against reading whole channels.
 
     python benchmarks/overview.py [MINUTES] [FOLDER]
 

@@ -1,4 +1,4 @@
-"""Tables of docs/paper.md: ``python benchmarks/paper_tables.py``, which takes minutes.
+"""Print the tables of docs/paper.md: ``python benchmarks/paper_tables.py``, which takes minutes.
 
 The tables show where linear motion reaches the gap, exponents at 5 um around two resonances, and how textbook
 methods change the energy of an impact and the exponent at 260 Hz. Options are those of `vibench reproduce`.

@@ -1,4 +1,4 @@
-"""Planned over actual processor time of predictions, while the cost ledger learns from them.
+"""Measure planned over actual processor time of predictions, while the cost ledger learns from them.
 
 ``python benchmarks/planned_costs.py --seed S --count 200 [--save FILE]`` draws random scenes of all contact
 laws as `error_targets.py` does, plans and runs each, and learns from it. The plans are evaluated again after

@@ -1,13 +1,13 @@
-"""Published measurements of control-based continuation, compared with the values that their authors state.
+"""Analyse published measurements of control-based continuation; compare with the authors' values.
 
     python benchmarks/published_branches.py [FOLDER --rate 5000]
 
 The script imports limit cycles of an airfoil in wind, held at the University of Bristol, with an import
 mapping (source and licence: tests/analysis/exchange/flutter_rig/README.md). For each it prints frequency,
-amplitude of the heave over five periods at a time (mean, least and largest), and how invasive the control
-was: the fundamental of control target less response, over that of the response. Beside them are the authors'
-amplitude, measured over five periods before the samples were kept, and the largest heave less its mean, which
-their script computes from the samples. With a FOLDER, the complete published files are used.
+amplitude of the heave over five periods at a time (mean, smallest, largest), and how invasive the control
+was: the fundamental of control target minus response, over that of the response. Beside them are the authors'
+amplitude, measured over five periods before the samples were stored, and the largest heave minus its mean,
+which their script computes from the samples. With a FOLDER, the complete published files are used.
 """
 
 import argparse
@@ -41,7 +41,7 @@ class HeldCycle:
     stated_m: float
     largest_m: float
     invasive: float
-    """Mean fundamental of control target less response, over that of the response."""
+    """Mean fundamental of control target minus response, over that of the response."""
     criterion: float
     """Criterion of the authors' search, the root of the difference of both squares [V]."""
     stated_criterion: float

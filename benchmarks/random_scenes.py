@@ -1,4 +1,4 @@
-"""Random scenes over all models, damping times, gaps, frequencies and amplitudes of the benchmarks."""
+"""Random scenes (specimen and drive): models, damping times, gaps, frequencies and amplitudes."""
 
 from dataclasses import replace
 
@@ -73,7 +73,7 @@ FEW = MotionSearch(places=2, starts=2)
 def near_bifurcation(random: np.random.Generator) -> tuple[BranchEvent, Scene]:
     """Return a random bifurcation, and a scene near it that starts from rest or near its motion.
 
-    The relative distance of the frequency is 1e-6 to 1e-3, that of the start 1e-6 to 1e-1.
+    The relative distance of the frequency is 1e-6 to 1e-3, that of the initial state 1e-6 to 1e-1.
     """
     while True:
         scene = random_scene(random)

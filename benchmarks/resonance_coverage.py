@@ -6,8 +6,8 @@
 
 A scene has one mode with a given damping ratio, window and sensor noise, or two or three close modes, or the
 modes of the paper's specimen. `--random` adds random scenes of two or three close modes. Each row shows how
-many modes were found, and how often k = 2 contains frequency, damping and peak. A mode that is reported as
-explained, but more than five standard deviations off, counts as wrong.
+many modes were found, and how often k = 2 contains frequency, damping and peak. A mode whose fit is reported
+as explained, but is more than five standard deviations off, counts as wrong.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Draw texts of the project by a seed, for a reader who marks those that must be read twice.
+"""Draw random texts of the project by a seed, to find texts that must be read twice.
 
     python benchmarks/sample_texts.py --seed 7 --count 200
     python benchmarks/sample_texts.py --seed 7 --count 200 --since COMMIT     # commit titles after it

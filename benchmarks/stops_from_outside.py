@@ -8,9 +8,9 @@
 This process runs the virtual rig in real time, and a witness that watches the generator's output. Another
 process drives the rig through the same interfaces as real instruments: `vibench measure` on a separate
 terminal, the window (offscreen), or a process that attends an engine. Each cell of the test runs one such
-process. It reaches the state, the condition is created, the cause happens, and the witness waits for silence.
-Time counts from Enter, because `vibench stop` is the installed command. Cells are drawn by the seed and
-written to ``--save`` one by one; stored cells are not measured again. Linux only; two conditions need a C
+process. The run reaches the state, the condition is created, the cause happens, and the witness waits for
+silence. Time counts from Enter, because `vibench stop` is the installed command. Cells are drawn by the seed
+and written to ``--save`` one by one; stored cells are not measured again. Linux only; two conditions need a C
 compiler.
 """
 
@@ -71,7 +71,7 @@ STANDSTILL_S = 1.5
 """Allowed time to silence a stopped run that no longer advances [s]."""
 DEAD_MAN_S = 1.0
 LATE_S = 0.3
-"""Interval between looks of the witness on a busy computer [s]."""
+"""Interval between checks by the witness on a busy computer [s]."""
 SHIM = Path(__file__).with_name("shim_of_conditions.c")
 ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted")
 """Conditions that may end a run before its stop, or prevent its recording from being finished."""

@@ -1,4 +1,4 @@
-"""States of a motion once a drive period, by the public `integrate`. SI units."""
+"""States of a motion once per drive period, by the public `integrate`. SI units."""
 
 from numpy.typing import ArrayLike
 

@@ -1,14 +1,14 @@
-"""Stability and phase of subharmonic motions of the paper's specimen and similar specimens.
+"""Print stability and phase of subharmonic motions of the paper's specimen and similar specimens.
 
     python benchmarks/subharmonics.py [--laws stops p3] [--levels 1e-6 2e-6] [--starts 12] [--seed 1]
 
 For each contact law, level of the base and period of two and three drive periods, motions of that period are
-searched for. Random starts cover a band around two or three times the first mode, and each branch is followed
-along frequency. For the stable parts, the script prints frequencies, amplitude of m0 at the subharmonic, and
-the phase for a phase-locked loop. This phase is the phase of the subharmonic times the number of drive
-periods, minus the phase of the base. A quarter of a period behind for three drives (three eighths for two) is
-what Volvert and Kerschen (J. Sound Vib. 511, 2021) call phase resonance. A loop needs a stable point there,
-and a phase that falls as the frequency rises.
+searched for. Random initial states cover a band around two or three times the first mode, and each branch is
+followed along frequency. For the stable parts, the script prints frequencies, amplitude of m0 at the
+subharmonic, and the phase for a phase-locked loop. This phase is the phase of the subharmonic times the
+number of drive periods, minus the phase of the base. A quarter of a period behind for three drives (three
+eighths for two) is what Volvert and Kerschen (J. Sound Vib. 511, 2021) call phase resonance. A loop needs a
+stable point there, and a phase that falls as the frequency rises.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Four channels at 51.2 kS/s for minutes of rig time, through nidaqmx into a recording: speed and memory.
+"""Record four channels at 51.2 kS/s for minutes of rig time, through nidaqmx: speed and memory.
 
     python benchmarks/sustained_recording.py [MINUTES]
 

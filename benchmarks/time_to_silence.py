@@ -245,7 +245,7 @@ CAUSES = {
     "viewer gone": Cause(Laboratory.forget_viewer, 0.55 + BLOCK_S + ABORT_S + MARGIN_S),
     "limit passed": Cause(
         lambda laboratory: laboratory.virtual.faults.turn_amplifier_gain(40.0),
-        # Counted from the change of gain; while the drive ramps up, the limit is passed later.
+        # Time counts from the change of gain; while the drive ramps up, it exceeds the limit later.
         RAMP_S + 2 * BLOCK_S + ABORT_S + MARGIN_S,
     ),
     "samples lost": Cause(lose_samples, BLOCK_S + MARGIN_S),

@@ -1,4 +1,4 @@
-"""Speed and memory of the averaged spectra against scipy on the whole array.
+"""Compare speed and memory of the averaged spectra with scipy on the whole arrays.
 
 Run as ``python benchmarks/transmission.py [MINUTES]``. Each of the two programs runs in a separate process,
 so that its peak memory can be measured. The recording (4 channels at 51.2 kS/s) is in a file, as in the

@@ -163,7 +163,7 @@ def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> I
 
 
 def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
-    """Compare sweeps with specimens that are wrong by a few bounds of a fit."""
+    """Compare sweeps with simulated specimens whose parameters are wrong by a few times a fit's bounds."""
     true = gong2025()
     m0, m1, m2 = true.masses
     wrong = {

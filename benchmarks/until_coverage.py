@@ -1,4 +1,4 @@
-"""Test how often bounds contain the truth when recordings end by them, and how much time this saves.
+"""Test how often bounds contain the truth if they decide when a recording ends, and the time saved.
 
     python benchmarks/until_coverage.py --rule                           # the rule alone, on Gaussian records
     python benchmarks/until_coverage.py --count 60 --seed 1 --shard 1/2 --save part1.json
@@ -7,7 +7,7 @@
 
 The virtual rig makes one recording of each scene at its longest time, in simulated time and with noisier
 sensors. The rule of `vibench.acquisition.run.until` is then applied to its beginning, at the times of the
-looks and with the analysis that runs during a measurement. Thus each recording ends as if the analysis took
+checks and with the analysis that runs during a measurement. Thus each recording ends as if the analysis took
 no time. The requested uncertainties are those predicted from the description of the rig for several times.
 Linear motion of random rigs is compared with closed forms. The paper's specimen in chaos is compared with the
 mean of the other recordings, whose scatter widens the bound. A shard that was ended continues from its file.
@@ -60,7 +60,7 @@ LONGEST_S = 32.0
 PIECE_S = 0.5
 WEAK_VPP = 0.03
 SHARES = (0.1, 0.3, 0.5, 0.7)
-"""Positions between first look and longest time, on a logarithmic scale, for which requests are chosen."""
+"""Positions between first check and longest time, on a logarithmic scale, for which requests are chosen."""
 NOISIER = (10.0, 100.0)
 """Range of the factor on the noise of the sensors."""
 FARTHEST_HZ = 5.0
@@ -68,7 +68,7 @@ FARTHEST_HZ = 5.0
 
 @dataclass(frozen=True)
 class Ended:
-    """One quantity of one recording that was ended by one requested uncertainty."""
+    """One quantity of one recording that ended when one requested uncertainty was reached."""
 
     scene: int
     kind: str
@@ -88,7 +88,7 @@ class Ended:
 
 
 def looks_s(first_s: float, longest_s: float, piece_s: float) -> list[float]:
-    """Return the times of the looks, as `UntilWatch` chooses them [s]."""
+    """Return the times of the checks, as `UntilWatch` chooses them [s]."""
     due_s, found = first_s, []
     for number in range(1, round(longest_s / piece_s) + 1):
         if number * piece_s >= due_s * (1 - 1e-9):
@@ -146,7 +146,7 @@ def record(rig: Rig, plan: Measurement, path: Path) -> None:
 
 
 def scene(number: int, seed: int) -> Iterator[Ended]:
-    """Record once, and end this recording by several requested uncertainties."""
+    """Record once, and end this recording at several requested uncertainties."""
     kind, rig, plan = drawn(number, seed)
     is_noise = kind == "noise"
     first_s, piece_s = (FEWEST_REALISATIONS * 1.0, 1.0) if is_noise else (plan.until.shortest_s, PIECE_S)

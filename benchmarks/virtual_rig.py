@@ -1,4 +1,4 @@
-"""Speed of the virtual rig in rig seconds per second, with four channels at 51.2 kS/s.
+"""Measure the speed of the virtual rig in rig seconds per second, with four channels at 51.2 kS/s.
 
 Run ``python benchmarks/virtual_rig.py``. Each line is the best of three runs of the simulated world alone
 (generator, amplifier, shaker, specimen, sensors, converter). The last line is with real pyvisa and nidaqmx.

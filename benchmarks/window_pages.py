@@ -1,4 +1,4 @@
-"""Processor time of the window's thread on the Files, Compare and Simulate pages.
+"""Measure the processor time of the window's thread on the Files, Compare and Simulate pages.
 
     python benchmarks/window_pages.py RECORDING.h5
 

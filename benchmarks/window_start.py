@@ -1,4 +1,4 @@
-"""Time from the command `vibench gui` to the first painted window, with files in the disk cache.
+"""Measure the time from `vibench gui` to the first painted window, with files in the disk cache.
 
     python benchmarks/window_start.py [TIMES]
 

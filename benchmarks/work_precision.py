@@ -123,7 +123,7 @@ def solver_of(name, prepare, cost_s=COST_S):
 
 
 def least_cost(solver, tolerance, start):
-    """Return the least processor time over simulated time; None if the solver fails."""
+    """Return the shortest processor time over simulated time; None if the solver fails."""
     best, spent = math.inf, 0.0
     for _ in range(REPEATS):
         cost = solver.cost(tolerance, start, solver.cost_s)
@@ -249,7 +249,7 @@ def with_numbalsoda(motion, method, tolerance, start, span_s):
 
 
 def cost_at(works, error):
-    """Return the cost of a solver at an error, interpolated in logarithms; None below the least error."""
+    """Return the cost of a solver at an error, interpolated in logarithms; None below its smallest error."""
     front, best = [], math.inf
     for work in sorted(works, key=lambda each: each.error):
         if work.cost < best:
