@@ -163,7 +163,7 @@ class Evidence:
 
     drive_hz: float
     periods: int
-    """Number of drive periods tested."""
+    """Number of drive periods used for the tests."""
     spread: float
     """Scatter of the points relative to the size of the orbit."""
     noise: float

@@ -44,7 +44,7 @@ class Neighbours:
     point: Integers
     neighbour: Integers
     distance: Reals
-    """Distance of each pair, shape (pairs,)."""
+    """Distance of the two points of each pair, shape (pairs,)."""
 
 
 def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> Neighbours:
@@ -110,14 +110,14 @@ class Divergence:
     """Mean logarithm of the distance of initial neighbours, step by step."""
 
     logarithm: Reals
-    """Mean ln(distance), shape (steps + 1,)."""
+    """Mean ln(distance) of all pairs after each step, shape (steps + 1,)."""
     size: float
     """Logarithm of the typical distance of two points of the motion."""
     first: int
     last: int
     """First and last step of the fitted line; equal if there were too few steps for a line."""
     exponent: float
-    """Slope [1/step]; NaN without a line."""
+    """Slope of the fitted line [1/step]; NaN if no line was fitted."""
     sd_exponent: float
     """Scatter of the slope over tenths of the record."""
     pairs: int
@@ -307,7 +307,7 @@ class SurrogateTest:
 
     @property
     def rejects_linear_noise(self) -> bool:
-        """Return whether linear noise is rejected."""
+        """Return whether the test is valid and rejects linear noise."""
         is_lowest = self.p <= 1 / (len(self.surrogates) + 1)
         return self.is_valid and is_lowest and self.margin >= self.least_margin
 
