@@ -33,7 +33,7 @@ class CurveOrigin(StrEnum):
 
 
 class CurveKind(StrEnum):
-    """Quantity of a curve."""
+    """Quantity that a curve shows."""
 
     TRANSMISSIBILITY = "transmission"
     RESPONSE_I = "Response I"
