@@ -32,7 +32,7 @@ class LineEvent:
     DOCUMENT: ClassVar = "kind frequency_hz amplitude_m"
 
     kind: str
-    """fold, period doubling, Neimark-Sacker, symmetry breaking or grazing."""
+    """Kind: fold, period doubling, Neimark-Sacker, symmetry breaking or grazing."""
     frequency_hz: float
     amplitude_m: float
     index: int
@@ -82,7 +82,7 @@ class BranchLine(Labelled):
 
     @property
     def points(self) -> int:
-        """Number of points."""
+        """Number of points on the branch."""
         return len(self.frequency_hz)
 
     @property

@@ -71,7 +71,7 @@ class BranchRequest(SpecimenChoice):
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4
     """Longest period to search, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
-    """Seed of the random states."""
+    """Seed of the random initial states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
     """When the amplitude varies: follow the phase resonance of the mode between these frequencies [Hz]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
@@ -140,7 +140,7 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def search(self) -> MotionSearch:
-        """Settings of the search."""
+        """Settings of the search for motions."""
         return MotionSearch(
             places=self.places,
             starts=self.starts,

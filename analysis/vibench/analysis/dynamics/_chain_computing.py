@@ -85,7 +85,7 @@ class ChainRun(Labelled):
     """Displacement x of m0 in every cell, shape (n, cells): over the last periods of a steady sine; under
     other drives, the RMS over equal stretches of the run."""
     impact_time_s: Reals
-    """Times of the contacts within `time_s`."""
+    """Times of the contacts within the range of `time_s`, shape (contacts,)."""
     impact_cell: NDArray[np.int64]
     outcome: str
     elapsed_s: float = 0.0
@@ -122,7 +122,7 @@ class ChainAnswer(Labelled):
 
     @property
     def wave_numbers(self) -> Reals:
-        """Phase from unit to unit [rad]."""
+        """Phase shift of a wave from one unit to the next [rad], shape (WAVES,)."""
         return np.linspace(0.0, np.pi, WAVES)
 
     @cached_property

@@ -62,7 +62,7 @@ class ChainRequest(SpecimenChoice):
     """Requested relative error of transmissions under a steady sine, 0.01 or "1 %"; sets accuracy and
     times."""
     time_s: TargetTime | None = None
-    """Time for each run under a steady sine, 2 or "2 s"; one minute by default."""
+    """Computing time of each run under a steady sine, 2 or "2 s"; one minute by default."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
