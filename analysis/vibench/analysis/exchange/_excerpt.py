@@ -31,7 +31,7 @@ class Excerpt:
     channels: tuple[ChannelHeader, ...]
     start: int
     stop: int
-    """One past the last sample."""
+    """Index one past the last sample."""
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ class LaidPart:
     segment: Segment
     start: int
     stop: int
-    """One past the last sample."""
+    """Index one past the last sample."""
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ class ImportMapping(FrozenModel):
     """Specimen, if it is not the paper's specimen."""
     calibration_valid_days: PositiveInt | None = None
     confirmations: dict[str, str | float] = Field(default_factory=dict)
-    """Remarks for the report."""
+    """Confirmed settings and remarks for the report, keyed by name."""
 
     @model_validator(mode="after")
     def _has_a_rate(self) -> Self:

@@ -156,7 +156,7 @@ class SourceChannel:
 
     @property
     def rates_hz(self) -> tuple[float, float]:
-        """Bounds of the sample rate [Hz]."""
+        """Bounds of the sample rate [Hz]; equal if the rate is exact."""
         exact = self.sample_rate_hz
         return (self.rate_bounds_hz or (0.0, inf)) if exact is None else (exact, exact)
 
