@@ -61,7 +61,7 @@ class CollisionNumbers:
 
     @property
     def determined(self) -> tuple[FoundParameter, ...]:
-        """Parameters that the motion determines."""
+        """Parameters for which the motion gives a value with bounds."""
         return tuple(each for each in self.parameters if each.is_determined)
 
     @property

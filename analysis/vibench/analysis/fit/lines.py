@@ -32,7 +32,7 @@ LEAST_DAMPING_TIME_S = 1e-8
 """Start value of the damping time for a specimen described without damping [s]."""
 CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
-"""Reference frequency of the channels' phases."""
+"""Frequency at which the channels' phases are stated [Hz]."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
 """Factors on all natural frequencies for further starting points of the search."""
 _STEP = 1e-6
@@ -82,7 +82,7 @@ class Freedom:
 
 @dataclass(frozen=True, eq=False)
 class Descended:
-    """Result of a fit."""
+    """Result of a fit to spectral lines."""
 
     specimen: Specimen
     logarithms: Reals
@@ -121,7 +121,7 @@ class Lines:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom of the fit."""
         return 2 * self.frequency_hz.size - len(self.free) - CHANNEL_PHASES
 
     @property
@@ -211,7 +211,7 @@ def fit_lines(lines: Lines) -> Descended:
     usual = Freedom()
     best = _from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:
-        # The start may be wrong by a turn of the phase: restart from stiffer and softer specimens.
+        # The starting point may be wrong by a turn of phase: restart from stiffer and softer specimens.
         others = [_from(lines, usual, lines.start + _stiffer(lines, scale)) for scale in SCALES]
         best = min([best, *others], key=lambda each: each.cost)
     if np.isinf(best.cost):

@@ -56,7 +56,7 @@ SHOWN = {
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A parameter with its interval."""
+    """A fitted parameter with its interval."""
 
     OWN_UNITS: ClassVar = dict.fromkeys(("value", "low", "high", "sd", "nominal"), "{0.unit}")
     DOCUMENT: ClassVar = "value low high sd bench=nominal"

@@ -41,7 +41,7 @@ class SpecimenFit(Labelled):
     covariance: Reals
     """Covariance of the logarithms of the fitted parameters, shape (n, n), in the order of ``values``."""
     lines: int
-    """Number of lines used."""
+    """Number of spectral lines that were fitted."""
     reduced_chi_square: float
     """Reduced chi square, about 1 if the model explains the lines; includes the estimated scatter."""
     limit: float
@@ -54,7 +54,7 @@ class SpecimenFit(Labelled):
 
     @property
     def fits(self) -> bool:
-        """Whether the model explains the lines."""
+        """Whether the model explains the spectral lines."""
         return self.reduced_chi_square <= self.limit
 
     def drawn(self, rng: np.random.Generator) -> Specimen:
