@@ -224,7 +224,7 @@ _FINE_POINTS = 401
 _STEP = 1e-6
 _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
-"""Maximum steps of a fit."""
+"""Maximum number of steps of a fit."""
 _STEADY_AVERAGES = 49.0
 """Equivalent number of averages of a scatter smoothed over neighbouring lines."""
 _LEAST_LINES_ABOUT = 8

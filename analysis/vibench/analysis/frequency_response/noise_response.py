@@ -70,13 +70,13 @@ class NoiseResponse(Labelled):
     periodic: PeriodicFrequencyResponse | None
     """Result for periodic noise, with the sources of scatter; None for other noise."""
     used_s: float
-    """Averaged time [s]."""
+    """Total duration of the averaged data [s]."""
     left_out: int
     """Number of realisations or segments that are incomplete or have lost or overloaded samples."""
     lost_samples: int
-    """Lost samples during the noise."""
+    """Number of samples lost during the noise."""
     overloaded_samples: int
-    """Samples during the noise with a channel near full scale."""
+    """Number of samples during the noise at which a channel was near full scale."""
     unit: str = "1"
     """Unit of the transmission; kg for a force."""
 

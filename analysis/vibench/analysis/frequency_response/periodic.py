@@ -45,7 +45,7 @@ class Repetition:
     sd_samples: float
     """Standard deviation of the period due to noise of the drive channel."""
     periods: int
-    """Whole periods in the record."""
+    """Number of whole periods in the record."""
 
 
 def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetition:
@@ -174,7 +174,7 @@ class Drift:
 
     @property
     def text(self) -> str:
-        """Description of the drift."""
+        """Description of the drift in words."""
         drifts = {
             "the gain of the channels": self.gain_share,
             "the specimen's frequencies": self.frequency_share,

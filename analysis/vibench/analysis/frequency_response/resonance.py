@@ -260,7 +260,7 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        # One pole fitted to two modes may end far from both, so also split the pole at its start.
+        # One pole fitted to two modes may end far from both, so also split its starting value.
         split = (_split_poles(each[worst : worst + 1], 2) for each in (poles, starts[0]))
         starts = [np.vstack((rest, two.reshape(2, 2))) for two in chain.from_iterable(split)]
     return best

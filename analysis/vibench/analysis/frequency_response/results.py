@@ -51,7 +51,7 @@ class FrequencyResponseSettings:
 
     @property
     def segment_s(self) -> float:
-        """Length of a segment, or of a period."""
+        """Length of a segment, or of a period [s]."""
         return self.segment_samples / self.sample_rate_hz
 
 
@@ -75,7 +75,7 @@ class FrequencyResponse(Labelled):
     sd_phase_rad: Reals
     """Standard deviation of the phase [rad]."""
     half_width: Reals
-    """Relative half width of the bounds."""
+    """Relative half width of the bounds of the magnitude."""
     coherence_significance: float
     """Coherence that independent noises exceed with probability 1 - ``settings.confidence``."""
     resolution_hz: float
