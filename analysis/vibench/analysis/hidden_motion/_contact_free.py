@@ -56,9 +56,9 @@ class FreeImpacts(Labelled):
     }
 
     samples: Reals
-    """Centre of the contact, in samples of the motion."""
+    """Centre of each contact, in samples since the start of the motion."""
     sides: Reals
-    """-1 at the lower stop, +1 at the upper stop."""
+    """Side of each impact: -1 at the lower stop, +1 at the upper stop."""
     impulses: Reals
     """Magnitude of the impulse on m1 [N s]."""
     p: Reals
@@ -351,11 +351,11 @@ class Collisions(Labelled):
     """Start of contact, in samples of the motion."""
     durations_s: Reals
     sides: Reals
-    """-1 at the lower stop, +1 at the upper stop."""
+    """Side of each contact: -1 at the lower stop, +1 at the upper stop."""
     impulses: Reals
     """Magnitude of the impulse on m1 [N s]."""
     penetrations_m: Reals
-    """Largest penetration during each contact."""
+    """Largest penetration during each contact [m]."""
     speeds_before: Reals
     speeds_after: Reals
     """Speeds of p, towards and away from the stop [m/s]."""
@@ -390,7 +390,7 @@ def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiec
 
 
 def join_collisions(parts: list[Collisions]) -> Collisions:
-    """Join the collisions of several pieces."""
+    """Join the collisions of several parts of a motion."""
     names = [each.name for each in fields(Collisions)]
     return Collisions(
         **{name: np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in names}

@@ -29,7 +29,7 @@ LOSS_LIMIT = 8.0
 """Mean squared normalised innovation above which a track is lost; about 1 is good."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
-"""Kind of a step without contact."""
+"""Value of `Filtered.kinds` for a step without contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ class Smoothed:
 
     first: int
     states: Reals
-    """States, shape (samples, 8)."""
+    """Smoothed states, shape (samples, 8)."""
     variances: Reals
     """Variances of p and of its rate, shape (samples, 2)."""
     forces: Reals
@@ -222,7 +222,7 @@ class Smoothed:
     first_covariance: Reals
     """Covariance of the first state, shape (8, 8)."""
     touched: Flags
-    """Flags of steps with contact."""
+    """Flags of the steps with contact, shape (samples,)."""
 
     @property
     def p(self) -> Reals:
@@ -231,7 +231,7 @@ class Smoothed:
 
     @property
     def rate(self) -> Reals:
-        """Rate of p [m/s]."""
+        """Rate of change of p [m/s]."""
         return np.asarray(self.states[:, 4] - self.states[:, 5])
 
 

@@ -35,7 +35,7 @@ class Forecast(Labelled):
     first: int
     """Index of the first sample in the recording."""
     p: Reals
-    """Relative displacement [m]."""
+    """Relative displacement p = y - z [m]."""
     error: Reals
     """Error that 68 % of recent forecasts did not exceed at this horizon [m]; NaN if they are too few."""
 

@@ -209,7 +209,7 @@ def _restarts(
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        # If a shifted start fails, try the start itself, then the latest result.
+        # If the shifted start values fail, try the unshifted values, then the latest result.
         for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
             answer = estimate(begin, motion, near, first, stop)
             if _is_held(answer, motion):
@@ -232,11 +232,11 @@ class _Combined:
 
     values: Reals
     half: Reals
-    """Half width of the bounds."""
+    """Half width of the bounds of each value."""
     sd: Reals
     """Larger of the filter's standard deviation and the scatter of restarts."""
     assumed: Reals
-    """Standard deviation of the description."""
+    """Standard deviation of the described values."""
     beyond: Reals
     """Distance between the values without and with the narrow prior."""
 

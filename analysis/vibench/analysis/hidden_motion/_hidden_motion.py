@@ -84,7 +84,7 @@ class MeasuredMass:
     velocity: Reals
     """Measured velocity [m/s], shape (samples,); NaN where unknown."""
     noise: float
-    """Rms noise [m/s]."""
+    """RMS noise of the measured velocity [m/s]."""
     _sums: Reals = field(default_factory=lambda: np.zeros(5))
 
     def add(self, piece: TrackedPiece) -> None:
@@ -154,7 +154,7 @@ class TrackedMotion(Labelled):
     p: Samples
     """Relative displacement y - z, shape (samples,) [m]."""
     rate: Samples
-    """Rate of p [m/s]."""
+    """Rate of change of p [m/s]."""
     p_sd: Samples
     """Standard deviation of p [m]."""
     collisions: Collisions
@@ -164,7 +164,7 @@ class TrackedMotion(Labelled):
 
     @property
     def share_followed(self) -> float:
-        """Share of samples with a track."""
+        """Share of the samples that were tracked."""
         return float(np.mean(~np.isnan(self.p)))
 
     @property

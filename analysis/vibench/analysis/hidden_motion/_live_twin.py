@@ -65,7 +65,7 @@ class Level(FrozenModel):
 
     mean: float
     sd: float
-    """Standard deviation between blocks."""
+    """Standard deviation of the level between blocks."""
 
     @property
     def limit(self) -> float:
@@ -142,7 +142,7 @@ class LiveState(StrEnum):
     """State of the live hidden motion."""
 
     WAITING = "waiting"
-    """Too little data or motion."""
+    """There is too little data or motion to start a track."""
     TRACKED = "tracked"
     LOST = "lost"
     """The data do not fit the parameters; no motion is shown."""
@@ -150,7 +150,7 @@ class LiveState(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class LiveMotion(Labelled):
-    """Newest part of the hidden motion."""
+    """Newest part of the hidden motion, for a picture."""
 
     OWN_UNITS: ClassVar = {"p": "m"}
 
@@ -180,7 +180,7 @@ _FIND_S = 2.4
 _PATIENCE = 2.0
 """Factor by which the waiting time grows with every search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
-"""First and longest time between two attempts for a motion that does not fit [s]."""
+"""First and longest time between attempts to start a track, if the motion does not fit the model [s]."""
 _CLIPPED = 25.0
 """Upper limit of squared innovations, so that one late impact does not count as a change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)

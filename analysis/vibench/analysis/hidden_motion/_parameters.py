@@ -31,9 +31,9 @@ class Search(NamedTuple):
     """Settings of the search for one parameter, relative to its value."""
 
     prior_sd: float
-    """Prior standard deviation about the description."""
+    """Prior standard deviation about the described value."""
     step: float
-    """Step for derivatives."""
+    """Step of the parameter for numerical derivatives."""
     near: float
     """Prior standard deviation about the description, if the motion can be tracked with it."""
     least_sd: float = 0.0

@@ -22,7 +22,7 @@ from ._latent_force import latent_motion
 from ._prepared_motion import PreparedMotion
 
 ACQUISITION_S = 0.06
-"""Length of motion for acquisition [s]."""
+"""Length of motion from which a track is started [s]."""
 _WORST_MISFIT = 3.0
 """Largest misfit of an acquisition that may start a track."""
 _ACQUIRED_EXCESS = 4.0
@@ -42,7 +42,7 @@ _WORST_SD_OF_GAP = 0.1
 
 @dataclass(frozen=True, eq=False)
 class TrackedPiece:
-    """Consecutive samples with a track."""
+    """Consecutive samples of a motion that were tracked."""
 
     smoothed: Smoothed
     run: Filtered
@@ -55,7 +55,7 @@ class TrackedPiece:
 
     @property
     def stop(self) -> int:
-        """Index after the last sample."""
+        """Index one past the last sample."""
         return self.first + int(self.smoothed.states.shape[0])
 
 
