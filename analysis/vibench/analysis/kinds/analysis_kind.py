@@ -58,7 +58,7 @@ class AnalysisKind(Generic[P, A, L]):
     compared: Callable[[A], tuple[Quantity, ...]]
     """Return the measured quantities that are compared with the simulated records (draws)."""
     lay: Callable[[A, Drawn[Any]], L]
-    """Compare the analysis with all draws."""
+    """Return the overlay: the comparison of the analysis with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
     """Yield curves of the measured or simulated response of the recording with this name."""
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
