@@ -233,7 +233,7 @@ class DensityPicture:
     time_s: tuple[float, float]
     """Left and right edge [s since the first sample of the recording]."""
     frequency_hz: tuple[float, float]
-    """Lower and upper edge [Hz]."""
+    """Lower and upper edge of the picture [Hz]."""
     decibel: NDArray[np.float32]
     """Density in decibels, shape (rows, columns); NaN where samples were lost."""
     segment_s: float

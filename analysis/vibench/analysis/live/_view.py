@@ -174,7 +174,7 @@ class SweepTrace:
 
     @property
     def points(self) -> int:
-        """Number of points."""
+        """Number of stored points."""
         return self._end - self._begin
 
     def add(self, point: SinePoint) -> None:
