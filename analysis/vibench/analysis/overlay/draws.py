@@ -106,7 +106,7 @@ class UnseenNoise:
     """White noise that moves the table but is absent from the recorded voltage; referred to that voltage."""
 
     power: float = 0.0
-    """Variance per sample [V²]."""
+    """Variance of one sample [V²]."""
     sd: float = 0.0
     """Standard deviation of this power [V²]."""
 

@@ -107,7 +107,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def compared(self) -> int:
-        """Number of points with enough draws."""
+        """Number of points with enough draws for a comparison."""
         return int(np.sum(self._is_compared))
 
     @property
@@ -131,7 +131,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def outside(self) -> int:
-        """Number of points beyond the limit."""
+        """Number of points whose |z| exceeds the limit."""
         return int(np.sum(np.abs(self.z[np.isfinite(self.z)]) > self.limit))
 
     @property
@@ -163,7 +163,7 @@ class EnsembleCurve(Labelled):
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
             agrees = "agrees with" if self.agrees else "differs from"
-            # State the limit if the value agrees although it is outside the 95 % band.
+            # A value outside the 95 % band may still agree, so state the limit of |z|.
             limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
             return (
                 f"{self.name} {self.measured[0]:.4g} {agrees} the twin's {self.median[0]:.4g} (95 % of draws "
@@ -340,7 +340,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """Rate at which a motion ends."""
+    """Rate at which a motion ends by chance."""
 
     DOCUMENT: ClassVar = (
         "what runs ends measured_ended=measured.ended measured_end_s=measured.stop_s counted_from_s=from_s "

@@ -29,7 +29,7 @@ class MeasurementPrediction(Labelled):
     measurement: Measurement
     prediction: ResponsePrediction
     basis: str
-    """Source of the base amplitude."""
+    """Source of the base amplitude, in words."""
     approach: Approach
     """Initial state of each simulated point: rest, or the final state of the previous point."""
     specimen_name: str

@@ -38,10 +38,10 @@ class FittedShaker:
     covariance: Reals
     """Covariance of the logarithms of its first six parameters, shape (6, 6), widened by chi^2 above 1."""
     chi2: float
-    """Reduced chi square."""
+    """Reduced chi square of the fit."""
     lines: int
     source: str
-    """Name of the recording."""
+    """Name of the recording to which the shaker was fitted."""
 
     @property
     def relative_sd(self) -> dict[str, float]:

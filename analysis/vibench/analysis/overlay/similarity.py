@@ -37,7 +37,7 @@ class SimilarityCurve:
     response: Reals
     """Response I or II, relative to the drive amplitude; NaN if missing."""
     amplitude_m: float
-    """Drive amplitude A0."""
+    """Drive amplitude A0 [m]."""
 
     def __post_init__(self) -> None:
         if self.frequency_hz.ndim != 1 or self.frequency_hz.shape != self.response.shape:
