@@ -68,9 +68,9 @@ class MapRequest(SpecimenChoice):
     highest_m: PositiveFloat = 50e-6
     """Largest amplitude of the base displacement; amplitudes are spaced logarithmically."""
     columns: Annotated[int, Field(ge=3, le=1000)] = 121
-    """Number of frequencies."""
+    """Number of drive frequencies."""
     rows: Annotated[int, Field(ge=3, le=1000)] = 81
-    """Number of amplitudes."""
+    """Number of base amplitudes."""
     random_starts: Annotated[int, Field(ge=0, le=100)] = 0
     """Number of random initial states at every point, in addition to rest, to find coexisting motions."""
     periods: Annotated[int, Field(ge=300, le=30_000)] = 3000
@@ -108,7 +108,7 @@ class MapPicture:
     """A map as far as it is computed; cells that are not computed show the nearest computed cell."""
 
     frequency_hz: tuple[float, float]
-    """Outer edges of the picture."""
+    """Lower and upper edge of the picture [Hz]."""
     amplitude_m: tuple[float, float]
     classes: NDArray[np.int8]
     """Indices in `MOTION_CLASSES`, shape (rows, columns)."""
@@ -314,7 +314,7 @@ class SimulationRequest(SpecimenChoice):
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; free flight is exact at every level. Costs and errors are shown below."""
     duration_s: PositiveFloat = 8.0
-    """Length of each run, from rest."""
+    """Simulated time of each run, from rest."""
     window_s: PositiveFloat = 5.0
     """Observed time at the end of each run."""
     budget_s: NonNegativeFloat = BUDGET_S
