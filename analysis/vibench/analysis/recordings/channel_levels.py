@@ -35,7 +35,7 @@ class ChannelLevel:
     rms: float
     """RMS over the whole recording, including ramps and waits [unit of the channel]."""
     peak: float
-    """Largest magnitude [unit of the channel]."""
+    """Largest magnitude over the whole recording [unit of the channel]."""
     full_scale: float
     """Full scale of the converter's input [unit of the channel]."""
     share_at_full_scale: float

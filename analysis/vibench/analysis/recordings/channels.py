@@ -86,7 +86,7 @@ class Stretch:
 
     start: int
     stop: int
-    """One past the last sample."""
+    """Index one past the last sample."""
     numbers: dict[str, int | float | str]
     """Values of this part in the plan, such as ``realisation`` or ``frequency_hz``."""
     is_complete: bool
