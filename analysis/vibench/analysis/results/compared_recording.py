@@ -35,7 +35,7 @@ class ComparedRecording(Labelled):
     samples_id: str
     curves: tuple[Curve, ...]
     failures: tuple[str, ...]
-    """Sentences on simulations that failed."""
+    """One sentence for each simulation that failed."""
     warnings: tuple[str, ...]
     """Warnings from the checks of the recording."""
     kept: bytes
