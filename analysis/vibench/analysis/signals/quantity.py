@@ -33,12 +33,12 @@ class ConvertedSignal:
     OWN_UNITS: ClassVar = {"samples": "{unit}", "settled": "{unit}"}
 
     samples: Reals
-    """Shape (samples,) [m, m/s or m/s2]."""
+    """Converted samples, shape (samples,) [m, m/s or m/s2]."""
     sample_rate_hz: float
     quantity: Quantity
     low_hz: float
     high_hz: float
-    """Ends of the kept band."""
+    """Lower and upper end of the kept band [Hz]."""
     edge_samples: int
     """Number of disturbed samples at each end."""
 
