@@ -90,7 +90,7 @@ class Collisions(Labelled):
     too_fast_hz: tuple[tuple[float, float], ...]
     """Frequency ranges in which collisions are not determined, because ringing may hide them."""
     noise_rms: float
-    """Noise used in the threshold [m/s]."""
+    """Noise from which the threshold is computed [m/s]."""
 
 
 def collisions(sweep: SweptMotion) -> Collisions:

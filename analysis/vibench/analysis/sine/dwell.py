@@ -187,9 +187,9 @@ def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) ->
 
 
 _LOWEST_ORDER = 0.1
-"""High-pass for displacement relative to the drive frequency, above drift and hum."""
+"""High-pass frequency for displacement relative to the drive frequency, above drift and hum."""
 _BAND_ABOVE = 0.33
-"""Low-pass relative to the sample rate."""
+"""Low-pass frequency relative to the sample rate."""
 _HIGHEST_ORDER = 0.45
 """Frequency of the highest order relative to the sample rate; aliases above it look like lower orders."""
 _SCATTER_BLOCKS = 10

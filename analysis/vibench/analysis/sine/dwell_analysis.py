@@ -27,9 +27,9 @@ from .dwell import DwellResponse, clear_of_dropouts, dwell_response, silence_bef
 # Repetition of the motion of a dwell: Poincaré points and their verdict.
 
 _LOWEST_ORDER = 0.1
-"""High-pass for both signals relative to the drive frequency."""
+"""High-pass frequency for both signals, relative to the drive frequency."""
 BAND_ABOVE = 0.25
-"""Low-pass relative to the sample rate; its edge ends within the band of the interpolation."""
+"""Low-pass frequency relative to the sample rate; the filter ends within the band of the interpolation."""
 
 
 _CLEAR_MOTION = 0.8
@@ -179,7 +179,7 @@ class IrregularMotion:
     stop_s: float
     """End, from the first sample of the dwell."""
     ended: bool
-    """Whether a repeating motion followed."""
+    """Whether a repeating motion followed the irregular one."""
 
 
 def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:

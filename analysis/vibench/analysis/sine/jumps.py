@@ -45,7 +45,7 @@ class Jump:
     after: float
     """Response before and after, in the order of time."""
     standard_errors: float
-    """Step divided by its standard error."""
+    """Size of the step, divided by its standard error."""
 
     @property
     def decibel(self) -> float:
@@ -266,7 +266,7 @@ class Hysteresis(Labelled):
     frequency_hz: Reals
     up: Reals
     down: Reals
-    """Response II of both sweeps."""
+    """Response II of the up sweep and of the down sweep."""
     differs: Flags
     """Points where the sweeps differ by more than 1.5 dB, averaged over 2 % of the band."""
     pairs: tuple[tuple[Jump, Jump], ...]

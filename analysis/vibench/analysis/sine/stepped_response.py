@@ -60,7 +60,7 @@ class SteppedResponse(Labelled):
     )
 
     frequency_hz: Reals
-    """Frequency as measured on the drive."""
+    """Measured frequency of the drive."""
     direction: tuple[str, ...]
     """Direction of each step, ``"up"`` or ``"down"``."""
     amplitude_vpp: Reals

@@ -44,7 +44,7 @@ class DrivePhase:
 
     phase_rad: Reals
     frequency_hz: Reals
-    """Instantaneous frequency by the converter clock."""
+    """Instantaneous frequency relative to the converter clock [Hz]."""
 
 
 def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: float) -> DrivePhase:
@@ -107,9 +107,9 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 _SAMPLES_PER_CYCLE = 24
 """Minimum samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
 _BAND_BELOW = 0.25
-"""High-pass for displacement relative to the lowest drive frequency: half orders pass, drift does not."""
+"""High-pass frequency for displacement over the lowest drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
-"""Low-pass relative to the decimated rate, within the flat band of the decimation."""
+"""Low-pass frequency relative to the decimated rate, within the flat band of the decimation."""
 _LINEAR_ABOVE = 5.5
 """Upper limit of the linear motion relative to the highest drive frequency, above order 5."""
 _STEADY_POINTS = 10_001
@@ -186,7 +186,7 @@ class SweptMotion(Labelled):
 
     @property
     def largest_i(self) -> float:
-        """Largest Response I."""
+        """Largest Response I in the sweep."""
         return float(self.response_i[self.largest(self.response_i)])
 
     @property
@@ -341,7 +341,7 @@ class SweepSums:
 
     @property
     def _band_hz(self) -> tuple[float, float]:
-        """Band of the displacement."""
+        """Frequency band of the displacement [Hz]."""
         return _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
 
     def _analysed(
