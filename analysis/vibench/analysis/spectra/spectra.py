@@ -261,7 +261,7 @@ class AmplitudeSpectrum(Labelled):
 
     @property
     def amplitude(self) -> Reals:
-        """|value|, peak [unit]."""
+        """Peak amplitude of each line, |value| [unit]."""
         return np.abs(self.value)
 
     @property
@@ -313,7 +313,7 @@ _TAPER = Window.HANN
 
 @dataclass(frozen=True, eq=False)
 class Spectrogram(Labelled):
-    """Amplitude over time and frequency."""
+    """Amplitude of a signal over time and frequency."""
 
     OWN_UNITS: ClassVar = {"amplitude": "{unit}", "density": "({unit})2 Hz-1"}
 
@@ -326,7 +326,7 @@ class Spectrogram(Labelled):
     resolution_hz: float
     """Width of the window's main lobe at half power."""
     noise_bandwidth_hz: float
-    """Equivalent noise bandwidth."""
+    """Equivalent noise bandwidth of a row [Hz]."""
 
     @property
     def density(self) -> Reals:
