@@ -47,7 +47,7 @@ class TrackedOrders(Labelled):
 
     @property
     def amplitude(self) -> Reals:
-        """|value|, shape (orders, intervals)."""
+        """Amplitude of each order, |value|, shape (orders, intervals)."""
         return np.abs(self.value)
 
     def order(self, number: float) -> Complexes:
