@@ -43,7 +43,7 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True)
 class Contribution:
-    """Contribution of one cause."""
+    """Contribution of one cause to an uncertainty."""
 
     cause: Cause
     relative: float | None
@@ -164,7 +164,7 @@ class Stated:
     base: tuple[Contribution, ...]
     """Contributions of the channel of the base."""
     clock: Contribution
-    """Contribution to every frequency."""
+    """Contribution of the clock to every frequency."""
 
     @property
     def scale_sd(self) -> float:
