@@ -47,8 +47,8 @@ CHAOS = MapMotion(MotionKind.CHAOTIC_SO_FAR, None, True, 4.08, 2.0, Share(0.7134
     [
         (0, None, "71.34% of the points"),
         (0, 0, "71.34% of the points"),
-        (0, 5, "71.34% of the points; if all were computed 17.07% to 96.78%"),
-        (3, None, "71.34% of the points; with other random starts 17.07% to 96.78%"),
+        (0, 5, "71.34% of the points; if all points were computed 17.07% to 96.78%"),
+        (3, None, "71.34% of the points; with other random initial states 17.07% to 96.78%"),
     ],
 )
 def test_the_share_of_a_motion_has_an_interval_only_if_it_is_an_estimate(random_starts, filled, end):

@@ -177,7 +177,7 @@ class BranchRequest(SpecimenChoice):
         if self.resonance_band_hz is not None:
             return f"{text}."
         return (
-            f"{text}; motions searched at {self.places} places from {self.starts} random states each, seed "
+            f"{text}; motions searched at {self.places} values from {self.starts} random states each, seed "
             f"{self.seed}, up to {self.most_periods} drive periods long."
         )
 

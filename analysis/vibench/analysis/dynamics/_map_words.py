@@ -65,9 +65,9 @@ def motion_words(results: MapResults, motion: MapMotion) -> str:
     text = f"{kind}, Response I {motion.response_i:.3g}: {motion.share.share:.2%} of the points"
     interval = f"{motion.share.low:.2%} to {motion.share.high:.2%}"
     if results.plan.random_starts:
-        return f"{text}; with other random starts {interval}"
+        return f"{text}; with other random initial states {interval}"
     is_estimate = results.audit is not None and results.audit.filled > 0
-    return f"{text}; if all were computed {interval}" if is_estimate else text
+    return f"{text}; if all points were computed {interval}" if is_estimate else text
 
 
 def map_caption(results: MapResults) -> str:
@@ -76,7 +76,7 @@ def map_caption(results: MapResults) -> str:
     sentences = [
         (
             f"{', '.join((_specimen_words(plan.specimen), *_fixed(plan)))}; {plan.accuracy.value}; motions "
-            f"followed for up to {plan.periods} drive periods; starts per point: {len(plan.start_labels)}."
+            f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} initial state(s)."
         ),
         f"{results.computed} of {plan.grid.size} points computed.",
     ]
