@@ -124,7 +124,7 @@ def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
     first = max(0, last - round(_APPROACH_S / measured.interval_s))
     if last - first < _LEAST_INTERVALS:
         raise NotEnoughData(
-            f"the sweep begins {max(last, 0)} intervals before the collisions, but A0 there needs "
+            f"the sweep begins {max(last, 0)} intervals before the collisions, but a fit of A0 needs "
             f"{_LEAST_INTERVALS} intervals; begin the sweep further away"
         )
     before = slice(first, last)

@@ -229,7 +229,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
     if table is not None:
         yield table.sentence
         if table.suspects:
-            yield f"The table does not fit: {culprits_text(table.suspects)}."
+            yield f"The table's described mass does not fit: {culprits_text(table.suspects)}."
     contradicted = _contradictory_suspects(updated.collisions)
     if contradicted:
         yield f"Collisions contradict the description: {culprits_text(contradicted)}."
