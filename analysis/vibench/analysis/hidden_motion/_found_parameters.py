@@ -219,7 +219,7 @@ def _restarts(
     if 2 * len(good) <= len(stretches) and len(stretches) > 1:
         return (
             refused
-            or f"only {len(good)} of {len(stretches)} searches in parts of the motion kept their track"
+            or f"only {len(good)} of {len(stretches)} parts of the motion could be tracked in the search"
         )
     if not good:
         return refused or "the track was lost repeatedly during the search for parameters"

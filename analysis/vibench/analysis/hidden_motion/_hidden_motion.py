@@ -71,8 +71,8 @@ class MassCheck:
         verdict = {True: "confirms", False: "refutes", None: "neither confirms nor refutes"}[self.confirms]
         return (
             f"The measured {self.channel} {verdict} the track: "
-            f"{100 * self.unexplained:.2g} % of it are not explained ({100 * self.expected:.2g} % are "
-            f"expected), and its scale is {self.scale:.3f}."
+            f"{100 * self.unexplained:.2g} % of its rms is not explained ({100 * self.expected:.2g} % is "
+            f"expected), and it is {self.scale:.3f} times the tracked velocity."
         )
 
 
@@ -438,7 +438,7 @@ def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> st
     """Return the reason why the parameters do not fit the specimen; empty if they fit."""
     for each in checks:
         if each.confirms is False:
-            return f"{each.channel} refutes a track with the found parameters"
+            return f"{each.channel} contradicts tracking with the found parameters"
     is_tracked = ~np.isnan(tracked.p)
     held = float(np.mean(is_tracked[int(np.argmax(is_tracked)) :]))
     if held < _LEAST_HELD:
