@@ -376,8 +376,8 @@ class EscapeRate:
         """Rate and bounds in words."""
         low, high = self.bounds_per_s
         return (
-            f"The end of {self.what} is random: it came in {self.ends} of {self.runs} runs, including the "
-            f"measured one; after the first end, the rate was {self.per_s:.2g} per second ({low:.2g} to "
+            f"The end of {self.what} is random: it occurred in {self.ends} of {self.runs} runs, including "
+            f"the measured one; after the first end, the rate was {self.per_s:.2g} per second ({low:.2g} to "
             f"{high:.2g})"
         )
 
