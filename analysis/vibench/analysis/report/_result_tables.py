@@ -115,7 +115,7 @@ def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
         "Bounds of a beginning lie between the last interval clearly without collisions and the first "
         "clearly with collisions. "
         "An end has no bounds: it is random, and differs between runs. "
-        "The state in which a sweep remains depends on its direction and on its start.",
+        "The motion that a sweep follows depends on its direction and on its first frequency.",
     )
 
 
