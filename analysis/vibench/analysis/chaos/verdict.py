@@ -100,8 +100,8 @@ _SHORTEST_BLOCK = 50
 def begin_of_last_motion(points: Points) -> int:
     """Return the index at which the last motion of a record starts; 0 if it never changes.
 
-    Each block of the record is tested for repetition within its noise. One change of the result is the end of
-    a transient or the loss of a motion. Several changes are chaos with calm stretches and count as one
+    Each block of the record is tested for repetition within its noise. One change of the result means that a
+    transient ended or a motion was lost. Several changes mean chaos with calm intervals, which counts as one
     motion.
     """
     count = len(points.value)
@@ -135,7 +135,7 @@ _FEWEST_TURNS = 3.0
 _LARGEST_HUM = 0.1
 """Largest mains hum relative to the orbit; more may be motion at the mains frequency."""
 _LOW_PERIOD = 4
-"""Longest period that counts as low; mains hum also causes such periods, at twice the mains frequency."""
+"""Longest period that counts as low; hum causes such periods if the drive is at twice the mains frequency."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40."""
