@@ -202,7 +202,7 @@ class CurvePeak:
 def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
     """Return the highest resonance peaks, sorted by frequency.
 
-    Branches and chaotic stretches have no peaks.
+    Branches and chaotic parts of a curve have no peaks.
 
     Parameters
     ----------
