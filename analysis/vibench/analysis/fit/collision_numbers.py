@@ -26,7 +26,7 @@ from .statistical_numbers import statistical_numbers
 CALM, COLLIDING = 1.01, 1.05
 """Ratios of Response I to II (1 for a sine): no collisions below the first, collisions above the second."""
 _LENGTH_S = 3.0
-"""Length of the tracked stretch [s], long enough for four restarts."""
+"""Length of the tracked part of a recording [s], long enough for four restarts."""
 _MOST_RECORDINGS = 3
 _JUDGED = (
     Hidden.LOWER_GAP,
