@@ -71,7 +71,7 @@ class FreeImpacts(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion(Labelled):
-    """Motion of a stretch, estimated without a contact model."""
+    """Motion of m1 against m2, estimated without a contact model."""
 
     OWN_UNITS: ClassVar = {"p": "m", "p_sd": "m"}
 
@@ -295,7 +295,7 @@ def free_numbers(
     """Fit m1, c1, k0, k2, c0 and c2 to flights by Gauss-Newton on the innovations.
 
     Return the specimen with these parameters, and relative standard deviations in the order of `FITTED`.
-    Raises NotEnoughData when no stretch is long enough.
+    Raises NotEnoughData when the motion is too short.
     """
     count = round(_FIT_STRETCH_S * motion.sample_rate_hz)
     places = [each for each in firsts if each + count < motion.samples]

@@ -46,7 +46,7 @@ _FURTHEST = 8.0
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters estimated at the end of a stretch of motion."""
+    """Parameters estimated from part of a motion."""
 
     tracked: TrackedSpecimen
     wanted: tuple[Hidden, ...]

@@ -30,7 +30,7 @@ _TRIALS = 3
 _FITTING_LEVEL = 1.6
 """Mean squared innovation of a track up to which the described parameters are only refined."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
-"""Shifts of gaps found without a contact model, in standard deviations, tried if no track holds."""
+"""Shifts of gaps found without a contact model, in standard deviations, tried if tracking fails."""
 _LARGEST_SD = 0.5
 """Largest standard deviation of a determined parameter, relative to the description's."""
 _WIDE = 3.0
@@ -335,7 +335,7 @@ def _apart(start: TrackedSpecimen, near: Mapping[Hidden, float], number: int) ->
 
 
 def _can_be_tracked(tracked: TrackedSpecimen, motion: PreparedMotion) -> bool:
-    """Return whether short stretches can be tracked with the description."""
+    """Return whether short parts of the motion can be tracked with the described parameters."""
     model = motion_model(tracked, motion)
     count = round(_TRIAL_S * motion.sample_rate_hz)
     firsts = np.linspace(0, max(0, motion.samples - 2 * count), _TRIALS).astype(int)

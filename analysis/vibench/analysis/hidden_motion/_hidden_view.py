@@ -24,7 +24,7 @@ _LEAD_S = 0.15
 
 @dataclass(frozen=True)
 class HiddenViewRequest:
-    """Stretch of a recording to show, and the parameters to use."""
+    """Part of a recording to show, and the parameters to use."""
 
     path: Path
     low_s: float

@@ -44,9 +44,9 @@ class ChannelNoise:
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
-    """A stretch of a recording without lost samples, corrected for dynamics and delays of the sensors.
+    """Part of a recording without lost samples, corrected for dynamics and delays of the sensors.
 
-    Long stretches are stored in single precision, far below sensor noise.
+    Long parts are stored in single precision, whose error is far below sensor noise.
     """
 
     acceleration: Samples
@@ -67,11 +67,11 @@ class PreparedMotion:
         return self.velocity.size
 
     def accelerations(self, start: int, stop: int) -> Reals:
-        """Return the accelerations of a short stretch."""
+        """Return the accelerations from sample ``start`` to before ``stop`` [m/s2]."""
         return self.acceleration[start:stop].astype(np.float64, copy=False)
 
     def velocities(self, start: int, stop: int) -> Reals:
-        """Return the velocities of a short stretch; NaN in drop-outs."""
+        """Return the velocities from sample ``start`` to before ``stop`` [m/s]; NaN in drop-outs."""
         return np.where(self.is_dropout[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
