@@ -26,7 +26,7 @@ class DriveTone:
     """Sine in a short part of the drive signal."""
 
     frequency_hz: float
-    """Frequency [Hz]; in a sweep, the frequency at the middle of the stretch."""
+    """Frequency [Hz]; in a sweep, the frequency at the middle of the samples."""
     amplitude: float
     """Peak amplitude [unit of the channel]."""
 
@@ -38,7 +38,7 @@ def _hann(samples: int) -> Reals:
 
 
 def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
-    """Return the sine in a short stretch of the drive, shape (samples,); None if it is not a sine.
+    """Return the sine in a short part of the drive, shape (samples,); None if it is not a sine.
 
     The ratio of the two largest lines of a Hann spectrum gives the exact frequency between them
     (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).

@@ -220,7 +220,7 @@ class SpectrogramRequest:
     highest_hz: float
     spacing: RowSpacing
     resolution_hz: float | None = None
-    """Resolution [Hz]; by default chosen from the length of the stretch so that events are visible."""
+    """Resolution [Hz]; by default chosen from the number of samples so that events are visible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +242,7 @@ class DensityPicture:
 
 
 def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
-    """Return the spectrogram of a stretch; every sample contributes.
+    """Return the spectrogram of part of a recording; every sample contributes.
 
     Raises RecordingError, InvalidRequest or NotEnoughData for an unusable file, channel or stretch.
     """
