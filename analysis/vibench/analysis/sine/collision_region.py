@@ -33,7 +33,7 @@ _CLEARLY = 2.0
 _VOTE_S = 1.0
 """An interval collides if most intervals within this time exceed the threshold: collisions persist."""
 _MERGE_S = 3.0
-"""Quiet stretches shorter than this do not split a region: motion may settle briefly between impacts."""
+"""Quiet intervals shorter than this do not split a region: motion may settle briefly between impacts."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class CollisionRegion:
-    """Stretch of a sweep in which the masses collide."""
+    """Part of a sweep in which the masses collide."""
 
     DOCUMENT: ClassVar = "start stop reaches_start_of_sweep=reaches_start reaches_stop_of_sweep=reaches_stop"
 
