@@ -1,10 +1,10 @@
-"""Copies of frozen models in which fields of their parts differ."""
+"""Copy frozen models with changed fields, also in nested models."""
 
 from pydantic import BaseModel
 
 
 def changed(model, **fields):
-    """Copy a model with other fields; a dictionary changes the fields of a part that is a model."""
+    """Copy a model with changed fields; a dictionary changes fields of a nested model."""
     update = {}
     for name, value in fields.items():
         part = getattr(model, name)

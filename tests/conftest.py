@@ -1,4 +1,4 @@
-"""One thread for linear algebra, as for the command; and the window's tests wherever Qt can be loaded."""
+"""Settings for all tests: one thread for linear algebra, and window tests wherever Qt can be loaded."""
 
 import gc
 import os
@@ -14,17 +14,17 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_SCALE_FACTOR", "1")
 os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
 
-# How long an example takes says how busy the computer is.
+# The duration of an example depends on the load of the computer.
 hypothesis.settings.register_profile(
     "busy", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("busy")
 
-# Tests keep their bench checks apart from those of whoever runs them; processes they start inherit it.
+# Tests use a separate state folder and never change a user's bench checks; child processes inherit it.
 _state_folder = tempfile.TemporaryDirectory(prefix="vibench_state_")
 os.environ["VIBENCH_STATE_DIR"] = os.environ["VIBENCH_LOCK_DIR"] = _state_folder.name
 
-# pytest-qt ends the whole run where Qt's system libraries are missing, so it is loaded here, after a look.
+# pytest-qt ends the whole test run where Qt's system libraries are missing, so it is loaded only if Qt loads.
 QT_MISSING = ""
 try:
     from PySide6 import QtGui, QtTest, QtWidgets  # noqa: F401 - to see whether they load
@@ -42,7 +42,7 @@ if not HAS_EXTENSIONS:
 
 
 def pytest_report_header() -> str:
-    """Say aloud when the window or an extension is not tested: a green run must not hide it."""
+    """Report when the tests of the window or of an extension are not run."""
     window = "the window is tested offscreen"
     if QT_MISSING:
         window = (
@@ -170,7 +170,7 @@ THOROUGH = "thorough"
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose what runs where no -m does, and let files be handed out in the order above."""
+    """Choose the tests that run without -m, and keep the file order of `LONG` for parallel runs."""
     asked = config.option.markexpr
     if asked in ("", THOROUGH):
         names_a_path = config.args_source is config.ArgsSource.ARGS
@@ -182,14 +182,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Look for garbage from now on, and not among the modules: half a million objects that stay."""
+    """Exclude the half a million objects of imported modules from garbage collection."""
     gc.freeze()
     gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest, and mark what is quick."""
+    """Sort the longest test files first, and mark the quick tests."""
     place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
     for item in items:

@@ -1,4 +1,4 @@
-"""Freeze a process until it really stands still."""
+"""Freeze a process and wait until all its threads have stopped."""
 
 import os
 import signal
@@ -13,15 +13,15 @@ PATIENCE_S = 20.0
 
 @contextmanager
 def frozen(pid: int) -> Iterator[None]:
-    """Stop all threads of a process; they go on afterwards.
+    """Stop all threads of a process; let them continue at the end.
 
-    The signal wakes one thread, which stops the others: on a loaded computer these run for some tenths of a
-    second more.
+    The signal wakes one thread, which stops all other threads. On a busy computer these threads run for some
+    tenths of a second longer.
     """
     os.kill(pid, signal.SIGSTOP)
     try:
         give_up_s, pause = time.monotonic() + PATIENCE_S, Event()
-        while not _stands_still(pid):
+        while not _is_stopped(pid):
             assert time.monotonic() < give_up_s, f"process {pid} does not stop"
             pause.wait(0.01)
         yield
@@ -30,7 +30,7 @@ def frozen(pid: int) -> Iterator[None]:
             os.kill(pid, signal.SIGCONT)
 
 
-def _stands_still(pid: int) -> bool:
-    """Read the state of each thread, which follows its name in parentheses; only Linux has such files."""
+def _is_stopped(pid: int) -> bool:
+    """Return whether every thread of a process is stopped, from its files in /proc (Linux only)."""
     threads = Path(f"/proc/{pid}/task").glob("*/stat")
     return all(each.read_text().rpartition(")")[2].split()[0] == "T" for each in threads)

@@ -1,4 +1,4 @@
-"""A disk without room for what this process writes."""
+"""Simulate a full disk for the files that this process writes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +8,7 @@ import pytest
 
 @contextmanager
 def full_disk(room_bytes: int = 20) -> Iterator[None]:
-    """Refuse every byte of a file beyond the first few; limits on file size exist on POSIX only."""
+    """Refuse every byte of a file beyond `room_bytes`; limits on file size exist on POSIX only."""
     resource = pytest.importorskip("resource", reason="limits on file size exist on POSIX only")
     usual = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room_bytes, usual[1]))

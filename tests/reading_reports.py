@@ -1,4 +1,4 @@
-"""Reads a report as a reader does: what is seen with all folds closed, and what they hold."""
+"""Parse an HTML report: its whole text, and the text that is visible with all folds closed."""
 
 import re
 from html.parser import HTMLParser
@@ -7,7 +7,7 @@ VOID = {"meta", "img", "br", "link", "hr"}
 
 
 class Page(HTMLParser):
-    """A page's texts, links and images; fails where elements are not closed in order."""
+    """Texts, links and images of an HTML page; fails if elements are not closed in order."""
 
     def __init__(self, text):
         super().__init__()
@@ -49,7 +49,7 @@ class Page(HTMLParser):
 
     @property
     def is_seen(self):
-        """Whether the text here is read with all folds closed: a summary is."""
+        """Whether the current text is visible with all folds closed; a fold's summary is visible."""
         if "details" not in self.open:
             return True
         return self.open[self.open.index("details") + 1 :][:1] == ["summary"]

@@ -1,4 +1,4 @@
-"""What documents and faces say of the code is true of it: names, paths, links and examples."""
+"""Names, paths, links and examples in documents and docstrings are correct."""
 
 import ast
 import importlib
@@ -65,7 +65,7 @@ def text_of(document):
 
 
 def resolves(dotted):
-    """Say whether a dotted name is a module, or something that stands on one, or a group of entry points."""
+    """Return whether a dotted name is a module, an attribute of a module, or an entry point group."""
     name, *rest = dotted.split(".")
     if dotted in {each.value for each in PlugInKind} or importlib.util.find_spec(name) is None:
         return True
@@ -120,7 +120,7 @@ TYPED = re.compile(r"^\$ (vibench .*)|`(vibench [^`]*)`", flags=re.MULTILINE)
 
 
 def commands_of(document):
-    """Words of every command in a document: in blocks without a language, in transcripts, in the text."""
+    """Return the words of every command in a document: in plain blocks, transcripts and running text."""
     text = text_of(document).replace("\\\n", " ")
     found = [each for block in BLOCK.findall(text) for each in COMMAND.findall(block)]
     found += [first or other for first, other in TYPED.findall(text)]
@@ -152,14 +152,14 @@ def test_every_command_in_a_document_exists_with_all_its_options(document):
 
 @every_document
 def test_commands_in_a_document_work_outside_a_checkout(document):
-    """What is shipped is found by its name; its path leads there in a checkout alone."""
+    """Shipped files are found by name everywhere, but by path in a checkout only."""
     paths = re.compile(r"(campaigns|hardware_configs|studies)/")
     wrong = [words for words in commands_of(document) if any(map(paths.match, words))]
     return [] if "decisions" in document.parts else wrong
 
 
 def code_of_the_readme(saying):
-    """Give the one example that says something, compiled."""
+    """Compile the only code example of the README that contains `saying`."""
     (code,) = (code for code in CODE.findall(text_of(ROOT / "README.md")) if saying in code)
     return compile(code, "README.md", "exec")
 
@@ -176,8 +176,8 @@ def test_the_measurement_in_the_readme_runs(tmp_path, monkeypatch, capsys):
     assert "Resonance" in capsys.readouterr().out
 
 
-def ordered_rooms():
-    """Give the rooms of every package, highest first, as the contracts of pyproject.toml order them."""
+def ordered_subpackages():
+    """Yield each package with its subpackages, highest first, in the order of pyproject.toml."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     for contract in contracts["contracts"]:
         for package in contract.get("containers", ()):
@@ -185,8 +185,8 @@ def ordered_rooms():
             yield pytest.param(package, layers.split(" | "), id=package)
 
 
-@pytest.mark.parametrize(("package", "rooms"), list(ordered_rooms()))
-def test_the_architecture_page_lists_packages_in_order_with_docstrings(package, rooms):
+@pytest.mark.parametrize(("package", "rooms"), list(ordered_subpackages()))
+def test_the_architecture_page_lists_subpackages_in_order_with_docstrings(package, rooms):
     _, section = text_of(ROOT / "docs" / "architecture.md").split(f"### `{package}`\n")
     listed = re.findall(r"^\| `(\w+)` \| (.+) \|$", section.split("\n### ")[0].split("\n## ")[0], flags=re.M)
     said = [importlib.util.find_spec(f"{package}.{room}") for room in rooms]

@@ -1,4 +1,4 @@
-"""The scripts in examples/ run as they stand, and say what their first lines promise."""
+"""The scripts in examples/ run unchanged and give the results that their first lines state."""
 
 import json
 import re

@@ -55,7 +55,7 @@ ONE_FILE_ROOMS = (
 
 
 def sources():
-    """Every source file of ours: its package, the module's dotted name, its room, its path."""
+    """Yield every source file: its portion, module name, package and path."""
     for portion in PORTIONS:
         for path in sorted((ROOT / portion / "vibench").rglob("*.py")):
             parts = path.relative_to(ROOT / portion).with_suffix("").parts
@@ -73,7 +73,7 @@ MODULES = {name: path for _, name, _, path in sources()}
 
 
 def imports_of(path, room):
-    """Absolute module and names of every import of ours in a file."""
+    """Yield line, absolute module and names of every vibench import in a file."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.ImportFrom):
             continue
@@ -83,8 +83,8 @@ def imports_of(path, room):
             yield node.lineno, target, [each.name for each in node.names]
 
 
-def trespasses(room, package, target, names):
-    """Say what an import reaches that is not shown to it."""
+def api_violations(room, package, target, names):
+    """Yield every private name or module that an import reaches."""
     other = ".".join(target.split(".")[:2])
     if other != package:
         if target not in FOR_PEOPLE + FOR_OUR_PROGRAMS and target.rpartition(".")[0] not in FOR_OUR_PROGRAMS:
@@ -106,7 +106,7 @@ def test_no_import_bypasses_a_public_api():
         f"{path.relative_to(ROOT)}:{line}: {trespass}"
         for portion, _, room, path in sources()
         for line, target, names in imports_of(path, room)
-        for trespass in trespasses(room, f"vibench.{portion}", target, names)
+        for trespass in api_violations(room, f"vibench.{portion}", target, names)
     ]
     assert found == []
 
@@ -120,7 +120,7 @@ def test_no_import_bypasses_a_public_api():
     ],
 )
 def test_an_import_that_bypasses_a_public_api_is_found(room, package, target, names):
-    assert list(trespasses(room, package, target, names))
+    assert list(api_violations(room, package, target, names))
 
 
 def test_only_modules_directly_behind_a_public_api_are_private():
@@ -172,8 +172,8 @@ def test_the_docstring_example_of_a_public_api_runs(face):
     assert result.failed == 0
 
 
-def loaded_by(program):
-    """Names of modules that a program of its own has loaded at its end."""
+def modules_loaded_by(program):
+    """Return the names of the modules that a new process has loaded after running a program."""
     program += "\nimport sys; print(*sorted(sys.modules))"
     return subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
@@ -196,4 +196,4 @@ def loaded_by(program):
     ],
 )
 def test_importing_a_public_api_loads_only_what_its_names_need(program, heavy):
-    assert heavy.isdisjoint(loaded_by(program))
+    assert heavy.isdisjoint(modules_loaded_by(program))

@@ -1,4 +1,4 @@
-"""The house rules, checked as tests so that one command is the whole check."""
+"""Rules of the project, checked as tests: linters, folders, commit titles, line budgets."""
 
 import importlib
 import re
@@ -40,7 +40,7 @@ NO_VERBS = {"A", "An", "Each", "Every", "If", "It", "No", "The", "There", "What"
         pytest.param(["lint-imports", "--no-cache"], id="imports-point-one-way"),
     ],
 )
-def test_linters_and_project_checks_pass(command):
+def test_linter_formatter_type_and_import_checks_pass(command):
     result = subprocess.run(
         [str(TOOLS / command[0]), *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -57,7 +57,7 @@ def test_each_namespace_package_is_imported_from_its_own_folder(portion):
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is a copy, not a checkout")
 def test_git_tracks_no_generated_file():
-    """A folder of results in a checkout would rename the results of a newcomer's first demo."""
+    """Results in a checkout would change the file names of a new user's first demo."""
     command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert listed.stdout.splitlines() == []

@@ -1,4 +1,4 @@
-"""What a laboratory on Windows does, with the functions that Windows has."""
+"""Commands of a laboratory on Windows, run without the functions that Windows lacks."""
 
 import json
 import subprocess
@@ -71,12 +71,12 @@ def here(tmp_path, monkeypatch):
 
 
 def test_the_posix_functions_removed_for_windows_tests_exist_here():
-    # Were the names misspelt, or gone from Python, nothing would be tested.
+    # A misspelt name, or one removed from Python, would test nothing.
     program = f"import os; print(sum(hasattr(os, each) for each in {POSIX_ONLY!r}))"
     assert int(ran("-c", program).stdout) > 25
 
 
-def test_a_run_on_windows_can_be_held_and_its_recording_marked(here):
+def test_windows_locks_mark_a_bench_and_a_recording_as_in_use(here):
     said = ran("-c", LOCKS.format(folder=str(here))).stdout.splitlines()
     assert "is in use by process" in said[0]
     assert said[1:] == ["True b'\\x00\\x00abc\\x00\\x00\\x00'", "False"]

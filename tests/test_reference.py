@@ -1,8 +1,7 @@
-"""Every public function says what its parameters are, what it gives in which unit, and what it raises.
+"""Every public_objects function documents its parameters, results with unit or shape, and exceptions.
 
-A parameter is documented by its section, by being named in the text, by a unit at the end of its name, or by
-a type of ours, which has a page of its own. Numbers and arrays that are given back have a unit or a shape; a
-function that raises says when.
+A parameter is documented by a Parameters section, by its name in the text, by a unit at the end of its name,
+or by a type of vibench. Numbers and arrays that are returned have a unit or a shape.
 """
 
 import ast
@@ -21,8 +20,8 @@ UNIT = re.compile(r"_(hz|s|m|rad|j|v|vpp|kg|a|ohm|n|db|decibel|bytes|samples|pa|
 SECTIONS = re.compile(r"\n(Parameters|Returns|Yields|Raises)\n-+\n")
 
 
-def public():
-    """Give every name of every face for people that has something to document."""
+def public_objects():
+    """Yield the name of every public_objects function and class, and the object."""
     for face in FOR_PEOPLE:
         module = importlib.import_module(face)
         for name in module.__all__:
@@ -48,8 +47,8 @@ def undocumented_parameters(function, told):
             yield f"parameter {each.name}"
 
 
-def shortcomings(function):
-    """Say what the docstring of a function leaves open."""
+def docstring_faults(function):
+    """Yield what the docstring of a function leaves out."""
     told = inspect.getdoc(function) or ""
     if not told:
         yield "no docstring"
@@ -67,25 +66,25 @@ def shortcomings(function):
 
 
 def test_every_public_function_is_documented():
-    functions = {name: found for name, found in public() if inspect.isfunction(found)}
+    functions = {name: found for name, found in public_objects() if inspect.isfunction(found)}
     assert len(functions) > 200
-    short = {name: list(shortcomings(found)) for name, found in functions.items()}
+    short = {name: list(docstring_faults(found)) for name, found in functions.items()}
     assert {name: found for name, found in short.items() if found} == {}
 
 
 def test_every_public_class_has_a_docstring():
-    classes = {name: found for name, found in public() if inspect.isclass(found)}
+    classes = {name: found for name, found in public_objects() if inspect.isclass(found)}
     assert [name for name, found in classes.items() if not found.__dict__.get("__doc__")] == []
 
 
-def left_open(angle, mass_kg, limit=1.0):
+def undocumented(angle, mass_kg, limit=1.0):
     """Turn something."""
     if angle > limit:
         raise ValueError(mass_kg)
 
 
 def test_an_undocumented_parameter_is_found():
-    assert list(shortcomings(left_open)) == ["parameter angle", "parameter limit", "what it raises"]
+    assert list(docstring_faults(undocumented)) == ["parameter angle", "parameter limit", "what it raises"]
 
 
 @pytest.mark.parametrize("folder", ["docs", "docs/decisions", "docs/tutorials"])

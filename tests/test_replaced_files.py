@@ -1,4 +1,4 @@
-"""A user's file is whole under its name at any moment: a disk that refuses leaves the older one, or none."""
+"""Files are replaced as a whole: a failed write leaves the earlier file, or none."""
 
 import ast
 import errno
@@ -53,14 +53,14 @@ def test_a_failed_write_leaves_the_existing_file_unchanged(tmp_path, writer, err
 
 @pytest.mark.parametrize("named", [None, "another"])
 def test_a_failed_write_names_the_file_in_the_error(tmp_path, named):
-    """An error of a write has no name."""
+    """The exception of a failed write contains no file name."""
     with pytest.raises(OSError, match="full") as refused, replace_file(tmp_path / "file"):
         raise OSError(errno.ENOSPC, "full", named)
     assert refused.value.filename == (named or str(tmp_path / "file"))
 
 
 def test_a_failed_rename_names_the_file_in_the_error(tmp_path):
-    """The unfinished file has a name that nobody gave."""
+    """The error names the final file and not the temporary file."""
     with pytest.raises(FileNotFoundError) as refused, replace_file(tmp_path / "file") as coming:
         coming.unlink(missing_ok=True)
     assert refused.value.filename == str(tmp_path / "file")
@@ -95,7 +95,7 @@ NO_FILE_OF_A_USER = {
 
 
 def writes(source):
-    """Yield each call that writes a file, and the names in it."""
+    """Yield each call that writes a file, and the variable names in it."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             call, names = (

@@ -1,4 +1,4 @@
-"""The documentation site: its texts, its links, and its tutorials as notebooks."""
+"""The documentation site: its texts, links, and tutorials as notebooks."""
 
 import json
 import re
@@ -18,7 +18,7 @@ SHORTEST = "how_accurate"
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """Build the site without the tutorials' results; it is the only thing in its folder."""
+    """Build the site without results of tutorials; the build creates only the folder `html`."""
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "vibench.cli", "docs", "--quick", "--out", "html"]
     ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""The tutorials run as they stand, from an empty folder, and what they assert holds."""
+"""The tutorials run unchanged from an empty folder, and their assertions hold."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""The wheel as users install it: beside files of theirs that bear the names of our folders."""
+"""The wheel as users install it, also beside user files that are named like our folders."""
 
 import json
 import os
@@ -35,7 +35,7 @@ print("every name resolves")
 
 
 def run(*command, cwd, **environment):
-    """Run a program that knows nothing of this checkout, and give what it printed."""
+    """Run a program outside this checkout, and return its standard output."""
     kept = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
     result = subprocess.run(
         [str(part) for part in command],
@@ -54,7 +54,7 @@ def pip(*arguments):
 
 
 def empty_environment(folder):
-    """Make an environment without packages, and give its interpreter."""
+    """Create an environment without packages, and return its interpreter."""
     venv.create(folder, symlinks=os.name != "nt")
     programs = Path(sysconfig.get_path("scripts", "venv", {"base": str(folder), "platbase": str(folder)}))
     return programs / Path(sys.executable).name
@@ -70,12 +70,12 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def python(wheel, tmp_path_factory):
-    """Interpreter of an environment with the wheel; its libraries are those of these tests."""
+    """Interpreter of an environment that contains the wheel and the libraries of these tests."""
     folder = tmp_path_factory.mktemp("installed")
     python = empty_environment(folder)
     pip("--python", python, "install", "--no-deps", "--no-compile", wheel)
     site = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)}))
-    # A folder named in a .pth file is searched, but its own .pth files, our checkout's, are not read.
+    # The .pth file adds the libraries of these tests to the path, but not the .pth files of this checkout.
     (site / "libraries.pth").write_text(sysconfig.get_path("purelib"))
     return python
 
@@ -158,7 +158,7 @@ def test_a_shipped_campaign_is_measured_and_analysed_from_the_wheel(python, user
 
 
 def lowest_allowed():
-    """Give our requirements, each at the lowest version that pyproject.toml allows."""
+    """Yield each requirement at the lowest version that pyproject.toml allows."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     for text in (*project["dependencies"], *extras["bench"], *extras["gui"]):
@@ -172,10 +172,10 @@ def lowest_allowed():
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_vibench_works_with_the_lowest_version_of_every_library_and_newest_dependencies(
+def test_vibench_works_with_the_lowest_allowed_version_of_every_required_library(
     wheel, tmp_path, users_folder
 ):
-    """docs/decisions/0005-dependencies.md says what each lower bound is for."""
+    """docs/decisions/0005-dependencies.md gives the reason for each lower bound."""
     python = empty_environment(tmp_path / "lowest")
     pip("--python", python, "install", "--prefer-binary", wheel, *lowest_allowed())
     run(python, "-c", EVERY_NAME.format(portions=PORTIONS), cwd=users_folder, QT_QPA_PLATFORM="offscreen")
@@ -183,6 +183,6 @@ def test_vibench_works_with_the_lowest_version_of_every_library_and_newest_depen
     arguments = ("predict", "--model", "hertz", "--amplitude", "5e-6", "--frequency", "260", "--json")
     (point,) = json.loads(run(python, "-m", "vibench.cli", *arguments, cwd=users_folder))["points"]
     assert point["impacts"] > 0
-    # The virtual rig speaks to every library of the bench: VISA, USB, DAQmx, gRPC.
+    # The virtual rig uses every library of the bench: VISA, USB, DAQmx, gRPC.
     run(python, "-m", "vibench.cli", "measure", "quick", "--out", "recordings", cwd=users_folder)
     run(python, "-m", "vibench.cli", "analyse", "recordings/noise.h5", "--out", "analysed", cwd=users_folder)

@@ -1,13 +1,13 @@
-"""The Windows implementation run here, in a Python from which everything was taken that Windows lacks.
+"""Run the Windows implementation on Linux, without the functions of Python that Windows lacks.
 
     python -m tests.windows_here measure campaign.toml --out recordings
 
-runs a command of vibench so, and
+runs a command of vibench, and
 
     pytest -p tests.windows_here -o timeout_method=thread tests/acquisition/recording
 
-the tests of a room. Left of the true system are its libraries (HDF5, Qt, ours) and Python's own, and the
-programs that a test starts: their locks are of another kind, and neither sees the other's (`sees_locks`).
+runs the tests of a package. Libraries (HDF5, Qt), Python's own modules and programs started by a test still
+use the real system. Their locks are of another kind; neither side sees the other's locks (`sees_locks`).
 """
 
 import errno
@@ -35,7 +35,7 @@ POSIX_SIGNALS = ("SIGHUP", "SIGALRM", "SIGUSR1", "SIGUSR2", "SIGQUIT", "setitime
 
 
 def locking(descriptor: int, mode: int, count: int) -> None:
-    """Lock bytes from the place of the file on, for this descriptor and no other, as Windows does."""
+    """Lock bytes from the current file position on, for this descriptor only, as Windows does."""
     place = os.lseek(descriptor, 0, os.SEEK_CUR)
     is_readable_only = fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
     kind = fcntl.F_RDLCK if is_readable_only else fcntl.F_WRLCK
@@ -46,7 +46,7 @@ def locking(descriptor: int, mode: int, count: int) -> None:
 
 
 def windows() -> ModuleType:
-    """Give the Windows implementation."""
+    """Load the Windows implementation."""
     runtime = ModuleType("msvcrt")
     runtime.locking, runtime.LK_NBLCK = locking, 2
     sys.modules["msvcrt"] = runtime
@@ -57,9 +57,9 @@ def windows() -> ModuleType:
     here, sys.platform = sys.platform, "win32"
     spec.loader.exec_module(module)
     sys.platform = here
-    del sys.modules["msvcrt"]  # by which Python's own modules would know Windows
-    module.LOCK_BYTE = 2**40  # Linux has no place further away
-    # The two that ask the kernel of Windows itself have no counterpart here.
+    del sys.modules["msvcrt"]  # Python's own modules would take this system for Windows
+    module.LOCK_BYTE = 2**40  # the largest file position of Linux is smaller than that of Windows
+    # These two functions call the Windows kernel.
     module.process_start = lambda pid: "1" if Path(f"/proc/{pid}").exists() else None
     module.lower_priority = lambda by: None
     return module
@@ -73,7 +73,7 @@ sees_locks = pytest.mark.skipif(
 
 
 def become_windows() -> None:
-    """Put the Windows implementation in the other's place, and take away what Windows lacks."""
+    """Replace the POSIX implementation, and remove the functions that Windows lacks."""
     sys.modules["vibench.sim.operating_system.posix"] = windows()
     for name in POSIX_ONLY:
         if hasattr(os, name):
@@ -87,7 +87,7 @@ def become_windows() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_load_initial_conftests() -> None:
-    """Run tests so, before a conftest imports the other; pytest alone still asks who the user is."""
+    """Start tests with the Windows implementation before a conftest imports the POSIX one."""
     import _pytest.tmpdir
 
     _pytest.tmpdir.get_user_id = lambda: None
