@@ -1,4 +1,4 @@
-"""A bench that behaves: what the generator plays comes back at the converter; both can be made to fail."""
+"""A simulated bench in a loop: the converter measures the generator's output; both can be made to fail."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ Fault = Callable[[], BaseException]
 
 @dataclass
 class LoopbackWorld:
-    """What the fake instruments share: the output's state, the samples passed, and every call made."""
+    """State shared by the simulated instruments: output, converted samples, and all calls."""
 
     rig: Rig
     samples: int = 0
@@ -62,7 +62,7 @@ class LoopbackWorld:
     """Lets so many samples be converted, which then wait."""
 
     def command(self, name: str, argument: object = None) -> None:
-        """Note a call to the generator, which takes its time before it is in force."""
+        """Record a generator command, which takes `latency_s` before it is in force."""
         self.call(name, argument)
         if self.is_sampling and self.latency_s > 0:
             self.convert(round(self.latency_s * SAMPLE_RATE_HZ))
@@ -78,11 +78,11 @@ class LoopbackWorld:
             raise failure
 
     def amplitudes(self) -> list[tuple[int, float]]:
-        """Every amplitude setting, with the sample at which it was made."""
+        """Return every amplitude setting, with the sample at which it was made."""
         return [(at, value) for name, value, at in self.calls if name == "amplitude"]
 
     def terminal(self, count: int) -> Samples:
-        """Next samples at the generator's terminal [V]; the phase goes on."""
+        """Return the next samples at the generator's terminal [V]; the phase continues."""
         cycles = self.cycles + self.frequency_hz * np.arange(count) / SAMPLE_RATE_HZ
         self.cycles = (self.cycles + self.frequency_hz * count / SAMPLE_RATE_HZ) % 1.0
         if self.streams:
@@ -97,7 +97,7 @@ class LoopbackWorld:
         return 0.5 * self.amplitude_vpp * self.rig.generator.terminal_factor() * shape
 
     def stream(self, count: int) -> Samples:
-        """Next samples of the analogue output [V], which began with the digitizer; zero when it runs dry."""
+        """Return the next samples of the analogue output [V]; zero after the last written sample."""
         heard = np.zeros(count)
         written = np.array(self.streamed[self.samples : self.samples + count])
         heard[: written.size] = written
@@ -106,7 +106,7 @@ class LoopbackWorld:
 
 
 class LoopbackGenerator:
-    """A FunctionGenerator that remembers, and fails when told to."""
+    """A FunctionGenerator that records its calls and can be made to fail."""
 
     identity = Identity("MAKER", "GENERATOR", "1", "1.0", "MAKER,GENERATOR,1,1.0")
 
@@ -172,7 +172,7 @@ class LoopbackGenerator:
 
 
 class LoopbackOutput:
-    """An AnalogOutput that keeps what it was given, with room for half a second, and fails when told to."""
+    """An AnalogOutput with a buffer of half a second that keeps its samples and can be made to fail."""
 
     identity = Identity("MAKER", "OUTPUT", "3", "1.0", "OUTPUT")
     sample_rate_hz = SAMPLE_RATE_HZ
@@ -188,7 +188,7 @@ class LoopbackOutput:
         if world.streams and world.played > len(world.streamed):
             raise DataLost("the output ran out of samples")
         world.streamed.extend(volts)
-        # No room: the output plays on by itself until there is.
+        # The buffer is full: the output plays until there is room.
         world.played = max(world.played, len(world.streamed) - self.ahead_samples)
 
     def arm(self) -> None:
@@ -206,7 +206,7 @@ class LoopbackOutput:
 
 
 class LoopbackDigitizer:
-    """A Digitizer on the loop: all follow the generator, and the specimen sits on the base."""
+    """A Digitizer in the loop: all channels follow the generator, and m0 moves with the base."""
 
     identity = Identity("MAKER", "DIGITIZER", "2", "1.0", "DIGITIZER")
     sample_rate_hz = SAMPLE_RATE_HZ
@@ -267,7 +267,7 @@ class LoopbackDigitizer:
         self._waiting = np.concatenate((self._waiting, volts), axis=1)
 
     def _integrated(self, acceleration: Samples) -> Samples:
-        """Velocity of what moves with that acceleration; what lies seconds back is forgotten."""
+        """Return the velocity of this acceleration; it forgets what is some seconds old."""
         leak = 1 - 2 * np.pi * 0.1 / SAMPLE_RATE_HZ
         velocity, self._velocity = lfilter([1 / SAMPLE_RATE_HZ], [1, -leak], acceleration, zi=self._velocity)
         return velocity
@@ -326,12 +326,12 @@ class MemoryRecorder:
         return [text for _, kind, text in self.events if kind == "state"]
 
     def channel(self, row: int) -> Samples:
-        """All volts of one channel."""
+        """Return all volts of one channel."""
         return np.concatenate([block.volts[row] for block in self.blocks])
 
 
 class LoopbackBench:
-    """The fake instruments as a bench."""
+    """The simulated instruments as a bench."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -348,7 +348,7 @@ class LoopbackBench:
         self.idled_s = 0.0
 
     def idle(self, duration_s: float) -> None:
-        """Let time pass at once."""
+        """Let time pass without waiting."""
         self.idled_s += duration_s
 
 
@@ -361,20 +361,20 @@ def no_drive_left_on() -> None:
 
 @pytest.fixture(scope="session")
 def rig() -> Rig:
-    """The default rig, sampling slowly; nobody can change it."""
+    """The default rig at a low sample rate; it cannot be changed."""
     shipped = load_rig("virtual_rig")
     return changed(shipped, daq={"sample_rate_hz": SAMPLE_RATE_HZ})
 
 
 @pytest.fixture
 def bench(rig: Rig) -> LoopbackBench:
-    """A loop of fake instruments."""
+    """A bench of simulated instruments in a loop."""
     return LoopbackBench(rig)
 
 
 @pytest.fixture
 def streaming_bench(rig: Rig) -> LoopbackBench:
-    """The same loop with an analogue output."""
+    """The same bench with an analogue output."""
     output = OutputConfig(physical="ao0", limit_v=5.0, sample_rate_hz=SAMPLE_RATE_HZ, source="test")
     with_output = changed(rig, daq={"output": output})
     bench = LoopbackBench(with_output)
@@ -384,5 +384,5 @@ def streaming_bench(rig: Rig) -> LoopbackBench:
 
 @pytest.fixture(scope="session")
 def new_bench() -> Callable[[Rig], LoopbackBench]:
-    """Make benches, for tests that need more than one."""
+    """Return the class that makes benches, for tests that need several."""
     return LoopbackBench

@@ -1,4 +1,4 @@
-"""A bench opens all or nothing, and leaving it silences the generator whatever happened."""
+"""Opening a bench opens all instruments or none; leaving it always silences the generator."""
 
 import itertools
 from contextlib import contextmanager
@@ -29,7 +29,7 @@ _serials = itertools.count(1)
 
 @pytest.fixture
 def rig():
-    """The virtual rig at a low rate, with a generator of its own on the bus."""
+    """Return the virtual rig at a low sample rate, with a separate generator on the bus."""
     rig = load_rig("virtual_rig")
     resource = f"USB0::0x0699::0x0353::B{next(_serials):04d}::INSTR"
     return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
@@ -43,7 +43,7 @@ def virtual(rig):
 
 @pytest.fixture
 def laboratory(rig, virtual):
-    """The same rig as a laboratory sees it: instruments at addresses, nothing said of a simulation."""
+    """Return the same rig as a real one: instruments at addresses, no mention of a simulation."""
     return changed(rig, virtual=None, daq={"server": virtual.daq_address})
 
 
@@ -56,7 +56,7 @@ def laboratory_bench(laboratory):
         yield bench
 
 
-def read_after(laboratory, *faults):
+def read_after_faults(laboratory, *faults):
     with laboratory_bench(laboratory) as bench:
         for fault in faults:
             fault()
@@ -68,7 +68,7 @@ def output_of(virtual):
 
 
 class TestOpening:
-    def test_a_virtual_bench_needs_only_its_configuration(self, rig):
+    def test_a_virtual_bench_opens_with_its_configuration_alone(self, rig):
         with open_bench(rig) as bench:
             assert bench.kind is BenchKind.SIMULATED
             assert bench.identities["generator"].model == "AFG1022"
@@ -87,7 +87,7 @@ class TestOpening:
         assert np.std(drive_v) * np.sqrt(2) == pytest.approx(0.5 * rig.generator.terminal_factor(), rel=2e-3)
 
     def test_a_missing_converter_leaves_the_generator_free_and_silent(self, laboratory, virtual):
-        """As after a killed program: the output is on, and the converter may be reserved for a while."""
+        """Like after a killed program, the output is on before the bench opens."""
         virtual.generator.execute(b"OUTP1:STAT ON")
         assert output_of(virtual) == b"1\n"
         lost = changed(laboratory, daq={"server": "127.0.0.1:9"})
@@ -103,7 +103,7 @@ class TestOpening:
         virtual.faults.heal()
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
 
-    def test_an_unconfirmed_knob_keeps_the_bench_closed_and_silent(self, laboratory, virtual):
+    def test_a_bench_with_an_unconfirmed_knob_is_refused_and_stays_silent(self, laboratory, virtual):
         with pytest.raises(CheckFailed, match=r"gain of the Bruel & Kjaer 2706 was not confirmed at 10 dB"):
             open_bench(laboratory, confirm_by_asking(lambda _: "no", "somebody"), CalibrationRule.WAIVED)
         assert output_of(virtual) == b"0\n"
@@ -140,7 +140,7 @@ class TestLeaving:
         bench.close()
 
     @pytest.mark.parametrize("error", [RuntimeError("mine"), KeyboardInterrupt(), SystemExit(3)])
-    def test_every_error_inside_a_bench_silences_it_and_propagates(self, laboratory, virtual, error):
+    def test_every_error_while_a_bench_is_open_silences_it_and_propagates(self, laboratory, virtual, error):
         with pytest.raises(type(error)) as caught, laboratory_bench(laboratory):
             raise error
         assert caught.value is error
@@ -148,17 +148,17 @@ class TestLeaving:
 
     def test_a_dead_daq_server_silences_the_bench_and_notes_the_failed_close(self, laboratory, virtual):
         with pytest.raises(InstrumentLost) as caught:
-            read_after(laboratory, virtual.faults.lose_daq_server)
+            read_after_faults(laboratory, virtual.faults.lose_daq_server)
         assert str(caught.value).startswith("reading samples 0 to 511")
         assert any("releasing" in note for note in caught.value.__notes__)
         assert output_of(virtual) == b"0\n"
 
-    def test_a_pulled_cable_does_not_hide_the_first_error(self, laboratory, virtual):
+    def test_a_pulled_usb_cable_does_not_hide_the_first_error(self, laboratory, virtual):
         with pytest.raises(DataLost) as caught:
-            read_after(laboratory, virtual.faults.overrun, virtual.faults.pull_usb_cable)
+            read_after_faults(laboratory, virtual.faults.overrun, virtual.faults.pull_usb_cable)
         assert any("MAY STILL BE ON" in note for note in caught.value.__notes__)
 
-    def test_a_pulled_cable_at_closing_raises_an_error(self, laboratory, virtual):
+    def test_closing_a_bench_with_a_pulled_usb_cable_raises_an_error(self, laboratory, virtual):
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"), laboratory_bench(laboratory):
             virtual.faults.pull_usb_cable()
 
@@ -172,20 +172,20 @@ class TestLeaving:
 
 
 class TestCalibration:
-    def test_an_expired_calibration_keeps_the_bench_closed(self, laboratory):
+    def test_a_bench_with_an_expired_calibration_is_refused(self, laboratory):
         with pytest.raises(
             CheckFailed, match=r"Polytec PSV-500 DV-04 was calibrated on 2001-01-01.*730 days"
         ):
-            open_bench(aged(laboratory, "2001-01-01"), confirm_simulated)
+            open_bench(calibrated_on(laboratory, "2001-01-01"), confirm_simulated)
 
     def test_an_expired_calibration_can_be_waived(self, laboratory):
-        open_bench(aged(laboratory, "2001-01-01"), confirm_simulated, CalibrationRule.WAIVED).close()
+        open_bench(calibrated_on(laboratory, "2001-01-01"), confirm_simulated, CalibrationRule.WAIVED).close()
 
     def test_a_virtual_rig_needs_no_calibration(self, rig):
-        open_bench(aged(rig, "2001-01-01")).close()
+        open_bench(calibrated_on(rig, "2001-01-01")).close()
 
     @pytest.mark.parametrize(("age_days", "is_valid"), [(-1, False), (0, True), (730, True), (731, False)])
-    def test_a_calibration_is_valid_for_the_time_stated_by_the_rig(self, rig, age_days, is_valid):
+    def test_a_calibration_is_valid_for_the_days_configured_in_the_rig(self, rig, age_days, is_valid):
         today = rig.vibrometer.calibrated + timedelta(days=age_days)
         assert calibrations(rig, today)[0].is_valid is is_valid
 
@@ -204,7 +204,7 @@ class TestCalibration:
         assert any("PSV-500" in each for each in named)
 
     def test_playback_needs_no_valid_calibration(self, laboratory):
-        old = aged(laboratory, "2001-01-01")
+        old = calibrated_on(laboratory, "2001-01-01")
         played = changed(old, daq={"driver": "file"})
         with pytest.raises(ConfigurationError, match="names none"):
             open_bench(played, confirm_simulated)
@@ -240,13 +240,13 @@ class TestKnobs:
             confirm_by_sheet(path)(rig.knobs)
 
     def test_a_real_bench_without_an_operator_is_refused_with_the_list_of_its_knobs(self, laboratory):
-        # pytest gives its tests no terminal.
+        # pytest runs its tests without a terminal.
         with pytest.raises(CheckFailed, match=r"no one can answer here") as caught:
             open_bench(laboratory, calibration=CalibrationRule.WAIVED)
         assert all(f"{knob.setting} at {knob.value}" in str(caught.value) for knob in laboratory.knobs)
 
 
-def aged(rig, day):
+def calibrated_on(rig, day):
     vibrometer = rig.vibrometer.model_copy(update={"calibrated": datetime.fromisoformat(day).date()})
     return rig.model_copy(update={"vibrometer": vibrometer})
 

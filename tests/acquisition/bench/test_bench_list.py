@@ -1,4 +1,4 @@
-"""What can be put on a bench is found, and what cannot be searched is said."""
+"""Finding instruments: available ones are listed, and buses that cannot be searched are reported."""
 
 import pytest
 
@@ -15,7 +15,7 @@ def virtual():
         yield running
 
 
-def test_generator_and_converter_are_found_under_the_names_that_a_configuration_needs(virtual):
+def test_generator_and_converter_are_listed_under_the_names_used_in_configurations(virtual):
     found = list_instruments(server=virtual.daq_address)
     assert any("1689::851::L0001" in resource for resource in found.visa_resources)
     module = next(device for device in found.daq_devices if device.name == "cDAQ1Mod1")

@@ -1,4 +1,4 @@
-"""One program at a bench, whoever its user is and however their configuration writes its instruments."""
+"""Only one program can use a bench, for all users and all spellings of its addresses."""
 
 import os
 import sys
@@ -20,7 +20,7 @@ posix = pytest.mark.skipif(not hasattr(os, "fork"), reason="modes and links as P
 
 @pytest.fixture(autouse=True)
 def shared(monkeypatch):
-    """What /tmp is to the users of a computer: all may make files, each removes his own only."""
+    """Create a folder like /tmp: every user may create files, and remove only own files."""
     with TemporaryDirectory() as folder:
         Path(folder).chmod(0o1777)
         monkeypatch.setenv("VIBENCH_LOCK_DIR", folder)
@@ -29,7 +29,7 @@ def shared(monkeypatch):
 
 @pytest.fixture
 def user(tmp_path_factory, monkeypatch):
-    """Be somebody with a state folder of his own, of this number where there are such."""
+    """Act as a user with a separate state folder, with this user number if given."""
 
     @contextmanager
     def somebody(number=None):
@@ -92,18 +92,18 @@ def test_one_generator_under_two_names_has_one_lock(user, resource):
         BenchLock.of(second)
 
 
-def test_two_benches_of_one_computer_have_separate_locks():
+def test_two_benches_on_one_computer_have_separate_locks():
     other = generator(resource="USB0::0x0699::0x0353::C999999::INSTR")
     other = other.model_copy(update={"daq": other.daq.model_copy(update={"device": "Dev2"})})
     with closing(BenchLock.of(RIG)), closing(BenchLock.of(other)):
         pass
 
 
-def a_link(path, aim):
+def a_symbolic_link(path, aim):
     path.symlink_to(aim)
 
 
-def a_second_name(path, aim):
+def a_hard_link(path, aim):
     path.hardlink_to(aim)
 
 
@@ -117,7 +117,7 @@ def a_folder(path, aim):
 
 @posix
 @pytest.mark.timeout(10)
-@pytest.mark.parametrize("trap", [a_link, a_second_name, a_pipe, a_folder])
+@pytest.mark.parametrize("trap", [a_symbolic_link, a_hard_link, a_pipe, a_folder])
 def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path, trap):
     BenchLock.of(RIG).close()
     aim = tmp_path / "precious"
@@ -130,7 +130,7 @@ def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path,
     assert aim.read_text() == "kept"
 
 
-def test_only_a_process_number_in_a_lock_is_shown(shared, monkeypatch):
+def test_only_the_process_number_of_a_lock_file_is_shown(shared, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
     with closing(BenchLock.of(RIG)):
         for path in shared.iterdir():
@@ -140,6 +140,6 @@ def test_only_a_process_number_in_a_lock_is_shown(shared, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="systemd's")
-def test_cleaning_a_shared_folder_keeps_locks(shared):
+def test_lock_files_have_the_sticky_mode_that_protects_them_from_cleaning(shared):
     with closing(BenchLock.of(RIG)):
         assert all(path.stat().st_mode & 0o1777 == 0o1666 for path in shared.iterdir())

@@ -1,4 +1,4 @@
-"""Campaigns of short dwells, faults for them, and what became of their points."""
+"""Campaigns of short dwells, simulated faults, and the outcomes of campaign points."""
 
 from vibench.acquisition.campaign import read_journal
 from vibench.acquisition.campaign._journal import journal_path
@@ -27,8 +27,8 @@ def outcomes(point_results):
     return [(each.name, each.outcome.value) for each in point_results]
 
 
-def failing_once(bench, fault, name=None):
-    """Let one read raise ``fault`` while a recording, or that of ``name``, is running."""
+def fail_one_read(bench, fault, name=None):
+    """Return a progress callback that lets one read raise ``fault`` during a recording (of ``name``)."""
     faults = [fault]
 
     def watch(progress):

@@ -1,4 +1,4 @@
-"""The catalogue of a folder: what it says, that it reads what has changed, and that it can be made again."""
+"""The catalogue of a folder: its contents, updates after changes, and rebuilding."""
 
 import os
 import shutil
@@ -42,15 +42,15 @@ def folder(bench, tmp_path):
 
 @pytest.fixture
 def reads(monkeypatch):
-    """Names of the recordings that were opened."""
+    """Return the list of the names of the recordings that were opened."""
     opened = []
     read = catalogue_module.read_entry
 
-    def counted(folder, path, size_bytes):
+    def counted_read(folder, path, size_bytes):
         opened.append(path.name)
         return read(folder, path, size_bytes)
 
-    monkeypatch.setattr(catalogue_module, "read_entry", counted)
+    monkeypatch.setattr(catalogue_module, "read_entry", counted_read)
     return opened
 
 
@@ -136,7 +136,7 @@ def test_a_foreign_file_named_like_the_catalogue_is_kept_until_a_rebuild(folder)
 
 
 def test_a_read_only_folder_can_be_listed(folder, monkeypatch):
-    # A directory in the place of the database: what SQLite says of a folder that is read-only.
+    # For a directory in place of the database SQLite reports the same error as for a read-only folder.
     (folder / CATALOGUE_NAME).mkdir()
     assert len(list_recordings(folder)) == 2
 

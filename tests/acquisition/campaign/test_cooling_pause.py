@@ -1,4 +1,4 @@
-"""Silence between recordings: how long, how silent, who hears a stop, and what a kill leaves behind."""
+"""Cooling pauses between recordings: duration, silence, stops, holds and kills."""
 
 import shutil
 from datetime import timedelta
@@ -18,7 +18,7 @@ from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
-from .small_campaigns import campaign, failing_once, outcomes, points, states
+from .small_campaigns import campaign, fail_one_read, outcomes, points, states
 
 REST_S = 12.0
 
@@ -29,7 +29,7 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
         world = kept._power._virtual.world
         began_s, loudest_v = [], []
 
-        def happened(event):
+        def record_event(event):
             match event.kind:
                 case CampaignEventKind.RESTING:
                     world.keep_truth()
@@ -40,12 +40,12 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
 
         begun = monotonic()
         point_results = run_campaign(
-            kept.bench, campaign("one", "two", rest_s=REST_S), tmp_path, on_event=happened
+            kept.bench, campaign("one", "two", rest_s=REST_S), tmp_path, on_event=record_event
         )
         assert monotonic() - begun < REST_S
     assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
     assert len(began_s) == 1
-    assert max(loudest_v) < 1e-4  # the table's velocity [m/s]: noise of the amplifier
+    assert max(loudest_v) < 1e-4  # velocity of the table [m/s]: noise of the amplifier
     told = (tmp_path / "c.status").read_text()
     assert "resting for 12 s before two" in told
 
@@ -94,7 +94,7 @@ def test_a_hold_extends_a_cooling_pause_until_the_hold_is_released(bench, tmp_pa
 def test_a_campaign_killed_in_a_cooling_pause_continues_at_the_next_point(bench, new_bench, rig, tmp_path):
     def as_left_by_a_kill(event):
         if event.kind is CampaignEventKind.RESTING:
-            # What a process leaves that is killed now: the files as they are, the journal's log included.
+            # A killed process leaves the files as they are now, including the write-ahead log of the journal.
             shutil.copytree(tmp_path / "out", tmp_path / "killed", dirs_exist_ok=True)
 
     plan = campaign("one", "two", rest_s=REST_S)
@@ -107,8 +107,8 @@ def test_a_campaign_killed_in_a_cooling_pause_continues_at_the_next_point(bench,
     assert fresh.idled_s == 0.0  # nothing has been played in this session
 
 
-def test_a_second_attempt_also_waits_for_the_cooling_pause(bench, tmp_path):
-    fault = failing_once(bench, DataLost("a hole"))
+def test_a_repeated_measurement_also_waits_for_the_cooling_pause(bench, tmp_path):
+    fault = fail_one_read(bench, DataLost("a hole"))
     point_results = run_campaign(
         bench, campaign("one", rest_s=REST_S, attempts=2), tmp_path, on_progress=fault
     )

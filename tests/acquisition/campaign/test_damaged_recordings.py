@@ -1,4 +1,4 @@
-"""A recording that is not as it was sealed counts no longer: it is named, kept, and its point made again."""
+"""A recording that differs from its seal is reported, kept, and measured again."""
 
 import os
 import shutil
@@ -30,47 +30,47 @@ NAMES = ("one", "two", "three")
 CAMPAIGN = Campaign(name="c", measurements=tuple(dwell(name, 260.0 + n) for n, name in enumerate(NAMES)))
 
 
-def truncated(folder):
+def truncate(folder):
     content = (folder / "two.h5").read_bytes()
     (folder / "two.h5").write_bytes(content[: len(content) // 2])
 
 
-def emptied(folder):
+def empty(folder):
     (folder / "two.h5").write_bytes(b"")
 
 
-def made_random(folder):
+def fill_with_random_bytes(folder):
     (folder / "two.h5").write_bytes(os.urandom(20_000))
 
 
-def with_another_sample(folder):
+def change_one_sample(folder):
     with h5py.File(folder / "two.h5", "r+") as file:
         file["m0_velocity"][100] += 1
 
 
-def with_another_scale(folder):
+def change_the_scale(folder):
     with h5py.File(folder / "two.h5", "r+") as file:
         for name in ("scale_factor", "physical_per_volt"):
             file["m0_velocity"].attrs[name] *= 2.0
 
 
-def exchanged(folder):
+def copy_other_point(folder):
     shutil.copy(folder / "three.h5", folder / "two.h5")
 
 
-def exchanged_for_an_older_one(folder):
-    """Another sound recording of the very same plan."""
+def replace_by_an_older_recording(folder):
+    """Replace a recording by another intact recording of the same plan."""
     shutil.copy(folder / "older" / "two.h5", folder / "two.h5")
 
 
-def replaced_by_a_folder(folder):
+def replace_by_a_folder(folder):
     (folder / "two.h5").unlink()
     (folder / "two.h5").mkdir()
 
 
 DAMAGES = (
-    truncated, emptied, made_random, with_another_sample, with_another_scale, exchanged,
-    exchanged_for_an_older_one, replaced_by_a_folder,
+    truncate, empty, fill_with_random_bytes, change_one_sample, change_the_scale, copy_other_point,
+    replace_by_an_older_recording, replace_by_a_folder,
 )  # fmt: skip
 
 
@@ -84,7 +84,7 @@ def recorded(new_bench, rig, tmp_path_factory):
 
 @pytest.fixture
 def folder(recorded, tmp_path):
-    """The recordings, for one test to damage: file times and all, as their catalogue knows them."""
+    """Return copies of the recordings, with their file times, for one test to damage."""
     return shutil.copytree(recorded, tmp_path, dirs_exist_ok=True)
 
 
@@ -114,7 +114,7 @@ def test_a_damaged_point_is_reported_kept_and_recorded_again(bench, folder, dama
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("damage", [truncated, with_another_sample, replaced_by_a_folder])
+@pytest.mark.parametrize("damage", [truncate, change_one_sample, replace_by_a_folder])
 def test_a_campaign_without_journal_does_not_accept_damaged_recordings(bench, folder, damage):
     damage(folder)
     (folder / "c.campaign.sqlite").unlink()
@@ -125,8 +125,8 @@ def test_a_campaign_without_journal_does_not_accept_damaged_recordings(bench, fo
 
 @pytest.mark.parametrize("has_journal", [True, False])
 def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, folder, has_journal):
-    """A resumed campaign read every sample of hundreds of recordings before it saw that it was stopped."""
-    with_another_sample(folder)
+    """The check of hundreds of recordings must notice a stop before it has read them all."""
+    change_one_sample(folder)
     journal = folder / "c.campaign.sqlite"
     if not has_journal:
         journal.unlink()
@@ -139,8 +139,8 @@ def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, fold
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
 
 
-@pytest.mark.parametrize("damage", [truncated, with_another_scale, exchanged, replaced_by_a_folder])
-def test_a_resume_lists_its_points_before_output(folder, damage):
+@pytest.mark.parametrize("damage", [truncate, change_the_scale, copy_other_point, replace_by_a_folder])
+def test_the_list_of_planned_recordings_marks_damaged_ones_as_incomplete(folder, damage):
     damage(folder)
     planned = planned_recordings(CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert [each.is_complete for each in planned] == [True, False, True]
@@ -148,14 +148,14 @@ def test_a_resume_lists_its_points_before_output(folder, damage):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_verifying_finds_every_damage(folder, damage):
+def test_verifying_finds_every_kind_of_damage(folder, damage):
     damage(folder)
     bad = [each for each in verify_recordings(folder) if each.is_bad]
     assert [each.path for each in bad] == ["two.h5"]
 
 
-@pytest.mark.parametrize("damage", [truncated, emptied, made_random, with_another_scale])
-def test_the_catalogue_does_not_call_a_damaged_recording_good(folder, damage):
+@pytest.mark.parametrize("damage", [truncate, empty, fill_with_random_bytes, change_the_scale])
+def test_the_catalogue_lists_a_damaged_recording_as_bad(folder, damage):
     assert {each.verdict for each in list_recordings(folder)} == {"samples not checked"}
     damage(folder)
     (bad,) = (each for each in list_recordings(folder) if each.is_bad)
@@ -241,7 +241,7 @@ def test_every_seal_check_detects_a_swapped_recording(folder):
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
-def said_by(statement):
+def change_journal(statement):
     def damage(folder):
         connection = sqlite3.connect(folder / "c.campaign.sqlite")
         connection.execute("PRAGMA ignore_check_constraints = 1")
@@ -257,8 +257,8 @@ def said_by(statement):
 @pytest.mark.parametrize("seal", ["hex(zeroblob(32))", "(SELECT seal FROM points WHERE name = 'one')", "''"])
 def test_two_seals_of_one_recording_in_the_journal_are_reported_as_damage(folder, table, seal):
     list_recordings(folder)
-    said_by(f"UPDATE {table} SET seal = {seal} WHERE name = 'two'")(folder)
-    if (table, seal) == ("attempts", "''"):  # as in a journal from before seals
+    change_journal(f"UPDATE {table} SET seal = {seal} WHERE name = 'two'")(folder)
+    if (table, seal) == ("attempts", "''"):  # as in a journal written before seals existed
         assert not [each for each in verify_recordings(folder) if each.is_bad]
         return
     with open_recording(folder / "two.h5") as recording:
@@ -272,13 +272,13 @@ def test_two_seals_of_one_recording_in_the_journal_are_reported_as_damage(folder
 
 
 def test_a_forged_seal_in_one_table_of_the_journal_is_detected(folder):
-    exchanged_for_an_older_one(folder)
+    replace_by_an_older_recording(folder)
     with open_recording(folder / "two.h5") as recording:
-        said_by(f"UPDATE points SET seal = '{recording.seal}' WHERE name = 'two'")(folder)
+        change_journal(f"UPDATE points SET seal = '{recording.seal}' WHERE name = 'two'")(folder)
         assert recording.check_seal(SealDepth.WHOLE).state is SealState.DAMAGED
 
 
-def test_a_restored_recording_of_a_repeated_point_is_reported_as_damaged(bench, folder):
+def test_a_recording_moved_back_after_its_point_was_repeated_is_reported_as_bad(bench, folder):
     former = (folder / "two.h5").read_bytes()
     (folder / "two.h5").unlink()
     run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
@@ -290,17 +290,17 @@ def test_a_restored_recording_of_a_repeated_point_is_reported_as_damaged(bench, 
 @pytest.mark.parametrize(
     "damage",
     [
-        said_by("UPDATE points SET file = '../older/two.h5', state = 'running' WHERE name = 'two'"),
-        said_by("UPDATE points SET file = '/etc/two.h5' WHERE name = 'two'"),
-        said_by("UPDATE points SET file = hex(zeroblob(4000)) || '.h5' WHERE name = 'two'"),
-        said_by("UPDATE points SET file = x'ff' WHERE name = 'two'"),
-        said_by("UPDATE points SET state = 'lost' WHERE name = 'two'"),
-        said_by("UPDATE points SET measurement_json = '{}' WHERE name = 'two'"),
-        said_by("UPDATE campaign SET value = 'x' WHERE key = 'version'"),
-        said_by("UPDATE campaign SET value = 'x' WHERE key = 'plan_json'"),
-        said_by("UPDATE benches SET identity_json = 'x'"),
-        said_by("DELETE FROM benches"),
-        said_by("ALTER TABLE points RENAME COLUMN file TO fine"),
+        change_journal("UPDATE points SET file = '../older/two.h5', state = 'running' WHERE name = 'two'"),
+        change_journal("UPDATE points SET file = '/etc/two.h5' WHERE name = 'two'"),
+        change_journal("UPDATE points SET file = hex(zeroblob(4000)) || '.h5' WHERE name = 'two'"),
+        change_journal("UPDATE points SET file = x'ff' WHERE name = 'two'"),
+        change_journal("UPDATE points SET state = 'lost' WHERE name = 'two'"),
+        change_journal("UPDATE points SET measurement_json = '{}' WHERE name = 'two'"),
+        change_journal("UPDATE campaign SET value = 'x' WHERE key = 'version'"),
+        change_journal("UPDATE campaign SET value = 'x' WHERE key = 'plan_json'"),
+        change_journal("UPDATE benches SET identity_json = 'x'"),
+        change_journal("DELETE FROM benches"),
+        change_journal("ALTER TABLE points RENAME COLUMN file TO fine"),
     ],
 )
 def test_an_inconsistent_journal_is_refused_in_a_sentence(bench, folder, damage):
@@ -323,7 +323,7 @@ def test_a_pipe_in_place_of_a_journal_does_not_block(folder):
 
 
 def test_verifying_names_a_journal_that_cannot_be_read(folder):
-    said_by("UPDATE points SET measurement_json = '{}'")(folder)
+    change_journal("UPDATE points SET measurement_json = '{}'")(folder)
     bad = [each for each in verify_recordings(folder) if each.is_bad]
     assert [(each.path, each.verdict) for each in bad] == [("c.campaign.sqlite", "unreadable")]
 
@@ -350,7 +350,7 @@ RENAMED = CAMPAIGN.model_copy(update={"name": "d"})
 
 
 def test_a_renamed_campaign_ignores_recordings_that_its_old_journal_rejects(bench, folder):
-    exchanged_for_an_older_one(folder)
+    replace_by_an_older_recording(folder)
     made = run_campaign(bench, RENAMED, folder, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
@@ -364,8 +364,8 @@ def test_a_campaign_without_journal_ignores_recordings_of_another_bench(new_benc
     assert {each.outcome for each in made} == {PointOutcome.KEPT}
 
 
-def refused_by_the_disk(bench, folder, stop):
-    """Carry the campaign out until the disk refuses the end of ``two``, which ``stop`` may cut short."""
+def run_until_disk_refuses(bench, folder, stop):
+    """Run the campaign until ``two`` cannot be finished on disk; ``stop`` may end the recording early."""
     switch = StopSwitch()
 
     def refuse(stand):
@@ -382,7 +382,7 @@ def refused_by_the_disk(bench, folder, stop):
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
 def test_a_stopped_recording_not_finished_on_disk_is_recovered_later(bench, tmp_path, has_journal):
-    refused_by_the_disk(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
+    run_until_disk_refuses(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
     made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
     assert (tmp_path / "two.h5.part").exists()
@@ -399,8 +399,8 @@ def test_a_stopped_recording_not_finished_on_disk_is_recovered_later(bench, tmp_
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_complete_recording_not_finished_on_disk_is_not_repeated(bench, tmp_path, has_journal):
-    refused_by_the_disk(bench, tmp_path, None)
+def test_a_complete_recording_not_finished_on_disk_is_not_measured_again(bench, tmp_path, has_journal):
+    run_until_disk_refuses(bench, tmp_path, None)
     if not has_journal:
         (tmp_path / "c.campaign.sqlite").unlink()
     with pytest.raises(RecordingError, match=r"two\.h5"):
@@ -411,9 +411,9 @@ def test_a_complete_recording_not_finished_on_disk_is_not_repeated(bench, tmp_pa
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
-def test_a_complete_recording_counts_even_if_the_journal_disagrees(bench, tmp_path):
-    """The journal could not be written after the recovery; or the user recovered it, as the error says."""
-    refused_by_the_disk(bench, tmp_path, None)
+def test_a_complete_recording_counts_even_if_the_journal_lists_it_as_failed(bench, tmp_path):
+    """The journal may lag behind a recovery, or the user has recovered the recording by hand."""
+    run_until_disk_refuses(bench, tmp_path, None)
     (tmp_path / "two.h5.tmp").rmdir()
     recover(tmp_path / "two.h5.part")
     failed = read_journal(tmp_path / "c.campaign.sqlite")[1]
@@ -425,7 +425,7 @@ def test_a_complete_recording_counts_even_if_the_journal_disagrees(bench, tmp_pa
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
-def test_a_restored_recording_is_not_repeated(bench, folder):
+def test_a_recording_moved_back_into_the_folder_is_not_measured_again(bench, folder):
     (folder / "two.h5").rename(folder / "two.away")
     with pytest.raises(RecordingError, match="gone"):
         run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, on_event=leave)
@@ -435,5 +435,5 @@ def test_a_restored_recording_is_not_repeated(bench, folder):
 
 
 def leave(event):
-    """End the campaign as soon as it has looked through the folder."""
+    """End the campaign as soon as the folder has been checked."""
     raise RecordingError("the folder is gone")

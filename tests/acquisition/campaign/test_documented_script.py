@@ -1,4 +1,4 @@
-"""The script in docs/campaigns.md runs as it stands there, and finds the jump it looks for."""
+"""The script in docs/campaigns.md runs unchanged and refines a jump."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.campaign._journal import journal_path
 
 ROOT = Path(__file__).parents[3]
-# A specimen that leaves its collisions goes on with them for up to a second, by chance.
+# A specimen that stops colliding may do so up to a second late, by chance.
 CAMPAIGN = """
 name = "jump"
 [[sweeps]]
@@ -36,12 +36,12 @@ def script():
 def test_the_documented_script_refines_a_jump_and_can_be_repeated(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
-    # With seed 1 the motion at 207.5 Hz leaves its collisions while it is recorded.
+    # With seed 1 the collisions at 207.5 Hz cease during the recording.
     for given, other in (("sample_rate_hz = 51200", "sample_rate_hz = 5120"), ("seed = 1\n", "seed = 2\n")):
         assert given in rig
         rig = rig.replace(given, other)
     Path("bench.toml").write_text(rig)
-    # From 150 Hz on, where there is one motion, the specimen is led up the branch that collides.
+    # Below 150 Hz there is one motion; from there the specimen follows the branch with collisions.
     Path("campaign.toml").write_text(CAMPAIGN)
     exec(script, {})
     points = read_journal(journal_path(Path("recordings"), "jump"))

@@ -1,4 +1,4 @@
-"""Estimates of time and bytes, held against what a campaign really takes."""
+"""Estimates of a campaign's time and size match a real campaign."""
 
 import pytest
 
@@ -29,7 +29,7 @@ CAMPAIGN = validated(
 )
 
 
-def test_estimated_bytes_match_the_samples(rig, tmp_path):
+def test_the_estimated_size_of_recordings_matches_their_samples(rig, tmp_path):
     expected = estimate_campaign(CAMPAIGN, rig, tmp_path)
     bytes_per_s = 5120 * 4 * 4
     assert expected.largest_bytes == pytest.approx((0.6 + 0.4 + 0.5 + 0.3) * bytes_per_s)

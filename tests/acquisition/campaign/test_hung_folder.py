@@ -1,4 +1,4 @@
-"""A folder that hangs, as one of a network does, keeps no stop from a campaign whose drive is on."""
+"""A hanging network folder does not block the stop of a campaign whose drive is on."""
 
 import os
 import sys
@@ -28,7 +28,7 @@ def test_a_hanging_status_file_does_not_block_a_stop(rig, tmp_path, monkeypatch)
         if status.is_fifo():
             switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
         else:
-            # At once: what writes the status may do so between an unlink and a mkfifo.
+            # Replace the file in one step: the status writer may run between an unlink and a mkfifo.
             os.mkfifo(fifo)
             fifo.replace(status)
 
@@ -36,4 +36,4 @@ def test_a_hanging_status_file_does_not_block_a_stop(rig, tmp_path, monkeypatch)
         (point_result,) = run_campaign(kept.bench, PLAN, tmp_path, on_progress=progress, switch=switch)
     assert point_result.outcome is PointOutcome.STOPPED
     assert point_result.reason == "enough"
-    os.close(os.open(status, os.O_RDONLY | os.O_NONBLOCK))  # whoever waits there goes on, to its end
+    os.close(os.open(status, os.O_RDONLY | os.O_NONBLOCK))  # lets the waiting writer end

@@ -1,4 +1,4 @@
-"""The journal: what it keeps, that a cut transaction leaves no trace, and who may look."""
+"""The journal: contents, interrupted transactions, and concurrent readers."""
 
 import multiprocessing
 import os
@@ -76,7 +76,7 @@ def test_an_added_point_with_an_existing_name_is_refused(journal):
 def _start_and_die(path):
     with Journal.open(path) as journal:
         journal.start("one", "one.h5")
-        # Half of the next step: its transaction is open when the process ends without a word.
+        # The transaction of the next step is open when the process ends.
         journal._connection.execute("BEGIN IMMEDIATE")
         journal._connection.execute("UPDATE points SET state = 'done'")
         os._exit(9)
@@ -96,7 +96,7 @@ def test_a_kill_during_a_journal_transaction_keeps_the_previous_state(journal):
     ]
 
 
-def test_reading_the_journal_during_writing_leaves_no_extra_files(journal, tmp_path):
+def test_a_journal_read_during_writing_leaves_no_extra_files(journal, tmp_path):
     journal.start("one", "one.h5")
     assert read_journal(journal.path)[0].state is JournalPointState.RUNNING
     journal.end("one", JournalPointState.DONE, ReasonCode.CARRIED_OUT, "")
@@ -125,19 +125,19 @@ def test_foreign_files_and_newer_journals_are_refused(journal, tmp_path):
 
 @pytest.fixture
 def connections(monkeypatch):
-    """Every connection to a database that is made."""
+    """Return the list of all database connections that are made."""
     made, connect = [], sqlite3.connect
     monkeypatch.setattr(sqlite3, "connect", lambda *at, **how: made.append(connect(*at, **how)) or made[-1])
     return made
 
 
-def opened(path):
+def open_and_close(path):
     with Journal.open(path):
         pass
 
 
 @pytest.mark.parametrize(
-    "use", [opened, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
+    "use", [open_and_close, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
 )
 def test_a_refused_journal_or_catalogue_file_is_closed(connections, tmp_path, use):
     path = tmp_path / "catalogue.sqlite"
@@ -151,7 +151,7 @@ def test_a_refused_journal_or_catalogue_file_is_closed(connections, tmp_path, us
             connection.execute("SELECT 1")
 
 
-def test_a_journal_that_cannot_be_started_closes_its_connection(journal, connections):
+def test_a_journal_that_already_exists_is_refused_and_its_connection_closed(journal, connections):
     with pytest.raises(RecordingError, match="already exists"):
         Journal.begin(journal.path, CAMPAIGN, journal.bench)
     (connection,) = connections

@@ -12,27 +12,27 @@ NOTICE = {"campaign": "c", "event": "ended", "reason": "c is finished", "recorde
 
 
 class Conversation(socketserver.StreamRequestHandler):
-    """As much of SMTP as a client without login needs."""
+    """The part of SMTP that a client without login uses."""
 
     def handle(self):
-        self.say("220 here")
+        self.reply("220 here")
         while line := self.rfile.readline().decode().strip():
             self.server.heard.append(line)
             match line.split(" ")[0].upper():
                 case "EHLO":
-                    self.say("250 here")
+                    self.reply("250 here")
                 case "DATA":
-                    self.say("354 go on")
+                    self.reply("354 go on")
                     while (text := self.rfile.readline().decode().rstrip("\r\n")) != ".":
                         self.server.heard.append(text)
-                    self.say("250 kept")
+                    self.reply("250 kept")
                 case "QUIT":
-                    self.say("221 bye")
+                    self.reply("221 bye")
                     return
                 case _:
-                    self.say("250 yes")
+                    self.reply("250 yes")
 
-    def say(self, line):
+    def reply(self, line):
         self.wfile.write(f"{line}\r\n".encode())
 
 
@@ -84,7 +84,7 @@ def test_a_server_without_requested_encryption_is_not_used(server, tmp_path):
     assert not any(line.startswith("Subject") for line in server.heard)
 
 
-def test_passwords_are_never_shown_or_stored_in_a_campaign(tmp_path):
+def test_the_mail_password_is_not_shown_and_an_invalid_sender_is_refused(tmp_path):
     shown = MailSettings(host="h", sender="a@b", recipients=("c@d",), user="me", password="secret!")
     assert "secret!" not in repr(shown)
     path = tmp_path / "mail.toml"

@@ -1,4 +1,4 @@
-"""Campaigns on a loop of fake instruments, into real files."""
+"""Campaigns with simulated instruments in a loop, recorded into real files."""
 
 import signal
 
@@ -17,7 +17,7 @@ from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, RunState
 from vibench.acquisition.recording import RecordingState
 
-from .small_campaigns import campaign, dwell, failing_once, outcomes
+from .small_campaigns import campaign, dwell, fail_one_read, outcomes
 
 CAMPAIGN = campaign("one", "two", "three")
 
@@ -43,13 +43,13 @@ def test_limits_are_checked_once_for_points_with_equal_excitation(bench, tmp_pat
 
 
 def test_a_complete_recording_can_be_moved_during_the_campaign(bench, tmp_path, monkeypatch):
-    def measured_and_moved(*arguments, **named):
+    def measure_and_move(*arguments, **named):
         outcome = run_measurement(*arguments, **named)
         if outcome.path.name == "two.h5":
             outcome.path.rename(tmp_path / "elsewhere.h5")
         return outcome
 
-    monkeypatch.setattr(_attempts, "run_measurement", measured_and_moved)
+    monkeypatch.setattr(_attempts, "run_measurement", measure_and_move)
     point_results = run_campaign(bench, CAMPAIGN, tmp_path / "out")
     assert [each.outcome for each in point_results] == [PointOutcome.RECORDED] * 3
     monkeypatch.undo()
@@ -59,7 +59,7 @@ def test_a_complete_recording_can_be_moved_during_the_campaign(bench, tmp_path, 
 
 @pytest.fixture(scope="module")
 def recorded(new_bench, rig, tmp_path_factory):
-    """A folder of the finished campaign, and what its progress named, numbered and counted."""
+    """Return the folder of a finished campaign, and the set of (name, number, count) of its progress."""
     folder, seen = tmp_path_factory.mktemp("recorded"), set()
     run_campaign(
         new_bench(rig), CAMPAIGN, folder, on_progress=lambda p: seen.add((p.name, p.number, p.count))
@@ -80,9 +80,9 @@ def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(ben
 
 
 @pytest.mark.thorough
-def test_resuming_keeps_complete_points_and_records_the_remaining_points(bench, tmp_path):
+def test_a_resume_keeps_complete_points_and_records_the_remaining_points(bench, tmp_path):
     with pytest.raises(DataLost):
-        run_campaign(bench, CAMPAIGN, tmp_path, on_progress=failing_once(bench, DataLost("a hole"), "two"))
+        run_campaign(bench, CAMPAIGN, tmp_path, on_progress=fail_one_read(bench, DataLost("a hole"), "two"))
     point_results = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(point_results) == [("one", "kept"), ("two", "recorded"), ("three", "recorded")]
     assert sorted(path.name for path in tmp_path.glob("*.h5")) == ["one.h5", "three.h5", "two.2.h5", "two.h5"]
@@ -93,14 +93,14 @@ def test_resuming_keeps_complete_points_and_records_the_remaining_points(bench, 
     assert {outcome for _, outcome in outcomes(kept)} == {"kept"}
 
 
-def test_resuming_with_another_plan_is_refused(bench, recorded):
+def test_a_resume_with_another_plan_is_refused(bench, recorded):
     changed = Campaign(name="c", measurements=(dwell("one", amplitude_vpp=2.0),))
     with pytest.raises(RecordingError, match=r"has changed since .*c\.campaign\.sqlite was written"):
         run_campaign(bench, changed, recorded[0], ExistingRecordings.RESUME)
 
 
 def test_a_campaign_can_skip_a_failed_measurement(bench, tmp_path):
-    fault = failing_once(bench, DataLost("a hole"), "one")
+    fault = fail_one_read(bench, DataLost("a hole"), "one")
     point_results = run_campaign(
         bench, CAMPAIGN, tmp_path, after_failure=AfterFailure.GO_ON, on_progress=fault
     )
@@ -110,7 +110,7 @@ def test_a_campaign_can_skip_a_failed_measurement(bench, tmp_path):
 
 @pytest.mark.parametrize("lost", [InstrumentLost("gone"), RecordingError("the disk is full")])
 def test_a_lost_instrument_or_disk_always_ends_a_campaign(bench, tmp_path, lost):
-    fault = failing_once(bench, lost, "one")
+    fault = fail_one_read(bench, lost, "one")
     with pytest.raises(type(lost)):
         run_campaign(bench, CAMPAIGN, tmp_path, after_failure=AfterFailure.GO_ON, on_progress=fault)
     assert [path.name for path in tmp_path.glob("*.h5*")] == ["one.h5"]
@@ -139,20 +139,20 @@ def test_ctrl_c_ramps_down_the_measurement_and_ends_the_campaign(bench, tmp_path
         assert recording.reason.startswith("SIGINT")
 
 
-def test_a_second_ctrl_c_stops_faster_and_further_ones_have_no_effect(bench, tmp_path):
-    def press_on(progress):
+def test_a_second_ctrl_c_stops_faster_and_further_presses_have_no_effect(bench, tmp_path):
+    def press_repeatedly(progress):
         if progress.state is RunState.RECORDING or progress.state is RunState.RAMPING_DOWN:
             signal.raise_signal(signal.SIGINT)
 
     original = bench.generator.stop
 
-    def stop_under_fire():
+    def stop_with_ctrl_c():
         signal.raise_signal(signal.SIGINT)
         original()
 
-    bench.generator.stop = stop_under_fire
+    bench.generator.stop = stop_with_ctrl_c
     with pytest.raises(KeyboardInterrupt):
-        run_measurement(bench, dwell("one"), tmp_path / "one.h5", on_progress=press_on)
+        run_measurement(bench, dwell("one"), tmp_path / "one.h5", on_progress=press_repeatedly)
     assert not bench.world.is_on
     with open_recording(tmp_path / "one.h5") as recording:
         assert recording.state is RecordingState.STOPPED

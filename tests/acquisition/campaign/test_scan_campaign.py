@@ -1,4 +1,4 @@
-"""Scans: who moves the beam, what a recording keeps of its point, and points that are refused or resumed."""
+"""Scans: moving the beam, the scan point in each recording, and points that are refused or resumed."""
 
 import json
 import shlex
@@ -75,13 +75,13 @@ def test_each_recording_contains_its_own_mass_and_scan_point(kept, tmp_path):
     world.keep_truth()
     velocities = {}
 
-    def happened(event):
+    def handle_event(event):
         if event.kind is CampaignEventKind.POINT_DONE:
             truth = world.truth()[: -round(0.35 * 25_600)][-round(0.2 * 25_600) :]
             columns = dict(zip(MOTION_COLUMNS, np.ptp(truth, axis=0), strict=True))
             velocities[event.facts["point"]] = columns
 
-    assert outcomes(run_campaign(kept.bench, scan(), tmp_path, on_event=happened)) == ALL
+    assert outcomes(run_campaign(kept.bench, scan(), tmp_path, on_event=handle_event)) == ALL
     for number, (name, body) in enumerate(PLACES.items()):
         path = tmp_path / f"dwell-{name}.h5"
         with open_recording(path) as recording:
@@ -113,15 +113,15 @@ def test_the_seal_covers_the_scan_coordinates(kept, tmp_path):
 
 
 @pytest.mark.parametrize("journal", ["kept", "lost"])
-def test_a_scan_resumes_at_its_third_point(coarse, tmp_path, journal):
+def test_a_scan_stopped_at_its_third_point_resumes_there(coarse, tmp_path, journal):
     switch = StopSwitch()
 
-    def stop_in_the_third(progress):
+    def stop_at_third_point(progress):
         if progress.name == "dwell-side":
             switch.ask(StopRequest.by(Cause.OPERATOR, "stopped"))
 
     with ReconnectingBench(coarse) as kept:
-        first = run_campaign(kept.bench, scan(), tmp_path, on_progress=stop_in_the_third, switch=switch)
+        first = run_campaign(kept.bench, scan(), tmp_path, on_progress=stop_at_third_point, switch=switch)
     assert outcomes(first)[-1] == ("dwell-side", PointOutcome.STOPPED)
     if journal == "lost":
         journal_path(tmp_path, "c").unlink()
@@ -145,7 +145,7 @@ sys.exit(3 if point["name"] == "low" else 0)
 """
 
 
-class Watched(CommandMessenger):
+class DriveWatcher(CommandMessenger):
     """A command that also notes whether a drive was on when it ran."""
 
     driven: ClassVar = []
@@ -158,7 +158,7 @@ class Watched(CommandMessenger):
 def test_the_move_command_runs_with_the_drive_off_and_may_refuse_a_point(kept, tmp_path):
     script, log = tmp_path / "move.py", tmp_path / "moves.jsonl"
     script.write_text(MOVER)
-    command = Watched.of(shlex.join([sys.executable, str(script), str(log), "$HOME; no shell"]))
+    command = DriveWatcher.of(shlex.join([sys.executable, str(script), str(log), "$HOME; no shell"]))
     twice = [
         {"name": name, **scan().measurements[0].model_dump(mode="json", exclude={"name"})} for name in "ab"
     ]
@@ -197,7 +197,7 @@ def test_the_move_command_runs_with_the_drive_off_and_may_refuse_a_point(kept, t
 
 
 def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
-    """Another program serves the rig, so nothing here can move its beam."""
+    """Another program serves the rig, so the campaign cannot move the beam by itself."""
     asked, switch = [], StopSwitch()
     with VirtualRig(coarse) as virtual:
         real = coarse.model_copy(
@@ -208,7 +208,7 @@ def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
             }
         )
 
-        def happened(event):
+        def handle_event(event):
             if event.kind is CampaignEventKind.MOVE_BEAM:
                 asked.append(event.text)
                 assert switch.is_holding
@@ -220,7 +220,7 @@ def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
                 switch.resume()
 
         with open_bench(real, confirm_simulated, "waived") as bench:
-            found = run_campaign(bench, scan(), tmp_path, switch=switch, on_event=happened)
+            found = run_campaign(bench, scan(), tmp_path, switch=switch, on_event=handle_event)
     assert outcomes(found) == ALL[:2]
     assert asked[0] == (
         "move the beam to top on m2 (x 0, y -0.5, z 0 m), then run 'vibench release' or press 'Go on'"

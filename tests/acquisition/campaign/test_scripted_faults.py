@@ -1,4 +1,4 @@
-"""A campaign on a rig that goes wrong by a script: faults cost attempts, and no point is lost."""
+"""A campaign on a rig with scripted faults repeats measurements and loses no point."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""When nobody is there: retries, a bench that comes back or has changed, results that ask for more."""
+"""Unattended campaigns: retries, reopened and changed benches, follow-up measurements."""
 
 import json
 import sys
@@ -25,7 +25,7 @@ from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Retryable
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
-from .small_campaigns import campaign, dwell, failing_once, outcomes, points, states
+from .small_campaigns import campaign, dwell, fail_one_read, outcomes, points, states
 
 
 def log(folder):
@@ -34,7 +34,7 @@ def log(folder):
 
 class TestRetries:
     def test_a_measurement_with_lost_data_is_repeated_in_a_new_file(self, bench, tmp_path):
-        fault = failing_once(bench, DataLost("a hole"))
+        fault = fail_one_read(bench, DataLost("a hole"))
         point_results = run_campaign(bench, campaign("one", "two", attempts=2), tmp_path, on_progress=fault)
         assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
         assert [each.path.name for each in point_results] == ["one.2.h5", "two.h5"]
@@ -43,7 +43,7 @@ class TestRetries:
         assert [line["why"] for line in log(tmp_path) if line["event"] == "fault"] == ["data_lost"]
 
     def test_faults_outside_the_retry_policy_are_not_retried(self, bench, tmp_path):
-        fault = failing_once(bench, DataLost("a hole"))
+        fault = fail_one_read(bench, DataLost("a hole"))
         with pytest.raises(DataLost):
             run_campaign(
                 bench, campaign("one", attempts=3, on=[Retryable.CHECK_FAILED]), tmp_path, on_progress=fault
@@ -52,14 +52,14 @@ class TestRetries:
         assert (point.state.value, point.reason_code, point.attempts) == ("failed", ReasonCode.DATA_LOST, 1)
         assert point.reason == "a hole"
 
-    def test_a_lost_instrument_is_reopened(self, bench, new_bench, rig, tmp_path):
+    def test_a_campaign_reopens_its_bench_after_a_lost_instrument(self, bench, new_bench, rig, tmp_path):
         opened = []
 
         def reopen():
             opened.append(new_bench(rig))
             return opened[-1]
 
-        fault = failing_once(bench, InstrumentLost("gone"))
+        fault = fail_one_read(bench, InstrumentLost("gone"))
         point_results = run_campaign(
             bench, campaign("one", "two", attempts=2), tmp_path, on_progress=fault, reopen=reopen
         )
@@ -72,7 +72,7 @@ class TestRetries:
         def reopen():
             raise InstrumentLost("still gone")
 
-        fault = failing_once(bench, InstrumentLost("gone"))
+        fault = fail_one_read(bench, InstrumentLost("gone"))
         with pytest.raises(InstrumentLost, match="gone") as ended:
             run_campaign(
                 bench,
@@ -87,8 +87,8 @@ class TestRetries:
 
     def test_a_bench_that_reopens_with_other_instruments_is_not_used(self, bench, new_bench, rig, tmp_path):
         other = new_bench(rig)
-        other.identities = {**other.identities, "generator": other_serial(other.identities["generator"])}
-        fault = failing_once(bench, InstrumentLost("gone"))
+        other.identities = {**other.identities, "generator": with_other_serial(other.identities["generator"])}
+        fault = fail_one_read(bench, InstrumentLost("gone"))
         with pytest.raises(CheckFailed, match=r"instruments\.generator\.serial was"):
             run_campaign(
                 bench, campaign("one", attempts=2), tmp_path, on_progress=fault, reopen=lambda: other
@@ -96,14 +96,14 @@ class TestRetries:
         assert not any(name == "start" for name, _, _ in other.world.calls)
 
 
-def other_serial(identity):
+def with_other_serial(identity):
     return Identity(identity.maker, identity.model, "another", identity.firmware, identity.reply)
 
 
 class TestAnotherBench:
     @pytest.fixture
     def begun(self, bench, tmp_path):
-        fault = failing_once(bench, DataLost("a hole"))
+        fault = fail_one_read(bench, DataLost("a hole"))
         with pytest.raises(DataLost):
             run_campaign(bench, campaign("one", "two"), tmp_path, on_progress=fault)
         return tmp_path
@@ -115,9 +115,9 @@ class TestAnotherBench:
             run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
-    def test_a_changed_bench_becomes_the_bench_of_the_campaign_once_accepted(self, begun, new_bench, rig):
+    def test_a_changed_bench_once_accepted_needs_no_second_acceptance(self, begun, new_bench, rig):
         bench = new_bench(rig)
-        bench.identities = {**bench.identities, "generator": other_serial(bench.identities["generator"])}
+        bench.identities = {**bench.identities, "generator": with_other_serial(bench.identities["generator"])}
         point_results = run_campaign(
             bench, campaign("one", "two"), begun, ExistingRecordings.RESUME, changed_bench=ChangedBench.ACCEPT
         )
@@ -153,11 +153,11 @@ class TestFurtherMeasurements:
         ]
 
     def test_a_resume_repeats_a_follow_up_analysis_that_was_not_stored(self, bench, tmp_path):
-        def broken(finished, recording):
+        def failing_analysis(finished, recording):
             raise ZeroDivisionError
 
         with pytest.raises(ZeroDivisionError):
-            run_campaign(bench, campaign("one"), tmp_path, after=broken)
+            run_campaign(bench, campaign("one"), tmp_path, after=failing_analysis)
         assert states(tmp_path) == ["done"]
         names = iter([[dwell("more")], []])
         point_results = run_campaign(
@@ -179,11 +179,11 @@ class TestResuming:
         assert [point.reason_code for point in points(tmp_path)] == [ReasonCode.FOUND, ReasonCode.FOUND]
 
     def test_two_programs_cannot_run_one_campaign(self, bench, tmp_path):
-        def second(progress):
+        def run_second_campaign(progress):
             with pytest.raises(RecordingError, match="another program is running"):
                 run_campaign(bench, campaign("one"), tmp_path, ExistingRecordings.RESUME)
 
-        run_campaign(bench, campaign("one"), tmp_path, on_progress=second)
+        run_campaign(bench, campaign("one"), tmp_path, on_progress=run_second_campaign)
         assert states(tmp_path) == ["done"]
 
     def test_a_stop_between_two_points_leaves_the_remaining_points_queued(self, bench, tmp_path):
@@ -209,14 +209,14 @@ class TestWatching:
         assert "c is finished (2 done, about 0:00:00 left)" in last
 
     def test_control_characters_of_instruments_do_not_reach_the_status(self, bench, tmp_path):
-        lost = failing_once(bench, DataLost("it replied \x1b[2J\udcff\nc is finished"))
+        lost = fail_one_read(bench, DataLost("it replied \x1b[2J\udcff\nc is finished"))
         with pytest.raises(DataLost):
             run_campaign(bench, campaign("one", attempts=1), tmp_path, on_progress=lost)
         text = (tmp_path / "c.status").read_text()
         assert r"it replied \x1b[2J\udcff\nc is finished" in text
         assert "\x1b" not in text
 
-    def test_an_incomplete_log_line_does_not_damage_the_next_one(self, bench, tmp_path):
+    def test_an_incomplete_log_line_does_not_damage_the_next_line(self, bench, tmp_path):
         (tmp_path / "c.log.jsonl").write_text('{"utc": "2026-01-01T00:00:00", "eve')
         run_campaign(bench, campaign("one"), tmp_path)
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
@@ -229,7 +229,7 @@ class TestWatching:
             CommandMessenger((sys.executable, "-c", keep, str(told))),
             CommandMessenger(("/no/such/program", "--now")),
         )
-        fault = failing_once(bench, DataLost("a hole"))
+        fault = fail_one_read(bench, DataLost("a hole"))
         run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=fault, messengers=messengers)
         fault, end = (json.loads(line) for line in told.read_text().splitlines())
         assert (fault["event"], fault["why"], fault["reason"]) == ("fault", "data_lost", "one: a hole")

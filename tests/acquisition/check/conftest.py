@@ -1,4 +1,4 @@
-"""A bench that is real as far as anybody on it can tell, on simulated instruments with faults on demand."""
+"""A bench on simulated instruments that programs take for a real one, with faults on demand."""
 
 import itertools
 from contextlib import contextmanager
@@ -31,13 +31,13 @@ def bench_of(rig, **habits):
 
 @pytest.fixture(name="bench_of")
 def _bench_of():
-    """Open a bench on a virtual rig that looks real: gives the bench and what is behind it."""
+    """Open a bench on a virtual rig that looks real; yields the bench and the virtual rig."""
     return bench_of
 
 
 @pytest.fixture
 def state_folder(tmp_path, monkeypatch):
-    """A state folder that nothing was kept in yet."""
+    """Return a state folder without stored files."""
     folder = tmp_path / "state"
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(folder))
     return folder

@@ -1,4 +1,4 @@
-"""What a bench needs before it is armed: a check that is recent, passed, and of the same configuration."""
+"""A bench is armed only after a recent, passed check of the same configuration."""
 
 import json
 from datetime import UTC, datetime, timedelta
@@ -32,7 +32,7 @@ DWELL = Measurement(
 )
 
 
-def kept_result(rig, age_h=1.0, verdict=Verdict.OK):
+def store_result(rig, age_h=1.0, verdict=Verdict.OK):
     found = Finding(name="amplifier gain", value="13 dB", expected="10 dB within 1 dB", verdict=verdict)
     result = CheckResult.of(rig, BenchReport(findings=(found,)), NOW - timedelta(hours=age_h))
     keep(result)
@@ -41,12 +41,12 @@ def kept_result(rig, age_h=1.0, verdict=Verdict.OK):
 
 @pytest.fixture
 def real(bench_of, rig, state_folder):
-    """A bench that nothing tells from a real one."""
+    """Open a simulated bench that programs take for a real one."""
     with bench_of(rig) as (bench, virtual):
         yield bench, virtual
 
 
-def test_an_unchecked_real_bench_is_not_armed(real, tmp_path):
+def test_a_real_bench_without_a_check_is_not_armed(real, tmp_path):
     bench, virtual = real
     before_s = virtual.world.time_s
     with pytest.raises(CheckFailed, match=r"checked under this user account.*bench check.*--check waived"):
@@ -64,7 +64,7 @@ def test_an_unchecked_real_bench_is_not_armed(real, tmp_path):
 )
 def test_an_old_or_failed_check_does_not_arm_a_real_bench(real, tmp_path, age_h, verdict, said):
     bench, _ = real
-    kept_result(bench.rig, age_h, verdict)
+    store_result(bench.rig, age_h, verdict)
     with pytest.raises(CheckFailed, match=said):
         require_fresh(bench, tmp_path, clock=lambda: NOW)
 
@@ -72,7 +72,7 @@ def test_an_old_or_failed_check_does_not_arm_a_real_bench(real, tmp_path, age_h,
 @pytest.mark.parametrize("verdict", [Verdict.OK, Verdict.WARN])
 def test_a_recent_passed_check_is_not_repeated(real, tmp_path, verdict):
     bench, virtual = real
-    result = kept_result(bench.rig, 11.9, verdict)
+    result = store_result(bench.rig, 11.9, verdict)
     before_s = virtual.world.time_s
     assert require_fresh(bench, tmp_path, clock=lambda: NOW) == result
     assert virtual.world.time_s == before_s
@@ -81,14 +81,14 @@ def test_a_recent_passed_check_is_not_repeated(real, tmp_path, verdict):
 def test_a_check_of_another_configuration_does_not_arm_the_bench(real, tmp_path):
     bench, _ = real
     turned = bench.rig.amplifier.model_copy(update={"gain_db": 20.0})
-    kept_result(bench.rig.model_copy(update={"amplifier": turned}))
+    store_result(bench.rig.model_copy(update={"amplifier": turned}))
     with pytest.raises(CheckFailed, match="was made with another configuration"):
         require_fresh(bench, tmp_path, clock=lambda: NOW)
 
 
 def test_the_rig_sets_how_long_a_check_is_valid(rig, state_folder):
     patient = rig.model_copy(update={"check_valid_h": 48.0})
-    result = kept_result(rig, 30.0)
+    result = store_result(rig, 30.0)
     assert "12 h are allowed" in why_not(result, rig, NOW)
     assert why_not(result, patient, NOW) is None
 
@@ -150,28 +150,28 @@ def test_changes_since_the_last_check_are_reported_in_decibels_and_days(real, tm
     assert drifted.verdict is Verdict.WARN
     assert "look for a changed knob" in drifted.advice
     assert result.report["drive over setting since last time"].verdict is Verdict.OK
-    # The gain itself is still within a decibel of its knob: without memory nobody would have noticed.
+    # The gain is still within one decibel of its knob: without the earlier check nobody would notice.
     assert result.report["amplifier gain"].verdict is Verdict.OK
 
 
 def test_checks_of_different_configurations_are_not_compared(real, tmp_path):
     bench, _ = real
-    kept_result(bench.rig.model_copy(update={"calibration_valid_days": 1}))
+    store_result(bench.rig.model_copy(update={"calibration_valid_days": 1}))
     assert not [each for each in check_bench(bench, tmp_path).findings if "since" in each.name]
 
 
 class TestKeeping:
     def test_only_the_last_check_of_each_rig_is_stored(self, rig, state_folder):
         other = rig.model_copy(update={"name": "another: rig/1"})
-        kept_result(rig, 3.0)
-        last, apart = kept_result(rig, 2.0), kept_result(other)
+        store_result(rig, 3.0)
+        last, apart = store_result(rig, 2.0), store_result(other)
         assert last_check(rig.name) == last
         assert last_check(other.name) == apart
         assert len(list(state_folder.rglob("*"))) == 1 + 2 * 2, "the last, and the last that passed"
 
     @pytest.mark.thorough
     def test_a_check_is_compared_with_the_last_passed_check(self, real, tmp_path):
-        """A fault that is still there was no fault the second time, and a repaired bench failed."""
+        """A persistent fault must fail every check until a new reference is accepted."""
         bench, _ = real
         healthy = check_bench(bench, tmp_path)
         was_louder = tuple(
@@ -192,16 +192,16 @@ class TestKeeping:
 
     @pytest.mark.parametrize("content", ["", "{", '{"rig": 3}', "\x00\xff"])
     def test_a_damaged_check_file_counts_as_no_check(self, rig, state_folder, content):
-        kept_result(rig)
+        store_result(rig)
         archive_path(rig.name).write_bytes(content.encode("latin-1"))
         assert last_check(rig.name) is None
 
     def test_an_unwritable_folder_gives_a_one_sentence_error(self, rig, state_folder):
         state_folder.write_text("a file in the way")
         with pytest.raises(RecordingError, match="VIBENCH_STATE_DIR"):
-            kept_result(rig)
+            store_result(rig)
 
-    def test_the_pace_does_not_change_the_identity_of_a_virtual_rig(self, rig):
+    def test_the_pace_of_a_virtual_rig_does_not_change_its_digest(self, rig):
         fast = rig.virtual.model_copy(update={"pace": "wall", "speed": 3.0})
         noisy = rig.virtual.model_copy(update={"seed": 99})
         assert rig_digest(rig) == rig_digest(rig.model_copy(update={"virtual": fast}))

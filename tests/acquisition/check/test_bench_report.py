@@ -1,4 +1,4 @@
-"""The check of the bench: a healthy one passes, every fault is found by name, and the output ends silent."""
+"""The bench check: a healthy bench passes, every fault is found, and the output ends silent."""
 
 from dataclasses import replace
 from math import inf
@@ -32,13 +32,13 @@ def checked(bench_of):
     return check
 
 
-def failed(report):
+def failed_findings(report):
     return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
 
 
 def test_a_healthy_bench_passes_and_matches_its_configuration(checked, rig, tmp_path):
     report = checked(rig, tmp_path)
-    assert failed(report) == set()
+    assert failed_findings(report) == set()
     clock = report["drive's clock"]
     told_ppm = rig.virtual.generator_clock_ppm - rig.virtual.converter_clock_ppm
     assert abs(clock.number - told_ppm) < 5 * clock.uncertainty + 0.01
@@ -69,7 +69,7 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
     }
     heavy = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=own)})
     report = checked(heavy, tmp_path)
-    assert failed(report) == set()
+    assert failed_findings(report) == set()
     assert report["base acceleration"].verdict is Verdict.OK
     for role in ("base_acceleration", "m0_velocity"):
         assert report[f"sign of {role}"].verdict is Verdict.OK
@@ -95,9 +95,9 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
         (lambda v: v.faults.stick_output(), "drive left after stop", "switch the amplifier off"),
     ],
 )
-def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, name, advice):
+def test_a_bench_fault_fails_its_finding_with_advice(checked, rig, tmp_path, fault, name, advice):
     report = checked(rig, tmp_path, fault)
-    assert name in failed(report)
+    assert name in failed_findings(report)
     assert advice in report[name].advice
     assert report.verdict is Verdict.FAIL
 
@@ -119,11 +119,11 @@ def test_a_reversed_vibrometer_sign_gives_a_warning(checked, rig, tmp_path):
     report = checked(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))
     assert report["sign of m0_velocity"].verdict is Verdict.WARN
     assert "this sensor is reversed" in report["sign of m0_velocity"].advice
-    assert failed(report) == set()
+    assert failed_findings(report) == set()
 
 
-class PressedOnceItSounds(StopSwitch):
-    """Asks for a stop when the generator's output is on."""
+class StopWhenOutputIsOn(StopSwitch):
+    """Requests a stop when the generator's output is on."""
 
     def __init__(self, generator):
         super().__init__()
@@ -141,15 +141,15 @@ def test_a_stop_during_a_check_silences_the_drive(bench_of, rig, tmp_path, is_st
     with bench_of(rig) as (bench, virtual):
         if is_stuck:
             virtual.faults.stick_output()
-        switch = PressedOnceItSounds(virtual.generator)
+        switch = StopWhenOutputIsOn(virtual.generator)
         with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
             bench_report(bench, tmp_path, switch)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
         assert terminal_v(virtual) < SILENT_V
 
 
-class StalledOnceItSounds(PressedOnceItSounds):
-    """The request of the drive guard."""
+class StallWhenOutputIsOn(StopWhenOutputIsOn):
+    """Requests a stop like the drive guard of a stalled run."""
 
     def ask(self, request):
         super().ask(StopRequest.by(Cause.FAULT, "the run read no samples for 5 s"))
@@ -157,32 +157,32 @@ class StalledOnceItSounds(PressedOnceItSounds):
 
 def test_a_stalled_check_counts_as_failed_and_not_as_stopped(bench_of, rig, tmp_path):
     with bench_of(rig) as (bench, virtual), pytest.raises(RunStalled, match="no samples for 5 s"):
-        bench_report(bench, tmp_path, StalledOnceItSounds(virtual.generator))
+        bench_report(bench, tmp_path, StallWhenOutputIsOn(virtual.generator))
 
 
 def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of, rig, tmp_path, monkeypatch):
     with bench_of(rig) as (bench, virtual):
         read, blocks = type(bench.digitizer).read, iter(range(100))
 
-        def empty_from_the_third_on(digitizer, samples):
+        def empty_from_third_read(digitizer, samples):
             block = read(digitizer, samples)
             return replace(block, volts=block.volts[:, :0]) if next(blocks) > 2 else block
 
-        monkeypatch.setattr(type(bench.digitizer), "read", empty_from_the_third_on)
+        monkeypatch.setattr(type(bench.digitizer), "read", empty_from_third_read)
         with pytest.raises(InstrumentError, match=r"a block of shape \(4, 0\), but \d+ samples"):
             bench_report(bench, tmp_path)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
 def test_a_wrong_load_setting_is_found_with_advice(checked, rig, tmp_path):
-    # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
+    # The panel is set to 50 ohm and cannot be read: every amplitude is twice the setting.
     report = checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
     assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
     assert "a factor of 2 means a wrong load" in report["drive over setting"].advice
 
 
 def test_a_correct_load_setting_passes_even_if_it_cannot_be_read(checked, rig, tmp_path):
-    assert failed(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
+    assert failed_findings(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
 
 
 def test_a_lost_generator_raises_an_error(bench_of, rig, tmp_path):
@@ -208,9 +208,9 @@ def test_a_bench_with_an_output_for_sines_is_checked_through_that_output(tmp_pat
     rig = load_rig("virtual_rig_streaming")
     with open_bench(rig) as bench:
         report = bench_report(bench, tmp_path)
-    assert failed(report) == set()
+    assert failed_findings(report) == set()
     assert report["drive over setting"].number == pytest.approx(1.0, abs=2e-3)
-    # One oscillator for both: the generator's would be 17 ppm off.
+    # The output uses the converter's clock; the generator's clock would be 17 ppm off.
     assert abs(report["drive's clock"].number) < 5 * report["drive's clock"].uncertainty + 0.01
     assert "time per command" not in [finding.name for finding in report.findings]
 

@@ -1,4 +1,4 @@
-"""The check at the beginning of each run: fading vibration is not a fault, lasting vibration is."""
+"""The low-level check at the beginning of each run: decaying vibration passes, lasting vibration fails."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def sine(peak, count):
 
 @pytest.fixture
 def check(rig):
-    """Judge a quiet stretch of a tenth of a second before a sine that is as it should be."""
+    """Return a check of 0.1 s of drive before the output, followed by a correct sine."""
     channels = channels_of(rig)
     terminal_v = 0.5 * AMPLITUDE_VPP * rig.generator.terminal_factor()
     accelerance = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, 160.0)))

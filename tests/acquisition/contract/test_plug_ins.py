@@ -1,4 +1,4 @@
-"""Instruments by plug-in: ours keep the contract, and a stranger's measure without an edit of ours."""
+"""Instrument plug-ins: built-in and third-party drivers pass the contract tests."""
 
 import os
 import subprocess
@@ -35,7 +35,7 @@ with open_recording(path) as recording:
 
 
 def run(*arguments, path=None, folder=ROOT):
-    """Run a program of this interpreter; a folder of packages may be put in front of its path."""
+    """Run a Python program; `path` is put in front of the module search path."""
     kept = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
     return subprocess.run(
         [sys.executable, *map(str, arguments)],
@@ -47,7 +47,7 @@ def run(*arguments, path=None, folder=ROOT):
     )
 
 
-def contract(name, *options, path=None, folder=ROOT):
+def run_contract_tests(name, *options, path=None, folder=ROOT):
     return run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
         *("--pyargs", "vibench.acquisition.contract", "--vibench-instrument", name, *options),
@@ -58,7 +58,7 @@ def contract(name, *options, path=None, folder=ROOT):
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """Install the example package where nothing else is."""
+    """Install the example package into a separate folder; return the folder."""
     target = tmp_path_factory.mktemp("installed")
     done = run(
         "-m", "pip", "--quiet", "install", "--no-deps", "--no-build-isolation", "--target", target, PACKAGE
@@ -72,7 +72,7 @@ def test_every_registered_driver_exists():
         assert plug_in(PlugInKind(row.group), row.name) is row.load()
 
 
-def test_an_unknown_driver_is_refused_with_the_known_ones():
+def test_an_unknown_driver_is_refused_with_the_known_drivers():
     with pytest.raises(ConfigurationError, match=r"'afg' is not in vibench\.generators; installed are afg"):
         plug_in(PlugInKind.GENERATOR, "afg")
 
@@ -85,26 +85,26 @@ def test_a_configuration_with_a_missing_driver_is_refused_before_opening():
 
 
 def test_a_failing_import_of_a_plug_in_is_reported(tmp_path, monkeypatch):
-    offer(tmp_path, monkeypatch, "broken", "no_such_module_of_anyone:Driver")
+    offer_generator(tmp_path, monkeypatch, "broken", "no_such_module_of_anyone:Driver")
     with pytest.raises(ConfigurationError, match=r"no_such_module_of_anyone:Driver, which cannot be loaded"):
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
 def test_an_exception_while_importing_a_plug_in_gives_a_one_sentence_error(tmp_path, monkeypatch):
     (tmp_path / "raises_at_once.py").write_text('raise RuntimeError("the firmware is too old")')
-    offer(tmp_path, monkeypatch, "broken", "raises_at_once:Driver")
+    offer_generator(tmp_path, monkeypatch, "broken", "raises_at_once:Driver")
     said = r"raises_at_once:Driver, which cannot be loaded \(RuntimeError: the firmware is too old\)"
     with pytest.raises(ConfigurationError, match=said):
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
 def test_two_plug_ins_with_one_name_are_refused(tmp_path, monkeypatch):
-    offer(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
+    offer_generator(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
     with pytest.raises(ConfigurationError, match=r"provided twice \(somebody:Else, vibench"):
         plug_in(PlugInKind.GENERATOR, "afg1022x")
 
 
-def test_plug_ins_are_searched_once_per_path(tmp_path, monkeypatch):
+def test_plug_ins_are_searched_once_per_module_search_path(tmp_path, monkeypatch):
     looks = []
     monkeypatch.setattr(_guarded, "entry_points", lambda: looks.append("look") or EntryPoints())
     monkeypatch.syspath_prepend(tmp_path / "first")
@@ -115,8 +115,8 @@ def test_plug_ins_are_searched_once_per_path(tmp_path, monkeypatch):
     assert looks == ["look"] * 2
 
 
-def offer(folder, monkeypatch, name, target):
-    """Let an installed package offer a generator."""
+def offer_generator(folder, monkeypatch, name, target):
+    """Install package metadata that offers a generator plug-in."""
     metadata = folder / "somebody-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
@@ -135,8 +135,8 @@ def test_third_party_instruments_measure_without_changes_to_vibench(installed, t
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["plain_scpi", pytest.param("charge_amplifier", marks=pytest.mark.slow)])
 def test_third_party_instruments_can_run_the_contract_tests(installed, tmp_path, name):
-    """Wherever it is asked for: outside of our folder pytest knows none of our settings."""
-    done = contract(name, f"--vibench-bench={BENCH}", path=installed, folder=tmp_path)
+    """The tests also run from a folder without vibench's pytest settings."""
+    done = run_contract_tests(name, f"--vibench-bench={BENCH}", path=installed, folder=tmp_path)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout
 
@@ -148,7 +148,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         '"OUTP1:STAT OFF"', '"*WAI"'
     )
     (tmp_path / "example_instruments.py").write_text(broken)
-    done = contract(
+    done = run_contract_tests(
         "plain_scpi", f"--vibench-bench={BENCH}", path=os.pathsep.join((str(tmp_path), str(installed)))
     )
     assert done.returncode == 1
@@ -214,6 +214,6 @@ OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcar
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", OUR_INSTRUMENTS)
 def test_the_built_in_drivers_pass_the_contract_tests(name):
-    done = contract(name)
+    done = run_contract_tests(name)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout

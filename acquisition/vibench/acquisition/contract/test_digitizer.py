@@ -10,7 +10,7 @@ KIND = PlugInKind.DIGITIZER
 BLOCK = 256
 
 
-def test_it_reports_its_identity_channels_and_rate(bench: Bench) -> None:
+def test_the_converter_reports_its_identity_channels_and_rate(bench: Bench) -> None:
     digitizer = bench.digitizer
     assert digitizer.identity.model
     assert digitizer.identity.reply
@@ -20,7 +20,7 @@ def test_it_reports_its_identity_channels_and_rate(bench: Bench) -> None:
     assert requested_hz * (1 - 1e-6) <= digitizer.sample_rate_hz <= 2 * requested_hz
 
 
-def test_blocks_follow_each_other_from_sample_zero(bench: Bench) -> None:
+def test_blocks_begin_at_sample_zero_and_have_no_gaps(bench: Bench) -> None:
     bench.digitizer.start()
     due = 0
     for count in (1, BLOCK, 3 * BLOCK, 7):
@@ -33,7 +33,7 @@ def test_blocks_follow_each_other_from_sample_zero(bench: Bench) -> None:
     assert bench.digitizer.waiting_samples >= 0
 
 
-def test_a_run_after_a_stop_counts_from_zero_again(bench: Bench) -> None:
+def test_samples_are_counted_from_zero_again_after_a_stop(bench: Bench) -> None:
     bench.digitizer.stop()
     for _ in range(2):
         bench.digitizer.start()
@@ -42,7 +42,7 @@ def test_a_run_after_a_stop_counts_from_zero_again(bench: Bench) -> None:
         bench.digitizer.stop()
 
 
-def test_reading_without_a_start_and_starting_twice_are_refused(bench: Bench) -> None:
+def test_reading_before_the_start_and_starting_twice_are_refused(bench: Bench) -> None:
     with refused():
         bench.digitizer.read(BLOCK)
     bench.digitizer.start()
@@ -52,7 +52,7 @@ def test_reading_without_a_start_and_starting_twice_are_refused(bench: Bench) ->
         bench.digitizer.read(0)
 
 
-def test_volts_are_whole_counts_if_the_step_is_known(bench: Bench) -> None:
+def test_volts_are_multiples_of_the_converter_step_if_it_is_known(bench: Bench) -> None:
     steps_v = bench.digitizer.volts_per_count
     assert len(steps_v) == len(bench.digitizer.roles)
     bench.digitizer.start()
@@ -66,7 +66,7 @@ def test_volts_are_whole_counts_if_the_step_is_known(bench: Bench) -> None:
             assert np.max(np.abs(counts - np.rint(counts))) < 1e-3
 
 
-def test_close_may_be_repeated_and_ends_reading(bench: Bench) -> None:
+def test_reading_a_closed_converter_is_refused_and_closing_twice_is_allowed(bench: Bench) -> None:
     bench.digitizer.start()
     bench.digitizer.close()
     bench.digitizer.close()

@@ -34,7 +34,7 @@ def tone_v(bench: Bench, frequency_hz: float) -> float:
     return line_v(measured_v(bench, 0.5), frequency_hz, bench.digitizer.sample_rate_hz)
 
 
-def test_it_is_described_before_it_is_opened(rig: Rig) -> None:
+def test_the_driver_describes_the_generator_before_opening(rig: Rig) -> None:
     can = generator_driver(rig.generator).describe(rig.generator)
     assert can.name
     assert 0 < can.amplitude_range_vpp[0] < can.amplitude_range_vpp[1]
@@ -42,7 +42,7 @@ def test_it_is_described_before_it_is_opened(rig: Rig) -> None:
     assert can.highest_sine_hz > 0
 
 
-def test_it_reports_its_identity_and_the_settings_to_confirm(bench: Bench) -> None:
+def test_the_generator_reports_its_identity_and_the_settings_to_confirm(bench: Bench) -> None:
     identity = bench.generator.identity
     assert identity.model
     assert identity.reply
@@ -54,7 +54,7 @@ def test_it_reports_its_identity_and_the_settings_to_confirm(bench: Bench) -> No
     assert highest <= bench.rig.generator.amplitude_limit_vpp
 
 
-def test_it_is_silent_when_it_has_been_opened(bench: Bench) -> None:
+def test_the_output_is_silent_after_opening(bench: Bench) -> None:
     bench.digitizer.start()
     assert is_quiet(bench)
 
@@ -67,7 +67,7 @@ def test_a_sine_has_the_requested_amplitude_and_frequency(bench: Bench) -> None:
     assert tone_v(bench, TONE_HZ) == pytest.approx(terminal_v(bench), rel=SAME)
 
 
-def test_frequency_and_amplitude_change_while_it_plays(bench: Bench) -> None:
+def test_frequency_and_amplitude_can_change_during_output(bench: Bench) -> None:
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
     bench.generator.start()
     bench.digitizer.start()
@@ -90,7 +90,7 @@ def test_a_waveform_is_played_point_by_point_at_its_repetition(bench: Bench) -> 
         assert line_v(volts, 10.0 * harmonic, rate_hz) == pytest.approx(share * terminal_v(bench), rel=SAME)
 
 
-def test_after_a_waveform_a_sine_is_a_sine(bench: Bench) -> None:
+def test_a_sine_plays_correctly_after_a_waveform(bench: Bench) -> None:
     points = 512
     bench.generator.load_waveform(np.sin(2 * np.pi * np.arange(points) / points), 50.0, level_vpp(bench))
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
@@ -100,7 +100,7 @@ def test_after_a_waveform_a_sine_is_a_sine(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("share", [1.01, 100.0, float("nan"), float("inf"), 0.0, -1.0])
-def test_an_amplitude_out_of_range_is_refused_and_nothing_plays(bench: Bench, share: float) -> None:
+def test_an_amplitude_out_of_range_is_refused_and_the_output_stays_silent(bench: Bench, share: float) -> None:
     highest = bench.generator.amplitude_range_vpp[1]
     with pytest.raises(LimitExceeded):
         bench.generator.load_sine(TONE_HZ, share * highest)
@@ -114,13 +114,13 @@ def test_a_waveform_that_cannot_be_played_is_refused(bench: Bench, waveform: lis
         bench.generator.load_waveform(np.array(waveform), 10.0, level_vpp(bench))
 
 
-def test_a_waveform_of_too_many_points_is_refused(bench: Bench) -> None:
+def test_a_waveform_with_too_many_points_is_refused(bench: Bench) -> None:
     most = generator_driver(bench.rig.generator).describe(bench.rig.generator).memory_points[1]
     with pytest.raises(LimitExceeded):
         bench.generator.load_waveform(np.sin(np.arange(most + 1)), 10.0, level_vpp(bench))
 
 
-def test_a_burst_plays_its_cycles_and_ends_by_itself(bench: Bench) -> None:
+def test_a_burst_waits_for_its_trigger_and_ends_after_its_cycles(bench: Bench) -> None:
     cycles = 32
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
     bench.generator.arm_burst(cycles)
@@ -136,7 +136,7 @@ def test_a_burst_plays_its_cycles_and_ends_by_itself(bench: Bench) -> None:
     assert tone_v(bench, TONE_HZ) == pytest.approx(terminal_v(bench), rel=SAME)
 
 
-def test_a_built_in_sweep_waits_for_its_trigger_and_ends_at_its_stop(bench: Bench) -> None:
+def test_a_built_in_sweep_waits_for_its_trigger_and_ends_at_its_stop_frequency(bench: Bench) -> None:
     sweep = Sweep(TONE_HZ, 1.25 * TONE_HZ, 2.0)
     can = generator_driver(bench.rig.generator).describe(bench.rig.generator)
     if can.longest_sweep_s < sweep.duration_s:
@@ -158,7 +158,7 @@ def test_a_built_in_sweep_waits_for_its_trigger_and_ends_at_its_stop(bench: Benc
     assert tone_v(bench, sweep.stop_hz) == pytest.approx(terminal_v(bench), rel=SAME)
 
 
-def test_the_bench_check_measures_the_time_of_a_setting(bench: Bench) -> None:
+def test_the_measured_command_latency_is_between_zero_and_five_seconds(bench: Bench) -> None:
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
     assert 0 < bench.generator.measured_latency_s() < 5.0
 
@@ -173,7 +173,7 @@ def test_stop_is_silence_at_any_time(bench: Bench) -> None:
     assert is_quiet(bench)
 
 
-def test_close_is_silence_and_may_be_repeated(bench: Bench) -> None:
+def test_closing_silences_the_output_and_may_be_repeated(bench: Bench) -> None:
     level = level_vpp(bench)
     bench.generator.load_sine(TONE_HZ, level)
     bench.generator.start()

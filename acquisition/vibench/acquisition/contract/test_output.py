@@ -32,7 +32,7 @@ def level_v(bench: Bench) -> float:
 
 @contextmanager
 def playing(bench: Bench) -> Iterator[None]:
-    """Play a tone with the duration of the samples that are written ahead."""
+    """Play a tone as long as the samples that are written ahead."""
     output = output_of(bench)
     stretch = output.ahead_samples // 2
     output.write(tone(output, level_v(bench), 0, stretch))
@@ -43,7 +43,7 @@ def playing(bench: Bench) -> Iterator[None]:
     output.stop()
 
 
-def test_it_reports_its_identity_and_its_lead_time(bench: Bench) -> None:
+def test_the_output_reports_its_identity_and_its_lead_time(bench: Bench) -> None:
     output = output_of(bench)
     assert output.identity.reply
     assert output.identity == output.identity
@@ -53,7 +53,7 @@ def test_it_reports_its_identity_and_its_lead_time(bench: Bench) -> None:
     assert output.idle in IdleOutput
 
 
-def test_a_tone_appears_at_the_terminal_from_its_first_sample(bench: Bench) -> None:
+def test_a_tone_starts_at_the_terminal_with_the_first_converter_sample(bench: Bench) -> None:
     with playing(bench):
         rate_hz = bench.digitizer.sample_rate_hz
         share = output_of(bench).ahead_samples / output_of(bench).sample_rate_hz
@@ -66,19 +66,19 @@ def test_a_tone_appears_at_the_terminal_from_its_first_sample(bench: Bench) -> N
 
 
 @pytest.mark.parametrize("peak", [1.01, float("nan"), float("inf")])
-def test_a_sample_past_the_limit_is_refused_and_nothing_plays(bench: Bench, peak: float) -> None:
+def test_a_sample_beyond_the_limit_is_refused(bench: Bench, peak: float) -> None:
     output = output_of(bench)
     assert bench.rig.daq.output is not None
     with pytest.raises(LimitExceeded):
         output.write(np.array([0.0, peak * bench.rig.daq.output.limit_v, 0.0]))
 
 
-def test_a_plan_without_a_signal_is_refused(bench: Bench) -> None:
+def test_arming_without_written_samples_is_refused(bench: Bench) -> None:
     with refused():
         output_of(bench).arm()
 
 
-def test_stop_outputs_zero_at_any_time_and_allows_another_stream(bench: Bench) -> None:
+def test_stopping_outputs_zero_at_any_time_and_allows_another_stream(bench: Bench) -> None:
     output_of(bench).stop()
     with playing(bench):
         bench.digitizer.read(256)
@@ -91,7 +91,7 @@ def test_stop_outputs_zero_at_any_time_and_allows_another_stream(bench: Bench) -
         bench.digitizer.read(256)
 
 
-def test_close_may_be_repeated(bench: Bench) -> None:
+def test_closing_may_be_repeated_and_ends_writing(bench: Bench) -> None:
     output = output_of(bench)
     output.close()
     output.close()

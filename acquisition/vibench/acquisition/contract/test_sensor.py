@@ -8,7 +8,7 @@ from vibench.acquisition.rig import Rig, channels_of
 KIND = PlugInKind.SENSOR
 
 
-def test_its_channel_has_a_sensitivity_a_range_and_a_name(rig: Rig) -> None:
+def test_a_sensor_channel_has_a_name_a_sensitivity_and_a_range(rig: Rig) -> None:
     for channel in channels_of(rig):
         assert channel.sensor
         assert isfinite(channel.units_per_volt)

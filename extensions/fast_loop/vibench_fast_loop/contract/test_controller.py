@@ -1,4 +1,4 @@
-"""Requirements on every real-time controller: it plays its program, reports its inputs, ends by itself."""
+"""Requirements of every real-time controller: play its program, report its inputs, and end by itself."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -37,8 +37,8 @@ def series(bench: Bench, feedback: LoopFeedback | None = None) -> LoopProgram:
     )
 
 
-def listened(bench: Bench, duration_s: float) -> tuple[Samples, list[LoopBlock]]:
-    """Return the samples read over a duration, and the blocks; the controller gets requests meanwhile."""
+def read_with_requests(bench: Bench, duration_s: float) -> tuple[Samples, list[LoopBlock]]:
+    """Read samples for a duration while sending requests; return the samples and the controller's blocks."""
     stretch = int(TALK_S * bench.digitizer.sample_rate_hz)
     parts, blocks = [], list[LoopBlock]()
     for _ in range(round(duration_s / TALK_S)):
@@ -51,11 +51,11 @@ def complex_of(row: Sequence[tuple[float, float]]) -> list[complex]:
     return [complex(*pair) for pair in row]
 
 
-def answered(block: LoopBlock, of_base: bool) -> complex:  # noqa: FBT001 - which of two inputs
+def response_to(block: LoopBlock, of_base: bool) -> complex:  # noqa: FBT001 - which of two inputs
     return complex_of(block.base if of_base else block.m0)[1]
 
 
-def test_it_reports_its_identity_and_its_configuration(bench: Bench) -> None:
+def test_the_controller_reports_its_identity_and_its_configuration(bench: Bench) -> None:
     facts, config = controller_of(bench).facts, bench.rig.controller
     assert controller_of(bench).identity.reply
     assert controller_of(bench).identity == controller_of(bench).identity
@@ -71,7 +71,7 @@ def test_it_reports_its_identity_and_its_configuration(bench: Bench) -> None:
 def test_a_fourier_series_appears_at_the_terminal_as_requested(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
-    volts, blocks = listened(bench, 0.8)
+    volts, blocks = read_with_requests(bench, 0.8)
     row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)
     heard = (volts[row] * bench.channels[row].units_per_volt)[volts.shape[1] // 2 :]
     level, rate_hz = level_v(bench), bench.digitizer.sample_rate_hz
@@ -83,7 +83,7 @@ def test_a_fourier_series_appears_at_the_terminal_as_requested(bench: Bench) -> 
 def test_the_coefficients_match_the_played_signal_and_the_sensors(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
-    volts, blocks = listened(bench, 1.2)
+    volts, blocks = read_with_requests(bench, 1.2)
     block = [each for each in blocks if each.steady][-1]
     output, level = complex_of(block.output), level_v(bench)
     assert abs(output[1] - level) < 0.01 * level
@@ -94,25 +94,25 @@ def test_the_coefficients_match_the_played_signal_and_the_sensors(bench: Bench) 
         assert abs(complex_of(coefficients)[1]) == pytest.approx(shown, rel=0.05)
 
 
-def test_a_law_responds_to_its_samples_beside_the_series(bench: Bench) -> None:
+def test_a_feedback_law_adds_its_response_to_the_played_series(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
-    _, blocks = listened(bench, 0.8)
+    _, blocks = read_with_requests(bench, 0.8)
     of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
-    gain = LAW * level_v(bench) / abs(answered(blocks[-1], of_base))
+    gain = LAW * level_v(bench) / abs(response_to(blocks[-1], of_base))
     # The law averages this sample and the previous sample, its memory: a proportional-derivative law.
     into = (1.0, 0.0) if of_base else (0.0, 1.0)
     direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
     law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
     controller_of(bench).play(series(bench, law))
-    _, blocks = listened(bench, 0.8)
+    _, blocks = read_with_requests(bench, 0.8)
     block = [each for each in blocks if each.steady][-1]
     late = np.exp(-2j * np.pi * TONE_HZ / controller_of(bench).facts.rate_hz)
-    wanted = level_v(bench) + 0.5 * gain * (1 + late) * answered(block, of_base)
+    wanted = level_v(bench) + 0.5 * gain * (1 + late) * response_to(block, of_base)
     assert abs(complex_of(block.output)[1] - wanted) < 0.1 * LAW * level_v(bench)
 
 
-def test_it_falls_silent_without_requests_and_gives_the_reason(bench: Bench) -> None:
+def test_the_controller_falls_silent_without_requests_and_gives_the_reason(bench: Bench) -> None:
     controller = controller_of(bench)
     bench.digitizer.start()
     controller.play(series(bench))
@@ -125,22 +125,22 @@ def test_it_falls_silent_without_requests_and_gives_the_reason(bench: Bench) -> 
     assert controller.report().state is LoopState.PLAYING, "the controller must play again on request"
 
 
-def test_silence_is_allowed_at_any_time_and_reaches_the_terminal(bench: Bench) -> None:
+def test_silence_may_be_requested_at_any_time_and_reaches_the_terminal(bench: Bench) -> None:
     controller_of(bench).silence(0.0)
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
-    listened(bench, 0.3)
+    read_with_requests(bench, 0.3)
     controller_of(bench).silence(0.05)
     controller_of(bench).silence(0.0)
     assert line_v(measured_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
     assert controller_of(bench).report().state is LoopState.SILENT
 
 
-def test_close_may_be_repeated_and_is_silence(bench: Bench) -> None:
+def test_closing_silences_the_controller_and_may_be_repeated(bench: Bench) -> None:
     controller = controller_of(bench)
     bench.digitizer.start()
     controller.play(series(bench))
-    listened(bench, 0.3)
+    read_with_requests(bench, 0.3)
     controller.close()
     controller.close()
     assert line_v(measured_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
