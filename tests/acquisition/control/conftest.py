@@ -1,4 +1,4 @@
-"""A hardening oscillator on a shaking base, in slow time: cheap, bistable, and known in closed form."""
+"""A hardening oscillator on a vibrating base, simulated in slow time: fast, bistable, with a closed form."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ CLOCK_PPM = 20.0
 
 @dataclass
 class Oscillator:
-    """x'' + 2 z w0 x' + w0^2 x + g x^3 = -a(t), averaged over a period: X' for x = Re X exp(i w t)."""
+    """x'' + 2 z w0 x' + w0^2 x + g x^3 = -a(t), averaged over a period; x = Re X exp(i w t)."""
 
     natural_hz: float = 120.0
     damping: float = 0.004
@@ -27,7 +27,7 @@ class Oscillator:
     motion: complex = 0j
 
     def advance(self, frequency_hz: float, base: complex, duration_s: float) -> None:
-        """Move on by one slow step under the base's acceleration phasor."""
+        """Integrate one slow step under the acceleration phasor of the base."""
         omega, natural = 2 * np.pi * frequency_hz, 2 * np.pi * self.natural_hz
 
         def rate(x: complex) -> complex:
@@ -41,7 +41,7 @@ class Oscillator:
         self.motion = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(x + h * k3))
 
     def highest_seen_m(self, frequency_hz: float, acceleration: float) -> float:
-        """Amplitude of the base and x together on the highest branch, as a vibrometer sees it."""
+        """Return the largest amplitude of m0 in space [m]: base plus x on the highest branch."""
         omega, natural = 2 * np.pi * frequency_hz, 2 * np.pi * self.natural_hz
         x = max(self.steady_amplitudes(frequency_hz, acceleration))
         stiffness = natural**2 - omega**2 + 0.75 * self.hardening * x**2
@@ -49,7 +49,7 @@ class Oscillator:
         return abs(moved - acceleration / omega**2)
 
     def steady_amplitudes(self, frequency_hz: float, acceleration: float) -> list[float]:
-        """All steady amplitudes of x, stable or not: the cubic of harmonic balance."""
+        """Return all steady amplitudes of x, also unstable ones, from the cubic of harmonic balance."""
         omega, natural = 2 * np.pi * frequency_hz, 2 * np.pi * self.natural_hz
         detuning, loss = natural**2 - omega**2, 2 * self.damping * natural * omega
         g = 0.75 * self.hardening
@@ -59,7 +59,7 @@ class Oscillator:
 
 @dataclass
 class Bench:
-    """Generator, shaker and oscillator; the base answers its setting by the rig's model, times a factor."""
+    """Generator, shaker and oscillator; the base follows the rig's model times `shaker_factor`."""
 
     rig: Rig
     oscillator: Oscillator
@@ -72,7 +72,7 @@ class Bench:
     settings: list[tuple[float, float, float]] = field(default_factory=list)
 
     def carry_out(self, measurement: Measurement) -> None:
-        """Play what is conducted, as a run would, until its end."""
+        """Run the feedback controller of a measurement until its end, as a run would."""
         controller = feedback_controller(measurement, self.rig, channels_of(self.rig), RATE_HZ)
         noise = np.random.default_rng(5)
         level = 0.0
@@ -87,7 +87,7 @@ class Bench:
                     continue
                 begin, level = level, phase.end_level
                 first = self.sample
-                volts = self._played(phase.play, phase.duration_s, (begin, level), most_vpp, noise)
+                volts = self._play(phase.play, phase.duration_s, (begin, level), most_vpp, noise)
                 if phase.segment is not None and phase.state is RunState.RECORDING:
                     span = (first / RATE_HZ, self.sample / RATE_HZ)
                     self.segments.append((phase.segment.label, dict(phase.segment.numbers), *span))
@@ -95,7 +95,7 @@ class Bench:
         except StopIteration:
             pass
 
-    def _played(self, play, duration_s, levels, most_vpp, noise):
+    def _play(self, play, duration_s, levels, most_vpp, noise):
         count = round(duration_s * RATE_HZ)
         tone = play if isinstance(play, Tone) else Tone(100.0, 0.0)
         frequency_hz = tone.frequency_hz * (1 + CLOCK_PPM * 1e-6)
@@ -114,7 +114,7 @@ class Bench:
         self.cycles = float(cycles[-1] % 1.0)
         turning = np.exp(2j * np.pi * cycles[:-1])
         omega = 2 * np.pi * frequency_hz
-        # The vibrometer sees x on top of the base: its acceleration a sin(w t) is a displacement i a / w^2.
+        # The vibrometer measures base plus x: acceleration a sin(w t) is the displacement i a / w^2.
         velocity = np.real(1j * omega * (motion + 1j * base / omega**2) * turning)
         physical = {
             Role.DRIVE_VOLTAGE: 0.5 * amplitude * turning.imag,
@@ -128,7 +128,7 @@ class Bench:
 
 @pytest.fixture
 def new_control_bench(rig: Rig) -> Callable[..., Bench]:
-    """Make benches around an oscillator; the vibrometer of this rig has no delay."""
+    """Return a function that makes benches around an oscillator; their vibrometer has no delay."""
     prompt = rig.model_copy(update={"vibrometer": rig.vibrometer.model_copy(update={"delay_s": 0.0})})
 
     def make(**habits) -> Bench:

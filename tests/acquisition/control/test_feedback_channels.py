@@ -1,4 +1,4 @@
-"""What feedback makes of base and m0: their ratio, whatever the moment from which phases are counted."""
+"""The ratio of m0 to the base is independent of the time origin of the phases."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 0.0, 0.0, 10_240.0)
 @pytest.mark.parametrize("harmonic", [1, 2, 3, 4])
 @pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
 def test_a_harmonic_of_m0_is_measured_with_sinusoidal_base_motion(harmonic, shift_rad):
-    """Base U sin(w t), m0 X sin(n w t - 1.2), the vibrometer late: X/U exp(-1.2 i) from any moment on."""
+    """Base U sin(w t) and delayed m0 X sin(n w t - 1.2) give X/U exp(-1.2 i) for any time origin."""
     omega, order = 2 * np.pi * HERTZ, harmonic * 2 * np.pi * HERTZ
     base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))
     late = harmonic * shift_rad - 1.2 - order * DELAY_S
@@ -36,7 +36,7 @@ def test_a_subharmonic_phase_is_known_up_to_whole_drive_periods(drives, shift_ra
 
 @pytest.mark.parametrize("harmonic", [1, 3])
 def test_ac_coupling_does_not_shift_the_phase(harmonic):
-    """A first-order high-pass turns the base by 0.9 degrees at 31 Hz: three times that at 3:1."""
+    """A first-order high-pass shifts the base by 0.9 degrees at 31 Hz, which counts three times at 3:1."""
     channels = replace(CHANNELS, base_cut_hz=0.5, response_cut_hz=0.5, response_delay_s=0.0)
     order = harmonic * 2 * np.pi * HERTZ
     base = np.full(8, -2e-4 * (2 * np.pi * HERTZ) ** 2) / (1 + 0.5 / (1j * HERTZ))
@@ -51,7 +51,7 @@ def test_a_silent_base_gives_no_response_ratio():
 
 @pytest.mark.parametrize("derivatives", [-1, 0, 1])
 def test_acceleration_and_displacement_of_m0_give_the_same_ratio_as_its_velocity(derivatives):
-    """A sensor whose signal is differentiated so many times for a velocity."""
+    """The velocity follows from a signal after `derivatives` differentiations."""
     channels = replace(CHANNELS, response_derivatives=derivatives, response_delay_s=0.0)
     orders_hz = HERTZ * np.arange(5)
     base = np.full(8, -2e-4 * (2 * np.pi * HERTZ) ** 2)

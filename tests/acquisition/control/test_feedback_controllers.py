@@ -1,4 +1,4 @@
-"""Measurements that listen: a bistable oscillator whose folds and resonance are known in closed form."""
+"""Feedback measurements on a bistable oscillator whose folds and resonance are known in closed form."""
 
 import json
 from itertools import pairwise
@@ -23,12 +23,12 @@ LEVEL = 0.6
 SETTLING = Settling(longest_wait_s=6)
 
 
-def said(bench, kind):
+def notes_of(bench, kind):
     return [json.loads(text) for _, each, text in bench.notes if each == kind]
 
 
 def folds_hz(oscillator, acceleration):
-    """Ends of the range with three steady amplitudes: where a sweep down, and one up, must jump."""
+    """Return the ends of the range with three steady amplitudes: sweeps down and up must jump there."""
     grid = np.arange(118, 150, 0.005)
     three = [f for f in grid if len(oscillator.steady_amplitudes(f, acceleration)) == 3]
     return three[0], three[-1]
@@ -36,7 +36,7 @@ def folds_hz(oscillator, acceleration):
 
 @pytest.fixture(scope="module")
 def both_ways(request):
-    """One measurement up and down through the bistable range, shared by what is asked of it."""
+    """Return a dictionary that shares one measurement up and down through the bistable range."""
     return {}
 
 
@@ -60,14 +60,14 @@ def swept(new_control_bench, both_ways):
 
 
 def test_jumps_up_and_down_are_bracketed_around_the_folds(swept):
-    jumps = {each["direction"]: each for each in said(swept, "jump") if each["how"] == "localised"}
+    jumps = {each["direction"]: each for each in notes_of(swept, "jump") if each["how"] == "localised"}
     lower, upper = folds_hz(swept.oscillator, LEVEL)
     assert upper - lower > 1.0
     for direction, fold in (("up", upper), ("down", lower)):
         found = jumps[direction]
         low, high = sorted((found["before_hz"], found["after_hz"]))
         assert high - low <= 0.25
-        # The level is held to 0.75 %, which moves the folds; a step can only shake it over early.
+        # The level is held to 0.75 %, which moves the folds; a step can only cause an early jump.
         assert low - 0.3 <= fold <= high + 0.3
 
 
@@ -85,7 +85,7 @@ def test_every_step_records_pass_branch_and_direction(swept):
 
 
 def test_steps_lie_on_the_branches_of_the_closed_form(swept):
-    up = [each for each in said(swept, "achieved") if each["segment"] == "step"][:9]
+    up = [each for each in notes_of(swept, "achieved") if each["segment"] == "step"][:9]
     lower, upper = folds_hz(swept.oscillator, LEVEL)
     for step in up:
         if lower < step["frequency_hz"] < upper:
@@ -98,7 +98,7 @@ def test_a_feedback_measurement_ends_within_the_planned_time(swept, both_ways):
     assert swept.sample / 5120 <= duration_s(both_ways["measurement"])
 
 
-def test_a_level_is_reached_with_a_wrong_shaker_model(new_control_bench):
+def test_the_base_level_is_reached_despite_a_wrong_shaker_model(new_control_bench):
     bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.6 + 0.3 * (frequency_hz > 125))
     plan = SettledSine(
         amplitude_vpp=1.0,
@@ -108,7 +108,7 @@ def test_a_level_is_reached_with_a_wrong_shaker_model(new_control_bench):
         base_level=BaseLevel(displacement_m=1e-6),
     )
     bench.carry_out(Measurement(name="held", excitation=plan, ramp_s=0.2))
-    steps = [each for each in said(bench, "achieved") if each["segment"] == "step"]
+    steps = [each for each in notes_of(bench, "achieved") if each["segment"] == "step"]
     assert len(steps) == 5
     for step in steps:
         target = 1e-6 * (2 * np.pi * step["frequency_hz"]) ** 2
@@ -119,7 +119,7 @@ def test_a_level_is_reached_with_a_wrong_shaker_model(new_control_bench):
     assert max(b / a for a, b in pairwise(loudest[2:-1])) <= 1.25 * (1 + 1e-9)
 
 
-def test_an_unreachable_level_is_flagged_within_the_planned_setting(new_control_bench):
+def test_an_unreachable_base_level_is_flagged_and_the_setting_stays_within_the_plan(new_control_bench):
     bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.2)
     plan = HeldDwell(
         amplitude_vpp=0.05,
@@ -130,7 +130,7 @@ def test_an_unreachable_level_is_flagged_within_the_planned_setting(new_control_
         update_s=0.5,
     )
     bench.carry_out(Measurement(name="out", excitation=plan, ramp_s=0.2))
-    looks = said(bench, "level")
+    looks = notes_of(bench, "level")
     assert len(looks) == 4
     assert {each["level"] for each in looks} == {"outside tolerance"}
     assert max(setting for *_, setting in bench.settings) == pytest.approx(0.05)
@@ -149,11 +149,11 @@ def test_a_sweep_holds_its_level_over_a_shaker_resonance(new_control_bench):
         settling=SETTLING,
     )
     bench.carry_out(Measurement(name="sweep", excitation=plan, ramp_s=0.2))
-    achieved = said(bench, "achieved")[-1]
+    achieved = notes_of(bench, "achieved")[-1]
     assert achieved["steps"] == 200
-    # 0.2 Hz a step over a flank of 9 % per Hz: the step before tells this one to within 2 %.
+    # At 0.2 Hz a step on a flank of 9 % per Hz, the previous step predicts the next to within 2 %.
     assert achieved["steps_outside"] <= 20
-    for outside in said(bench, "level"):
+    for outside in notes_of(bench, "level"):
         assert 140 < outside["from_hz"] <= outside["to_hz"] < 160
         assert abs(outside["worst"]) < 0.1
 
@@ -170,15 +170,15 @@ def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
         settling=SETTLING,
     )
     bench.carry_out(Measurement(name="backbone", excitation=plan, ramp_s=0.2))
-    found = said(bench, "resonance")
+    found = notes_of(bench, "resonance")
     assert [each["lock"] for each in found] == ["locked"] * 7
     assert max(each["periods"] for each in found[1:]) <= 150
     assert max(abs(each["phase_deg"] + 90) for each in found[1:]) < 1
     oscillator = bench.oscillator
     for each in found:
-        # The resonance of x over the base: detuned by hardening alone, where x lags a quarter period.
+        # Phase resonance of x over the base: hardening detunes it, and x lags by a quarter of a period.
         omega = 2 * np.pi * each["frequency_hz"]
-        # At a quarter of a period behind, what is seen is base and x at right angles.
+        # At this lag base and x are at right angles in the measured motion.
         x = np.sqrt(each["response_ii"] ** 2 - 1.0) * each["base_m_per_s2"] / omega**2
         expected = np.sqrt((2 * np.pi * 120) ** 2 + 0.75 * oscillator.hardening * x**2) / (2 * np.pi)
         assert abs(each["frequency_hz"] - expected) < 3 * each["frequency_u_hz"] + 0.02
@@ -187,7 +187,7 @@ def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
 
 
 def test_a_strongly_bent_resonance_is_followed(new_control_bench):
-    """From 120 to 127 Hz, by up to four half-widths (0.48 Hz) a level."""
+    """The resonance moves from 120 to 127 Hz, by up to four half-widths (0.48 Hz) per level."""
     bench = new_control_bench(hardening=HARDENING)
     plan = ResonanceTracking(
         amplitude_vpp=3.0,
@@ -199,7 +199,7 @@ def test_a_strongly_bent_resonance_is_followed(new_control_bench):
         flank_pairs=1,
     )
     bench.carry_out(Measurement(name="bent", excitation=plan, ramp_s=0.2))
-    found = said(bench, "resonance")
+    found = notes_of(bench, "resonance")
     assert all(abs(each["phase_deg"] + 90) < 1 for each in found[1:9])
     assert all(abs(each["phase_deg"] + 90) < 3 for each in found)
     assert found[-1]["at_hz"] > 127
@@ -208,7 +208,7 @@ def test_a_strongly_bent_resonance_is_followed(new_control_bench):
 def test_an_unsettled_motion_gives_no_resonance(
     new_control_bench,
 ):
-    """Phase and level are met, and a thousand like periods are not waited for."""
+    """Phase and level are within tolerance, but the motion is not observed for a thousand periods."""
     bench = new_control_bench()
     plan = ResonanceTracking(
         amplitude_vpp=1.0,
@@ -221,7 +221,7 @@ def test_an_unsettled_motion_gives_no_resonance(
         flank_pairs=0,
     )
     bench.carry_out(Measurement(name="growing", excitation=plan, ramp_s=0.2))
-    (found,) = said(bench, "resonance")
+    (found,) = notes_of(bench, "resonance")
     assert found["phase_deg"] == pytest.approx(-90, abs=2)
     assert found["held"] == "within tolerance"
     assert (found["motion"], found["lock"], found["frequency_hz"]) == ("unsettled", "not met", None)
@@ -231,13 +231,13 @@ def test_a_plan_without_a_level_plays_its_setting_throughout(new_control_bench):
     bench = new_control_bench()
     plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)
     bench.carry_out(Measurement(name="open", excitation=plan, ramp_s=0.2))
-    # The first is the silence that is listened to.
+    # The first entry is the silence that is measured first.
     assert {setting for *_, setting in bench.settings[1:]} == {0.3}
-    assert {each["level"] for each in said(bench, "achieved")} == {"not controlled"}
+    assert {each["level"] for each in notes_of(bench, "achieved")} == {"not controlled"}
 
 
 def test_an_isolated_branch_is_reached_again_from_rest(new_control_bench):
-    """From 123 Hz down the lower branch ends; led back to 123 Hz the motion stays on the upper one."""
+    """Below 123 Hz the lower branch ends; from there a return to 123 Hz stays on the upper branch."""
     bench = new_control_bench(hardening=HARDENING)
     plan = SettledSine(
         amplitude_vpp=1.0,
@@ -251,9 +251,9 @@ def test_an_isolated_branch_is_reached_again_from_rest(new_control_bench):
     bench.carry_out(Measurement(name="stuck", excitation=plan, ramp_s=0.2))
     lower, upper = folds_hz(bench.oscillator, LEVEL)
     assert lower < 123.0 < upper
-    (jump,) = said(bench, "jump")
+    (jump,) = notes_of(bench, "jump")
     assert jump["how"] == "localised"
     assert jump["after_hz"] - 0.3 <= lower <= jump["before_hz"] + 0.3
-    # The way back went over silence: the setting fell to a ninth, and came back.
+    # The search passed through silence: the setting fell to a ninth and rose again.
     settings = [setting for *_, setting in bench.settings[3:-1]]
     assert min(settings) < 0.15 * max(settings)

@@ -1,4 +1,4 @@
-"""A run that is conducted: every way out of it, what it refuses, and what it leaves in the recording."""
+"""Runs with feedback: every way to end them, refusals, and the recording that they leave."""
 
 import json
 
@@ -23,7 +23,7 @@ from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 SETTLING = Settling(longest_wait_s=2, tolerance=0.02)
-# On the loop the base answers as the model does at 160 Hz; m0 stands still.
+# In the loop the base follows the model at 160 Hz; m0 does not move relative to the base.
 DWELL = Measurement(
     name="held",
     excitation=HeldDwell(
@@ -127,7 +127,7 @@ def test_a_level_beyond_the_planned_setting_is_refused_before_output(bench, tmp_
     ],
 )
 def test_limits_are_checked_at_the_largest_setting_of_feedback(bench, tmp_path, excitation):
-    """A micrometre asks for millivolts; the plan allows ten volts, which at 20 Hz pass the stroke."""
+    """One micrometre needs millivolts, but the plan allows ten volts, which at 20 Hz exceed the stroke."""
     with pytest.raises(LimitExceeded, match="the stroke"):
         list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))
 

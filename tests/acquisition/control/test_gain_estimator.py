@@ -1,4 +1,4 @@
-"""The base's answer while the frequency moves: chance averaged away, a trend followed."""
+"""Estimation of the base gain while the frequency changes: noise is averaged and a trend is followed."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from vibench.acquisition.control.sine_loop import GainEstimator
 STEP_S = 0.1
 
 
-def tracked(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
-    """Follow a gain with a setting that is foreseen; returns held over target at every step."""
+def tracked_levels(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
+    """Follow a gain with predicted settings; return achieved over requested level at every step."""
     random = np.random.default_rng(seed)
     estimator = GainEstimator(memory_s)
     achieved = []
@@ -24,25 +24,25 @@ def tracked(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
 
 
 def test_a_constant_gain_is_exact_from_the_second_step():
-    achieved, estimator = tracked(lambda time_s: 0.6)
+    achieved, estimator = tracked_levels(lambda time_s: 0.6)
     assert achieved[0] == pytest.approx(0.6)
     np.testing.assert_allclose(achieved[1:], 1.0, rtol=1e-12)
     assert estimator.level == pytest.approx(1.0)
 
 
 def test_a_steady_trend_of_the_gain_is_extrapolated():
-    achieved, _ = tracked(lambda time_s: 1 + 0.3 * time_s)
+    achieved, _ = tracked_levels(lambda time_s: 1 + 0.3 * time_s)
     np.testing.assert_allclose(achieved[5:], 1.0, atol=1e-9)
 
 
 def test_random_errors_of_the_gain_are_averaged():
-    achieved, _ = tracked(lambda time_s: 1.0, steps=600, noise=0.05)
-    # Six answers in the memory, 5 % in phase with the level: 2 %, seldom more when a line is drawn.
+    achieved, _ = tracked_levels(lambda time_s: 1.0, steps=600, noise=0.05)
+    # The memory holds six values with 5 % noise: about 2 % remains, rarely more after a linear fit.
     assert np.std(achieved[10:]) < 0.035
 
 
 def test_a_gain_jump_decays_within_the_memory():
-    achieved, estimator = tracked(lambda time_s: 1.0 if time_s < 3 else 1.5)
+    achieved, estimator = tracked_levels(lambda time_s: 1.0 if time_s < 3 else 1.5)
     after = achieved[30:]
     assert np.all(np.abs(after[8:] - 1) < 0.01)
     assert abs(estimator.level - 1) < 0.01

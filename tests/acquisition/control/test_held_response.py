@@ -1,4 +1,4 @@
-"""A response held at an amplitude: against the closed form, and where it cannot be held."""
+"""A response held at a constant amplitude agrees with the closed form; failures are flagged."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
 
 @pytest.fixture
 def held(tmp_path):
-    """Carry out a held response on a rig, and give its notes."""
+    """Return a function that carries out a held response on a rig and returns its notes."""
 
     def carry_out(rig, plan):
         with open_bench(rig) as bench:
@@ -45,7 +45,7 @@ def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, held):
 
 @pytest.mark.thorough
 def test_an_unstable_branch_is_recorded_and_flagged(rig, held):
-    # Between the folds of a hardening spring: under this table's voltage the motion leaves quicker than that.
+    # Between the folds of a hardening spring the motion leaves the branch faster than feedback can hold it.
     hard = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}
     hardening = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=hard)})
     plan = HeldResponse(amplitude_vpp=4, frequencies_hz=(103,), response_m=6e-6, longest_wait_s=8)

@@ -1,4 +1,4 @@
-"""Halving the way to a jump, wherever it lies."""
+"""Bisection of the frequency range that contains a jump."""
 
 import pytest
 from hypothesis import given, strategies as st
@@ -13,8 +13,8 @@ from vibench.acquisition.control.settling_controller import (
 from vibench.acquisition.recording import JumpSide
 
 
-def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
-    """Answer a search by two smooth branches; returns the jump and the frequencies asked for."""
+def search_jump(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
+    """Search a jump between two smooth branches; return the jump and the requested frequencies."""
 
     def response(frequency_hz):
         is_before = (frequency_hz < jump_hz) == (before_hz < after_hz)
@@ -38,7 +38,7 @@ def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
 @given(jump_hz=st.floats(100.01, 109.99), resolution_hz=st.floats(0.05, 4.0), height=st.floats(0.1, 0.6))
 def test_the_bracket_contains_the_jump_with_the_requested_width(jump_hz, resolution_hz, height):
     for ends in ((100.0, 110.0), (110.0, 100.0)):
-        jump, asked = found(jump_hz, resolution_hz, *ends, height)
+        jump, asked = search_jump(jump_hz, resolution_hz, *ends, height)
         low, high = sorted((jump.before.frequency_hz, jump.after.frequency_hz))
         assert low - 1e-9 <= jump_hz <= high + 1e-9
         assert abs(jump.after.frequency_hz - jump.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
@@ -46,13 +46,13 @@ def test_the_bracket_contains_the_jump_with_the_requested_width(jump_hz, resolut
 
 
 def test_a_narrow_enough_bracket_needs_no_measurement():
-    jump, asked = found(105.0, 10.0)
+    jump, asked = search_jump(105.0, 10.0)
     assert asked == []
     assert jump == LocatedJump(jump.before, jump.after)
 
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
-def test_points_lie_on_one_branch_within_half_the_factor_in_decibels(response, expected):
+def test_points_are_on_one_branch_if_their_ratio_is_below_half_the_jump_factor_in_db(response, expected):
     assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 

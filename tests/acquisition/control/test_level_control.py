@@ -1,4 +1,4 @@
-"""The law that holds a level: converges, keeps its limits, and does not chase chance."""
+"""Level control converges, keeps its limits, and ignores random errors."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A mode told from its neighbours by a few points, with an uncertainty that repetitions bear out."""
+"""A mode fitted to a few points near its resonance, with an uncertainty that matches repetitions."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ SPECIMEN = gong2025()
 MODES = list(zip(SPECIMEN.natural_frequencies_hz, SPECIMEN.damping_ratios, strict=True))
 
 
-def points(natural_hz, damping, count=7):
-    """Frequencies within one and a half half-widths, and what m0 does there over the base."""
+def response_points(natural_hz, damping, count=7):
+    """Return frequencies within one and a half half-widths, and the response of m0 over the base."""
     frequency_hz = natural_hz * (1 + 1.5 * damping * np.linspace(-1, 1, count))
     s = SPECIMEN
     answers = []
@@ -24,7 +24,7 @@ def points(natural_hz, damping, count=7):
 @pytest.mark.parametrize(("natural_hz", "damping"), MODES)
 @pytest.mark.parametrize("turned", [0.0, 0.1])
 def test_frequency_and_damping_do_not_depend_on_sensor_phase(natural_hz, damping, turned):
-    frequency_hz, answers = points(natural_hz, damping)
+    frequency_hz, answers = response_points(natural_hz, damping)
     found = fit_mode(frequency_hz, answers * np.exp(1j * turned))
     assert found.frequency_hz == pytest.approx(natural_hz, rel=1e-4)
     assert found.damping_ratio == pytest.approx(damping, rel=1e-3)
@@ -33,7 +33,7 @@ def test_frequency_and_damping_do_not_depend_on_sensor_phase(natural_hz, damping
 @pytest.mark.parametrize(("natural_hz", "damping"), MODES)
 def test_the_stated_mode_uncertainty_matches_repetitions(natural_hz, damping):
     random = np.random.default_rng(2)
-    frequency_hz, answers = points(natural_hz, damping)
+    frequency_hz, answers = response_points(natural_hz, damping)
     found = []
     for _ in range(300):
         noise = 1e-3 * (random.standard_normal(7) + 1j * random.standard_normal(7))
@@ -44,13 +44,13 @@ def test_the_stated_mode_uncertainty_matches_repetitions(natural_hz, damping):
 
 
 def test_four_points_are_too_few_for_a_mode_fit():
-    assert fit_mode(*points(*MODES[1], count=4)) is None
+    assert fit_mode(*response_points(*MODES[1], count=4)) is None
 
 
 def test_a_fit_to_scattered_points_never_gives_a_mode_without_damping():
-    """A vibrometer without light led to "natural frequency 476.54 +- 0.12 Hz, damping ratio -1e-06"."""
+    """Drop-outs once gave "natural frequency 476.54 +- 0.12 Hz, damping ratio -1e-06"."""
     random = np.random.default_rng(3)
-    frequency_hz, answers = points(*MODES[1])
+    frequency_hz, answers = response_points(*MODES[1])
     found = [
         fit_mode(frequency_hz, answers.mean() * (random.standard_normal(7) + 1j * random.standard_normal(7)))
         for _ in range(300)

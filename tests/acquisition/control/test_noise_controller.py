@@ -1,4 +1,4 @@
-"""Noise equalised at the base, on the whole virtual rig: judged by Welch's method on what was recorded."""
+"""Noise equalised at the base on the virtual rig, judged by Welch's method from the recording."""
 
 import json
 
@@ -25,14 +25,14 @@ def noise(**changes):
 
 @pytest.fixture
 def recorded(rig, tmp_path):
-    """Carry out noise on the virtual rig, and open its recording."""
+    """Return a function that carries out noise on the virtual rig and opens the recording."""
 
     def record(excitation, **believed):
         daq = rig.daq.model_copy(update={"sample_rate_hz": 10240.0})
         plan = Measurement(name="noise", excitation=excitation, ramp_s=0.3, ramp_step_s=0.03)
         path = tmp_path / "noise.h5"
         with open_bench(rig.model_copy(update={"daq": daq})) as bench:
-            # What the controller believes of the shaker, after the simulated one was built.
+            # The simulated shaker exists already; this changes only the controller's model of the shaker.
             bench.rig = bench.rig.model_copy(update={"shaker": rig.shaker.model_copy(update=believed)})
             run_measurement(bench, plan, path)
         return open_recording(path)
@@ -41,7 +41,7 @@ def recorded(rig, tmp_path):
 
 
 def densities(recording, role):
-    """Density of a channel over all that was kept, at a resolution of its own [unit2/Hz]."""
+    """Return frequencies and mean density of a channel over all realisations [Hz, unit2/Hz]."""
     rate_hz, found = recording.sample_rate_hz, []
     for each in recording.segments:
         if each.label == "realisation":
@@ -71,7 +71,7 @@ def test_the_base_reaches_the_requested_spectrum(recorded, spectrum):
         assert np.mean(np.abs(off_db) < 3.0) > 0.95
         assert abs(np.median(off_db)) < 0.5
         last = notes(recording)[-1]
-        # The realisation's line sum is what the samples' rms is.
+        # The rms from the spectral lines must match the rms of the samples.
         (*_, segment) = (each for each in recording.segments if each.label == "realisation")
         samples = recording.read("base_acceleration", segment.first_sample, segment.last_sample + 1)
         assert last["base_rms"] == pytest.approx(np.std(samples), rel=0.03)
@@ -107,7 +107,7 @@ def test_an_unreachable_spectrum_ends_with_a_ramp_down(recorded):
 
 
 def test_a_density_above_its_abort_limit_ramps_down_the_run(recorded):
-    # No equalisation below the spectrum, and a limit of m0 far below what the first realisation makes.
+    # The first realisation already exceeds the limit of m0 by far, so that no equalisation can help.
     limits = corners((40, 1e-10))
     with pytest.raises(LimitExceeded, match=r"velocity of m0 reached .* dB above 1e-10; abort_db = 6"):
         recorded(noise(response_limits=limits))

@@ -1,4 +1,4 @@
-"""Feedback on the whole rig: verdicts, levels, jumps and modes against the simulation and the closed form."""
+"""Feedback on the virtual rig: verdicts, levels, jumps and modes match simulation and closed form."""
 
 import json
 
@@ -25,8 +25,8 @@ SPECIMEN = gong2025()
 
 
 @pytest.fixture
-def carried_out(rig, tmp_path):
-    """Carry out an excitation on the virtual rig, and open its recording."""
+def record_run(rig, tmp_path):
+    """Return a function that carries out an excitation on the virtual rig and opens the recording."""
     opened = []
 
     def carry_out(excitation, fixture_kg=HEAVY_KG, **spring):
@@ -47,12 +47,12 @@ def carried_out(rig, tmp_path):
         recording.close()
 
 
-def said(recording, kind):
+def notes_of(recording, kind):
     return [json.loads(event.text) for event in recording.events if event.kind == kind]
 
 
 def simulated_period(frequency_hz, amplitude_m, longest=8):
-    """Drive periods after which the simulated state repeats to a thousandth; 0 when it does not."""
+    """Return after how many drive periods the simulated state repeats to a thousandth; 0 if it does not."""
     periods = round(4 * frequency_hz)
     drive = Harmonic(frequency_hz, amplitude_m)
     motion = integrate(SPECIMEN, drive, periods / frequency_hz, sample_rate_hz=frequency_hz)
@@ -74,7 +74,7 @@ def simulated_period(frequency_hz, amplitude_m, longest=8):
         (260.0, 5e-6, 0),
     ],
 )
-def test_the_measured_period_matches_the_simulation(carried_out, frequency_hz, amplitude_m, period):
+def test_the_measured_period_matches_the_simulation(record_run, frequency_hz, amplitude_m, period):
     assert simulated_period(frequency_hz, amplitude_m) == period
     plan = HeldDwell(
         amplitude_vpp=4.0,
@@ -82,34 +82,34 @@ def test_the_measured_period_matches_the_simulation(carried_out, frequency_hz, a
         base_level=BaseLevel(displacement_m=amplitude_m),
         duration_s=0.3,
     )
-    found = said(carried_out(plan), "settled")[-1]
+    found = notes_of(record_run(plan), "settled")[-1]
     assert found["period"] == period
     assert found["motion"] == ("periodic" if period else "aperiodic")
     assert found["level"] == "within tolerance"
 
 
-def test_the_base_is_held_while_impacts_ring_on_a_light_table(carried_out):
+def test_the_base_is_held_while_impacts_ring_on_a_light_table(record_run):
     plan = HeldDwell(
         amplitude_vpp=2.0,
         frequency_hz=260,
         base_level=BaseLevel(displacement_m=5e-6),
         duration_s=4,
     )
-    recording = carried_out(plan, fixture_kg=0.07)
+    recording = record_run(plan, fixture_kg=0.07)
     dwell = next(each for each in recording.segments if each.label == "dwell")
     base = recording.read("base_acceleration", dwell.first_sample, dwell.last_sample + 1)
     drive = recording.read("drive_voltage", dwell.first_sample, dwell.last_sample + 1)
     target = 5e-6 * (2 * np.pi * 260) ** 2
-    # The recorded drive's own frequency: two clocks would smear the fit.
+    # Fit at the frequency of the recorded drive: the clocks of generator and converter differ.
     measured = sine_amplitude(base, true_frequency_hz(drive), SAMPLE_RATE_HZ)
     assert abs(measured / target - 1) < 0.025
-    # And impacts do ring: the rest of the base's motion is not small.
+    # Impacts do ring: the remaining motion of the base is not small.
     assert np.var(base) - measured**2 / 2 > (0.1 * measured) ** 2 / 2
-    assert said(recording, "settled")[-1]["motion"] == "aperiodic"
+    assert notes_of(recording, "settled")[-1]["motion"] == "aperiodic"
 
 
 def true_frequency_hz(drive):
-    """Largest line of a long record, refined by its neighbours' phase."""
+    """Return the frequency of the drive, from the phase difference of the two halves of the record."""
     half = drive.size // 2
     time_s = np.arange(half) / SAMPLE_RATE_HZ
     turning = np.exp(-2j * np.pi * 260 * time_s)
@@ -118,8 +118,8 @@ def true_frequency_hz(drive):
     return 260 + ((turned + np.pi) % (2 * np.pi) - np.pi) * SAMPLE_RATE_HZ / (2 * np.pi * half)
 
 
-def linear_answer(frequency_hz):
-    """Displacements of m0, m1, m2 over the base's, without contact."""
+def linear_response(frequency_hz):
+    """Return the displacements of m0, m1 and m2 over that of the base, without contact."""
     omega = 2 * np.pi * frequency_hz
     s = SPECIMEN
     dynamic = s.stiffness_matrix + 1j * omega * s.damping_matrix - omega**2 * s.mass_matrix
@@ -127,9 +127,9 @@ def linear_answer(frequency_hz):
 
 
 def grazing_hz(low_hz, high_hz, amplitude_m):
-    """Where, between two frequencies, the linear relative motion of m1 and m2 just reaches the gap."""
+    """Return the frequency at which the linear relative motion of m1 and m2 just reaches the gap."""
     grid_hz = np.arange(low_hz, high_hz, 0.01)
-    reach = [abs(np.subtract(*linear_answer(f)[1:])) * amplitude_m - SPECIMEN.gap_m for f in grid_hz]
+    reach = [abs(np.subtract(*linear_response(f)[1:])) * amplitude_m - SPECIMEN.gap_m for f in grid_hz]
     (crossing,) = np.flatnonzero(np.diff(np.sign(reach)))
     return grid_hz[crossing]
 
@@ -147,7 +147,7 @@ ABOVE = (277.0, 281.0, 285.0, 290.0, 295.0, 300.0, 310.0, 320.0, 330.0, 340.0)
     ],
 )
 def test_a_sweep_jumps_where_its_linear_branch_first_touches_the_stops(
-    carried_out, frequencies_hz, direction, between_hz
+    record_run, frequencies_hz, direction, between_hz
 ):
     plan = SettledSine(
         amplitude_vpp=4.0,
@@ -160,11 +160,11 @@ def test_a_sweep_jumps_where_its_linear_branch_first_touches_the_stops(
         jumps=JumpSearch(factor=1.45, resolution_hz=0.3),
         search_s=240,
     )
-    (jump,) = [each for each in said(carried_out(plan), "jump") if each["how"] != "steep, but no jump"]
+    (jump,) = [each for each in notes_of(record_run(plan), "jump") if each["how"] != "steep, but no jump"]
     assert jump["how"] == "localised"
     low_hz, high_hz = sorted((jump["before_hz"], jump["after_hz"]))
     assert high_hz - low_hz <= 0.3
-    # The base is held to 0.75 %, which moves grazing by 0.15 Hz; upwards and downwards it is 24 Hz apart.
+    # The base level is held to 0.75 %, which moves grazing by 0.15 Hz; the jumps up and down are 24 Hz apart.
     assert low_hz - 0.2 <= grazing_hz(*between_hz, 3e-6) <= high_hz + 0.2
 
 
@@ -178,7 +178,7 @@ def test_a_sweep_jumps_where_its_linear_branch_first_touches_the_stops(
     ],
 )
 def test_linear_modes_are_tracked_to_their_phase_resonance(
-    carried_out, start_hz, span_hz, step_hz, acceleration, paper_hz, of
+    record_run, start_hz, span_hz, step_hz, acceleration, paper_hz, of
 ):
     plan = ResonanceTracking(
         amplitude_vpp=1.0,
@@ -191,9 +191,9 @@ def test_linear_modes_are_tracked_to_their_phase_resonance(
         settling=Settling(tolerance=0.02),
         record_s=0.3,
     )
-    found = said(carried_out(plan, fixture_kg=0.07), "resonance")[0]
+    found = notes_of(record_run(plan, fixture_kg=0.07), "resonance")[0]
     grid_hz = np.arange(start_hz - 1.2, start_hz + 6, 0.005)
-    quadrature = np.array([of.motion(linear_answer(f)[0]).real for f in grid_hz])
+    quadrature = np.array([of.motion(linear_response(f)[0]).real for f in grid_hz])
     expected_hz = grid_hz[int(np.argmax(quadrature < 0))]
     assert found["lock"] == "locked"
     assert abs(found["frequency_hz"] - expected_hz) < 2 * found["frequency_u_hz"] + 0.01
@@ -206,7 +206,7 @@ def test_linear_modes_are_tracked_to_their_phase_resonance(
 
 
 @pytest.mark.thorough
-def test_a_resonance_with_impacts_is_followed_while_the_motion_is_steady(carried_out):
+def test_a_resonance_with_impacts_is_followed_while_the_motion_is_steady(record_run):
     plan = ResonanceTracking(
         amplitude_vpp=1.0,
         start_hz=94.5,
@@ -217,12 +217,12 @@ def test_a_resonance_with_impacts_is_followed_while_the_motion_is_steady(carried
         flank_pairs=2,
         record_s=0.3,
     )
-    found = [each for each in said(carried_out(plan), "resonance") if each["frequency_hz"]]
+    found = [each for each in notes_of(record_run(plan), "resonance") if each["frequency_hz"]]
     model = phase_resonance_branch(SPECIMEN, (92.0, 97.0), (4.5e-7, 1.6e-6))
     level = model.amplitudes_m * (2 * np.pi * model.frequencies_hz) ** 2
     onward = model.frequencies_hz > 95.0
     colliding = [each for each in found if each["frequency_hz"] > 95.0]
-    # One more or less locks in time, by how it leaves the quasi-periodic motion where contacts begin.
+    # How the quasi-periodic motion ends where contacts begin decides whether one more level locks in time.
     assert len([each for each in colliding if each["asked_m_per_s2"] > 0.35]) >= 4
     for each in colliding:
         expected_hz = np.interp(each["base_m_per_s2"], level[onward], model.frequencies_hz[onward])
@@ -234,8 +234,8 @@ def test_a_resonance_with_impacts_is_followed_while_the_motion_is_steady(carried
         assert each["motion"] == "periodic"
 
 
-def other_resonance(near_hz, *levels, **options):
-    """Track a super- or subharmonic resonance at levels of the base [m/s2]."""
+def track_resonance(near_hz, *levels, **options):
+    """Return a plan to track a super- or subharmonic resonance at base levels [m/s2]."""
     chosen = {
         "start_hz": near_hz,
         "low_hz": near_hz - 5,
@@ -252,11 +252,11 @@ def bumpers(below_m, above_m, stiffness=100):
 
 
 @pytest.mark.thorough
-def test_a_superharmonic_resonance_matches_harmonic_balance(carried_out):
-    """Beside harmonic balance of both together (`benchmarks/backbones.py --superharmonic`)."""
+def test_a_superharmonic_resonance_matches_harmonic_balance(record_run):
+    """The reference is harmonic balance of both levels (`benchmarks/backbones.py --superharmonic`)."""
     k1 = 2.1e-3 * (2 * np.pi * 100) ** 2
     cubic = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * k1 * 1e-4 / 1e-9}
-    found = said(carried_out(other_resonance(31.6, 10.92, 12.07, harmonic=3), **cubic), "resonance")
+    found = notes_of(record_run(track_resonance(31.6, 10.92, 12.07, harmonic=3), **cubic), "resonance")
     assert [each["lock"] for each in found] == ["locked"] * 2
     levels, hertz, third_m = (9.88, 10.92, 12.07), (31.764, 31.802, 31.849), (1.55e-7, 2.08e-7, 2.80e-7)
     for each in found:
@@ -271,10 +271,10 @@ def test_a_superharmonic_resonance_matches_harmonic_balance(carried_out):
 @pytest.mark.parametrize(
     ("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), pytest.param((30e-6, 60e-6), 90, marks=pytest.mark.slow)]
 )
-def test_the_second_superharmonic_is_tracked_with_either_bumper_nearer(carried_out, gap_m, phase_deg):
-    """Beside harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
-    plan = other_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
-    found = said(carried_out(plan, **bumpers(*gap_m)), "resonance")
+def test_the_second_superharmonic_is_tracked_with_either_bumper_nearer(record_run, gap_m, phase_deg):
+    """The reference is harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
+    plan = track_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
+    found = notes_of(record_run(plan, **bumpers(*gap_m)), "resonance")
     assert [each["lock"] for each in found] == ["locked"] * 2
     levels, hertz, second_m = (10, 10.5, 11), (47.756, 47.830, 47.881), (5.14e-7, 6.78e-7, 8.17e-7)
     for each in found:
@@ -294,40 +294,40 @@ def test_the_second_superharmonic_is_tracked_with_either_bumper_nearer(carried_o
     ],
 )
 def test_a_subharmonic_resonance_is_found_by_twice_the_phase_of_m0(
-    carried_out, gap_m, phase_deg, model_hz, model_m
+    record_run, gap_m, phase_deg, model_hz, model_m
 ):
-    """Beside harmonic balance (`benchmarks/backbones.py --subharmonic 2 --spring bumpers`), at 23.64 m/s2."""
+    """Compare `benchmarks/backbones.py --subharmonic 2 --spring bumpers` at a base of 23.64 m/s2."""
     settling = Settling(tolerance=0.02, longest_wait_s=20.0)
-    plan = other_resonance(
+    plan = track_resonance(
         192, 23.64, subharmonic=2, phase_deg=phase_deg, settling=settling, widest_step_hz=0.5, most_tries=25
     )
-    recording = carried_out(plan, **bumpers(*gap_m))
-    (found,) = said(recording, "resonance")
+    recording = record_run(plan, **bumpers(*gap_m))
+    (found,) = notes_of(recording, "resonance")
     assert found["lock"] == "locked"
-    # The resonance moves by 0.17 Hz with each m/s2.
+    # The resonance moves by 0.17 Hz per m/s2.
     expected_hz = model_hz + 0.17 * (found["base_m_per_s2"] - 23.64)
     assert found["frequency_hz"] == pytest.approx(expected_hz, abs=3 * found["frequency_u_hz"])
     assert found["frequency_u_hz"] < 0.1
     assert found["harmonic_m"] == pytest.approx(model_m, rel=0.03)
-    assert said(recording, "achieved")[-1]["period"] == 2
+    assert notes_of(recording, "achieved")[-1]["period"] == 2
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("subharmonic", "start_hz"), [(2, 192), pytest.param(3, 290, marks=pytest.mark.slow)]
 )
-def test_no_subharmonic_is_found_in_a_period_one_motion(carried_out, subharmonic, start_hz):
-    """Noise at half the drive has some phase, and one of thirty degrees' tolerance was met by it."""
-    plan = other_resonance(start_hz, 2, 3, subharmonic=subharmonic, phase_tolerance_deg=30)
-    found = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
+def test_no_subharmonic_is_found_in_a_period_one_motion(record_run, subharmonic, start_hz):
+    """Noise at half the drive has a random phase, which can lie within a tolerance of 30 degrees."""
+    plan = track_resonance(start_hz, 2, 3, subharmonic=subharmonic, phase_tolerance_deg=30)
+    found = notes_of(record_run(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
     assert [each["lock"] for each in found] == ["no motion of that period"] * 2
     assert [each["tries"] for each in found] == [1, 1]
 
 
 @pytest.mark.thorough
-def test_a_search_ends_at_a_phase_jump_between_motions(carried_out):
-    """From 197 Hz downwards m0's half-drive motion is small until it jumps; it was halved 22 times there."""
-    plan = other_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
-    (found,) = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
+def test_a_search_ends_at_a_phase_jump_between_motions(record_run):
+    """From 197 Hz down m0's half-drive motion is small until it jumps; the search must not bisect on."""
+    plan = track_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
+    (found,) = notes_of(record_run(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
     assert found["lock"] == "a jump of the phase, as between two motions"
     assert found["tries"] < 25

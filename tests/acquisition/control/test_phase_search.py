@@ -1,4 +1,4 @@
-"""Finding a phase resonance on a curve that is known."""
+"""The search for a phase resonance on a known phase curve."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,12 @@ from vibench.acquisition.recording import Held, Steadiness
 
 
 def error_deg(frequency_hz, natural_hz, damping):
-    """Phase of a base-excited oscillator's relative motion, less minus 90 degrees."""
+    """Return the phase error of the relative motion from -90 degrees, for a base-excited oscillator."""
     ratio = frequency_hz / natural_hz
     return float(np.degrees(np.angle(1 / (1 - ratio**2 + 2j * damping * ratio)))) + 90
 
 
-def searched(natural_hz, damping, start_hz, noise_deg=0.0, seed=0):
+def run_search(natural_hz, damping, start_hz, noise_deg=0.0, seed=0):
     random = np.random.default_rng(seed)
     search = PhaseSearch(0.5 * natural_hz, 2 * natural_hz, widest_step_hz=0.01 * natural_hz)
     frequency_hz = start_hz
@@ -35,7 +35,7 @@ def searched(natural_hz, damping, start_hz, noise_deg=0.0, seed=0):
 @settings(max_examples=60)
 @given(damping=st.floats(0.004, 0.05), start=st.floats(0.93, 1.07))
 def test_the_search_locks_onto_sharp_and_broad_modes_from_both_sides(damping, start):
-    search = searched(266.0, damping, 266.0 * start)
+    search = run_search(266.0, damping, 266.0 * start)
     assert abs(search.tries[-1].error_deg) < 1
     found = search.resonance(0.0)
     assert found.frequency_hz == pytest.approx(266.0, abs=266 * damping * 0.02)
@@ -43,14 +43,14 @@ def test_the_search_locks_onto_sharp_and_broad_modes_from_both_sides(damping, st
 
 
 def test_the_stated_frequency_uncertainty_covers_noise():
-    found = [searched(266.0, 0.0167, 262.0, noise_deg=0.3, seed=seed).resonance(0.0) for seed in range(200)]
+    found = [run_search(266.0, 0.0167, 262.0, noise_deg=0.3, seed=seed).resonance(0.0) for seed in range(200)]
     away = np.array([each.frequency_hz - 266.0 for each in found])
     stated = np.array([each.uncertainty_hz for each in found])
     assert np.mean(np.abs(away) <= 2 * stated) > 0.9
 
 
 def test_the_phase_error_of_the_sensors_widens_the_frequency_uncertainty():
-    search = searched(266.0, 0.0167, 262.0)
+    search = run_search(266.0, 0.0167, 262.0)
     slope = 2 / (2 * 0.0167 * 266.0) * 180 / np.pi
     assert search.resonance(0.3).uncertainty_hz == pytest.approx(0.3 / slope, rel=0.15)
 
@@ -69,7 +69,7 @@ def test_phase_errors_beyond_90_degrees_do_not_count_as_a_resonance():
 
 
 def test_the_slope_of_an_irregular_phase_is_taken_near_resonance():
-    """It falls by 300 degrees a hertz at the resonance, and hardly at all further off."""
+    """The phase falls by 300 degrees per hertz at resonance, and hardly at all further off."""
     tries = [PhaseError(192 + 0.25 * n, 18.0 - n, 0.1) for n in range(4)]
     tries += [PhaseError(193.09 + off, -300.0 * off + 0.3, 0.1) for off in (-0.02, 0.01, 0.0)]
     found = PhaseSearch(190.0, 195.0, 0.5, tries, is_mode=False).resonance(0.3)
@@ -79,7 +79,7 @@ def test_the_slope_of_an_irregular_phase_is_taken_near_resonance():
 
 
 def uncertainty_deg(response, **plan):
-    """Give how well the phase of a motion, shape (periods, 5), is known over a base without noise."""
+    """Return the phase uncertainty [deg] of a motion, shape (periods, 5), over a base without noise."""
     periods = Periods(np.ones(len(response), complex), response)
     judgement = Judgement(Steadiness.PERIODIC, 1, 0.0, 0.0, 0.0, 0.0)
     base = MeasuredLevel(1.0, 0.0)
@@ -93,7 +93,7 @@ def uncertainty_deg(response, **plan):
 
 @pytest.mark.parametrize("plan", [{"harmonic": 2}, {"harmonic": 3}, {"subharmonic": 2}, {"subharmonic": 3}])
 def test_only_signals_above_noise_have_a_phase(plan):
-    """Eight phases of noise scatter by 100 degrees, so that their mean seemed known to 30 or so."""
+    """The phases of eight noise periods scatter by 100 degrees, so their mean seems known to 30."""
     known = []
     for seed in range(300):
         random = np.random.default_rng(seed)

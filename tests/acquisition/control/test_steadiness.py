@@ -1,4 +1,4 @@
-"""Settled or not, and how: verdicts on motions whose nature is known."""
+"""Verdicts on steadiness for motions of known kind: periodic, aperiodic, unsettled."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ RULE = Settling()
 
 
 def points(count, *columns):
-    """Coefficients of ``count`` periods: a unit fundamental, and what else is given for each order."""
+    """Return coefficients of ``count`` periods: a unit fundamental, plus the given values for each order."""
     table = np.zeros((count, 5), np.complex128)
     table[:, 1] = 1.0
     for order, values in columns:
@@ -31,7 +31,7 @@ def noise(count, share, seed=0):
 @given(period=st.integers(1, 8), depth=st.floats(0.05, 0.5), seed=st.integers(0, 99))
 def test_a_motion_repeating_after_k_periods_has_period_k(period, depth, seed):
     pattern = np.random.default_rng(seed).standard_normal(period)
-    pattern[0] = np.abs(pattern).sum() + 3.0  # no shorter period, not even nearly and by chance
+    pattern[0] = np.abs(pattern).sum() + 3.0  # no shorter period, not even approximately by chance
     signal = points(300, (0, depth * np.resize(pattern, 300))) + noise(300, 1e-3)
     found = judgement_of(signal, RULE)
     assert (found.steadiness, found.period) == (Steadiness.PERIODIC, period)
@@ -59,7 +59,7 @@ def test_a_transient_is_never_called_aperiodic():
 
 
 def chaos(count, seed):
-    """Give the logistic map at 3.9 from a random start."""
+    """Return a sequence of the logistic map at 3.9 with random initial value and zero mean."""
     value = np.empty(count)
     value[0] = np.random.default_rng(seed).uniform(0.2, 0.8)
     for place in range(1, count):
@@ -75,7 +75,7 @@ def test_stationary_chaos_is_called_aperiodic_in_95_percent_of_runs():
     assert Steadiness.PERIODIC not in verdicts
 
 
-def test_growing_or_drifting_chaos_is_not_settled():
+def test_growing_or_drifting_chaos_is_unsettled():
     growing = np.linspace(0.5, 1.5, 400)
     for seed in range(10):
         for motion in (0.4 * growing * chaos(400, seed), 0.4 * chaos(400, seed) + 0.6 * growing):
@@ -100,7 +100,7 @@ def test_the_uncertainty_of_the_scatter_covers_repeated_measurements():
     found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)
-    # The stated one counts one degree of freedom a period; ten coordinates make it smaller in white noise.
+    # Stated is one degree of freedom a period; in white noise ten coordinates make the scatter smaller.
     assert scatter.std() <= np.mean([each.scatter_u for each in found])
 
 
@@ -112,7 +112,7 @@ def test_too_few_periods_are_unsettled():
     ("drives", "share", "period"), [(2, 0.1, 2), (3, 0.002, 3), (2, 0.0, 1), (3, 0.0, 1)]
 )
 def test_the_period_of_a_motion_is_counted_in_drive_periods(drives, share, period):
-    """Orders that are not multiples of the drive's tell whether the motion is as long as it was looked at."""
+    """Orders that are not multiples of the drive's show whether the motion really has the longer period."""
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
     seen[:, 1] += share
@@ -121,7 +121,7 @@ def test_the_period_of_a_motion_is_counted_in_drive_periods(drives, share, perio
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
 def test_a_motion_with_one_wandering_order_is_aperiodic(kept):
-    """It keeps its statistics and does not repeat, by itself too."""
+    """The order keeps its statistics but does not repeat, with and without a constant part."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))
     assert judgement_of(moved + kept, RULE).steadiness is Steadiness.APERIODIC

@@ -1,4 +1,4 @@
-"""A simulated AFG1022 on the simulated USB bus, with a log of what it was told and what came of it."""
+"""A simulated AFG1022 on the simulated USB bus, with a log of its messages and states."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -18,11 +18,11 @@ _SERIALS = (f"C02{number:04d}" for number in itertools.count(1))
 
 
 def _nothing(message: bytes) -> None:
-    """Leave the bench alone."""
+    """Do nothing."""
 
 
-class Logged:
-    """Listens in between the USB interface and the instrument."""
+class MessageLog:
+    """Logs messages between the USB interface and the instrument."""
 
     def __init__(self, instrument: AFG1022) -> None:
         self.serial, self.maker, self.model = instrument.serial, instrument.maker, instrument.model
@@ -45,7 +45,7 @@ class Logged:
         self._instrument.report(code)
 
     def commands(self) -> list[str]:
-        """What was told, without the questions."""
+        """Return all messages except queries."""
         return [message for message in self.messages if "?" not in message]
 
     def forget(self) -> None:
@@ -53,16 +53,16 @@ class Logged:
         self.states.clear()
 
 
-class Impostor(Logged):
-    """Another model with the same USB address, as an AFG1062 would be."""
+class Impostor(MessageLog):
+    """Another generator model with the same USB address, such as an AFG1062."""
 
     def execute(self, message: bytes) -> Reply:
         reply = super().execute(message)
         return Reply(b"TEKTRONIX,AFG1062,C1,FV:1\n") if message.startswith(b"*IDN?") else reply
 
 
-class PanelLoad(Logged):
-    """A firmware that tells its load, and lets nobody but the operator set it."""
+class PanelLoad(MessageLog):
+    """A firmware whose load can be read, but can be set only at the panel."""
 
     def execute(self, message: bytes) -> Reply:
         if message.startswith(b"OUTP1:IMP "):
@@ -73,11 +73,11 @@ class PanelLoad(Logged):
 
 @dataclass
 class Plugged:
-    """A generator on the bus."""
+    """A generator connected to the bus."""
 
     instrument: AFG1022
     usb: UsbTmcInstrument
-    log: Logged
+    log: MessageLog
 
     @property
     def config(self) -> GeneratorConfig:
@@ -94,11 +94,11 @@ class Plugged:
 
 @dataclass
 class Bus:
-    """Plugs generators in, and all out at the end."""
+    """Connects generators to the bus."""
 
     plugged: list[Plugged] = field(default_factory=list)
 
-    def plug_in(self, quirks: Quirks | None = None, listener: type[Logged] = Logged) -> Plugged:
+    def plug_in(self, quirks: Quirks | None = None, listener: type[MessageLog] = MessageLog) -> Plugged:
         instrument = AFG1022(lambda: 0.0, serial=next(_SERIALS), quirks=quirks or Quirks())
         log = listener(instrument)
         usb = UsbTmcInstrument(log)

@@ -1,7 +1,7 @@
-"""A simulated PortAudio with one sound card, behind the real sounddevice: the analogue world on its jacks.
+"""A simulated PortAudio library with one sound card, used by the real sounddevice package.
 
-The real Python library makes every call and is called back through its own C callback; what stands in is the
-shared library underneath (PortAudio has no device of its own that could be looped back).
+The real Python package makes every call and receives its C callbacks; only the shared library is simulated
+(PortAudio has no loopback device).
 """
 
 import ctypes.util
@@ -30,7 +30,7 @@ WIRES = ("drive_voltage", 2.0), ("amplifier_voltage", 10.0), ("base_acceleration
 
 
 class Silent:
-    """The generator's terminal, where there is no generator."""
+    """The terminal of a missing generator."""
 
     def render(self, start_s, interval_s, count):
         return np.zeros(count)

@@ -1,4 +1,4 @@
-"""The AFG1022 driver over real pyvisa, against a simulated AFG1022 on a USB bus in memory."""
+"""The AFG1022 driver through the real pyvisa, on a simulated AFG1022 on a USB bus in memory."""
 
 import math
 from dataclasses import replace
@@ -70,12 +70,12 @@ class TestOpening:
         with pytest.raises(InstrumentLost, match=r"NOBODY.*power and cable"):
             AFG1022X.open(config)
 
-    def test_an_unknown_instrument_is_named_and_not_commanded(self, impostor):
+    def test_an_unknown_instrument_is_named_and_receives_no_settings(self, impostor):
         with pytest.raises(InstrumentError, match=r"AFG1062.*TEKTRONIX,AFG1022 is needed"):
             AFG1022X.open(impostor.config)
         assert impostor.log.commands() == ["OUTP1:STAT OFF", "*CLS"]
 
-    def test_a_second_program_gets_an_error_that_names_the_first(self, plugged, generator):
+    def test_opening_a_generator_in_use_is_refused_with_its_serial_number(self, plugged, generator):
         with pytest.raises((InstrumentBusy, InstrumentLost), match=plugged.instrument.serial):
             AFG1022X.open(plugged.config)
         generator.load_sine(100.0, 1.0)
@@ -104,7 +104,7 @@ class TestLoad:
         assert generator.unconfirmed == ()
         generator.close()
 
-    def test_a_load_of_50_ohm_halves_the_amplitude_range(self, bus):
+    def test_a_declared_load_of_50_ohm_halves_the_amplitude_range(self, bus):
         config = bus.plug_in().config.model_copy(update={"load_ohm": 50.0, "amplitude_limit_vpp": 20.0})
         generator = AFG1022X.open(config)
         assert generator.amplitude_range_vpp == (1e-3, 10.0)
@@ -223,7 +223,7 @@ class TestPlaying:
             generator.arm_burst(3)
         generator.close()
 
-    def test_the_time_of_one_verified_change_is_measured(self, plugged, generator):
+    def test_the_latency_of_a_verified_amplitude_command_is_measured(self, plugged, generator):
         generator.load_sine(100.0, 0.1)
         plugged.log.forget()
         assert 0 < generator.measured_latency_s() < 1.0
@@ -252,7 +252,7 @@ class TestLimits:
             act(generator)
         assert plugged.log.messages == []
 
-    def test_limits_of_the_bench_override_those_of_the_instrument(self, plugged):
+    def test_the_configured_amplitude_limit_overrides_the_limit_of_the_instrument(self, plugged):
         generator = AFG1022X.open(plugged.config.model_copy(update={"amplitude_limit_vpp": 0.5}))
         generator.load_sine(100.0, 0.5)
         with pytest.raises(LimitExceeded, match=r"amplitude_limit_vpp = 0.5"):
@@ -261,15 +261,15 @@ class TestLimits:
 
 
 class TestFaults:
-    def test_a_silently_replaced_setting_is_a_fault_and_silences_the_output(self, plugged, playing):
-        # Somebody turns to 10 ohm at the panel: 10 Vpp is now out of range, and silently becomes 1 Vpp.
+    def test_a_setting_replaced_by_the_instrument_is_refused_and_silences_the_output(self, plugged, playing):
+        # At a load of 10 ohm, set at the panel, 10 Vpp is out of range and silently becomes 1 Vpp.
         plugged.instrument.execute(b"OUTP1:IMP 10")
         with pytest.raises(SettingRefused, match=r"10\.0000VPP.*reads back '1") as caught:
             playing.set_amplitude(10.0)
         assert not plugged.is_on
         assert "The output was switched off." in caught.value.__notes__
 
-    def test_an_instrument_error_is_a_fault_and_silences_the_output(self, bus):
+    def test_an_error_of_the_instrument_is_raised_and_silences_the_output(self, bus):
         plugged = bus.plug_in(Quirks(out_of_range_becomes_default=False))
         generator = AFG1022X.open(plugged.config)
         generator.load_sine(260.0, 0.1)
@@ -280,7 +280,7 @@ class TestFaults:
         assert not plugged.is_on
         generator.close()
 
-    def test_a_memory_with_wrong_content_is_a_fault(self, plugged, generator):
+    def test_a_waveform_that_reads_back_differently_is_refused(self, plugged, generator):
         def spoil(message):
             if message.startswith(b"DATA:DATA EMEM"):
                 spoilt = plugged.instrument.memory.codes("EMEM").copy()
@@ -324,7 +324,7 @@ class TestFaults:
             playing.stop()
 
     @pytest.mark.parametrize("act", [lambda generator: generator.set_amplitude(0.2), AFG1022X.close])
-    def test_a_lost_instrument_raises_an_error_and_can_be_stopped_later(self, plugged, playing, act):
+    def test_a_lost_generator_raises_an_error_and_can_be_stopped_later(self, plugged, playing, act):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost):
             act(playing)

@@ -1,4 +1,4 @@
-"""The mapping from values to codes: what the terminal plays is what was requested, within one step."""
+"""Waveform codes: the generator plays the requested waveform to within one step."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, al
 )
 
 
-def achieved(made):
-    """Values that the codes stand for, on the scale of the values as given."""
+def waveform_of(made):
+    """Return the waveform of the codes, on the scale of the given values."""
     return made.panel_factor * (2 * made.codes / AFG1022_MODEL.top_code - 1.0)
 
 
@@ -25,7 +25,7 @@ def half_a_step(made):
 @given(waveforms)
 def test_codes_reproduce_the_zero_mean_waveform_within_half_a_step(values):
     made = AFG1022_MODEL.codes(values)
-    assert np.max(np.abs(achieved(made) - (values - values.mean()))) <= half_a_step(made) * (1 + 1e-9)
+    assert np.max(np.abs(waveform_of(made) - (values - values.mean()))) <= half_a_step(made) * (1 + 1e-9)
 
 
 @given(waveforms)
@@ -38,14 +38,14 @@ def test_the_largest_magnitude_maps_to_the_outermost_code(values):
 @given(waveforms)
 def test_the_remaining_dc_is_below_half_a_step(values):
     made = AFG1022_MODEL.codes(values)
-    assert abs(achieved(made).mean()) <= half_a_step(made) * (1 + 1e-9)
+    assert abs(waveform_of(made).mean()) <= half_a_step(made) * (1 + 1e-9)
 
 
 def test_a_full_range_sine_keeps_its_amplitude_on_the_panel():
     made = AFG1022_MODEL.codes(np.sin(2 * np.pi * np.arange(4096) / 4096))
     assert made.panel_factor == pytest.approx(1.0, abs=1e-12)
     assert (made.codes.min(), made.codes.max()) == (0, AFG1022_MODEL.top_code)
-    assert abs(achieved(made).mean()) < 1e-7
+    assert abs(waveform_of(made).mean()) < 1e-7
 
 
 def test_an_asymmetric_waveform_needs_a_larger_panel_amplitude():

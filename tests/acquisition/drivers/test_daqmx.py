@@ -1,4 +1,4 @@
-"""The DAQmx driver over the real nidaqmx client, against the virtual rig's DAQ."""
+"""The DAQmx driver through the real nidaqmx client, on the virtual rig's simulated DAQ."""
 
 from contextlib import ExitStack
 from types import SimpleNamespace
@@ -20,8 +20,8 @@ from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
 
 RATE_HZ = 5120.0
-# Step in a sine of 100 Hz and 0.5 V where one sample is missing: 61 mV. Two clocks that differ by
-# some ppm leave 1.4 mV in half a second.
+# A missing sample in a sine of 100 Hz and 0.5 V is a step of 61 mV. Clocks that differ by some ppm
+# leave 1.4 mV in half a second.
 A_LOST_SAMPLE_V = 0.5 * 2 * np.pi * 100.0 / RATE_HZ
 
 
@@ -61,7 +61,7 @@ def rig(configured, virtual):
 
 @pytest.fixture
 def opened():
-    """Opens digitizers, and closes them whatever becomes of the test."""
+    """Return a function that opens digitizers; they are closed after the test."""
     with ExitStack() as closing:
 
         def open_one(rig):
@@ -78,7 +78,7 @@ def digitizer(rig, opened):
 
 
 class TestReading:
-    def test_the_identity_names_product_serial_and_driver(self, digitizer):
+    def test_the_identity_names_product_and_driver(self, digitizer):
         assert digitizer.identity.model == "NI 9234"
         assert digitizer.identity.firmware.startswith("NI-DAQmx ")
         assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
@@ -87,7 +87,7 @@ class TestReading:
         digitizer = opened(with_daq(rig, sample_rate_hz=10_000))
         assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
 
-    def test_blocks_follow_each_other_without_a_gap(self, digitizer):
+    def test_blocks_have_consecutive_sample_numbers(self, digitizer):
         digitizer.start()
         firsts = [digitizer.read(samples).first_sample for samples in (100, 1, 700, 100)]
         assert firsts == [0, 100, 101, 801]
@@ -125,7 +125,7 @@ class TestReading:
         assert block.counts.dtype == np.int32
         assert np.array_equal(block.counts * np.array(digitizer.volts_per_count)[:, np.newaxis], block.volts)
 
-    def test_two_blocks_of_samples_share_no_memory(self, digitizer):
+    def test_samples_of_a_block_are_not_overwritten_by_the_next_block(self, digitizer):
         digitizer.start()
         first = digitizer.read(100)
         kept = first.volts.copy()
@@ -133,8 +133,8 @@ class TestReading:
         assert not np.shares_memory(first.volts, second.volts)
         assert np.array_equal(first.volts, kept)
 
-    def test_an_input_past_its_range_is_flagged_with_its_samples(self, rig, virtual, opened):
-        # The channel believes in a range of 1 V; the device measures on 5 V all the same.
+    def test_an_input_beyond_its_range_is_flagged_with_its_sample_range(self, rig, virtual, opened):
+        # A configured range of 1 V, while the device measures with its range of 5 V.
         digitizer = opened(with_channel(rig, 0, range_v=1.0))
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 8VPP;:OUTP1 ON")
         digitizer.start()
@@ -147,7 +147,7 @@ class TestReading:
 
 class TestStates:
     @pytest.mark.parametrize("samples", [0, -1])
-    def test_reading_no_samples_is_an_error(self, digitizer, samples):
+    def test_reading_zero_or_fewer_samples_is_refused(self, digitizer, samples):
         digitizer.start()
         with pytest.raises(InstrumentError, match=r"1 or more"):
             digitizer.read(samples)
@@ -160,12 +160,12 @@ class TestStates:
         with pytest.raises(InstrumentError, match=r"not sampling"):
             digitizer.read(10)
 
-    def test_a_second_start_is_an_error(self, digitizer):
+    def test_starting_a_running_digitizer_is_refused(self, digitizer):
         digitizer.start()
         with pytest.raises(InstrumentError, match=r"sampling already"):
             digitizer.start()
 
-    def test_stop_and_close_are_legal_at_any_time(self, digitizer):
+    def test_stopping_and_closing_are_allowed_at_any_time(self, digitizer):
         digitizer.stop()
         digitizer.start()
         digitizer.stop()
@@ -179,7 +179,7 @@ class TestStates:
 
 class TestConfiguration:
     def test_coupling_and_sensor_current_reach_the_device(self, rig, digitizer):
-        # The accelerometer shows its bias, or nothing, unless it is AC-coupled and fed.
+        # Without AC coupling and current the accelerometer shows its bias or nothing.
         digitizer.start()
         digitizer.read(5120)
         assert np.ptp(digitizer.read(1000).volts[2]) > 0
@@ -198,7 +198,7 @@ class TestConfiguration:
     def test_unsupported_settings_are_reported_when_the_bench_opens(self, rig, change, complaint):
         with pytest.raises(ConfigurationError, match=complaint):
             DaqmxDigitizer.open(change(rig))
-        DaqmxDigitizer.open(rig).close()  # nothing stayed reserved
+        DaqmxDigitizer.open(rig).close()  # no device stays reserved
 
     def test_a_missing_driver_is_reported(self, configured):
         with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver.*daq\.server"):
@@ -237,7 +237,7 @@ class TestFaults:
         assert digitizer.read(100).first_sample == 0
 
     @pytest.mark.parametrize("call", ["CreateAIVoltageChan", "CfgSampClkTiming", "TaskControl"])
-    def test_a_failure_during_opening_leaves_nothing_reserved(self, rig, virtual, call):
+    def test_a_failure_during_opening_leaves_the_device_free(self, rig, virtual, call):
         virtual.faults.fail_daq(call, -50103)
         with pytest.raises(InstrumentBusy):
             DaqmxDigitizer.open(rig)
@@ -302,7 +302,7 @@ def sine_fit(row, frequency_hz):
     return basis @ np.linalg.lstsq(basis, row)[0]
 
 
-def test_calls_after_an_unanswered_call_have_a_short_deadline():
+def test_the_call_after_an_unanswered_call_has_a_short_deadline():
     class Details(SimpleNamespace):
         def _replace(self, **changes):
             return Details(**{**vars(self), **changes})

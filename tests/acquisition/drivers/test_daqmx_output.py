@@ -1,4 +1,4 @@
-"""The streamed output over the real nidaqmx client, heard through the virtual rig's own inputs."""
+"""The streamed output through the real nidaqmx client, measured by inputs of the virtual rig."""
 
 from contextlib import ExitStack
 
@@ -29,7 +29,7 @@ def virtual(rig):
 @pytest.fixture
 def rig():
     rig = load_rig("virtual_rig")
-    # Only the drive is wanted, and the USB-4431 feeds sensors with another current than the NI 9234.
+    # Only the drive channel is used: the sensor current of the USB-4431 differs from that of the NI 9234.
     daq = rig.daq.model_copy(
         update={
             "device": "Dev1",
@@ -77,9 +77,9 @@ def test_the_stream_is_played_from_its_first_sample_without_gaps(digitizer, outp
         heard.append(digitizer.read(1280).volts[0])
         output.write(tone(written, 1280))
         written += 1280
-    drive_v = 2.0 * np.concatenate(heard)  # the channel's divider
+    drive_v = 2.0 * np.concatenate(heard)  # divider of the channel
     angle = 2 * np.pi * 100.0 * np.arange(drive_v.size) / RATE_HZ
-    late = slice(256, None)  # past the filter of the converter
+    late = slice(256, None)  # after the delay of the converter's filter
     basis = np.stack([np.cos(angle), np.sin(angle)], axis=1)[late]
     fitted = np.linalg.lstsq(basis, drive_v[late])[0]
     assert np.hypot(*fitted) == pytest.approx(1.0, rel=2e-2)
@@ -106,7 +106,7 @@ def test_an_output_idles_at_zero_or_reports_that_it_cannot(virtual, device, idle
         assert _set_idle_output(channel) is idle
 
 
-def test_the_output_of_a_4431_returns_to_zero_automatically(output):
+def test_the_output_of_a_usb_4431_idles_at_zero(output):
     assert output.idle is IdleOutput.ZERO
 
 
@@ -120,19 +120,19 @@ def test_stopping_an_output_sets_it_to_zero(digitizer, output):
 
 
 @pytest.mark.parametrize("volts", [np.array([0.0, 2.01]), np.array([-2.01]), np.array([np.nan])])
-def test_samples_past_the_limit_are_refused_before_they_are_written(output, volts):
+def test_samples_beyond_the_limit_are_refused_before_writing(output, volts):
     with pytest.raises(LimitExceeded, match=r"2 V are allowed"):
         output.write(volts)
     with pytest.raises(InstrumentError, match=r"nothing to play"):
         output.arm()
 
 
-def test_nothing_can_be_armed_before_something_is_written(output):
+def test_an_output_without_written_samples_cannot_be_armed(output):
     with pytest.raises(InstrumentError, match=r"nothing to play"):
         output.arm()
 
 
-def test_stop_and_close_are_legal_at_any_time_and_free_the_output(digitizer, output):
+def test_stopping_and_closing_are_allowed_at_any_time_and_free_the_output(digitizer, output):
     output.stop()
     output.stop()
     output.close()
@@ -150,7 +150,7 @@ def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
         heard = 2.0 * digitizer.read(6400).volts[0]
         output.stop()
         digitizer.stop()
-        delay = 40  # of the converter's filter
+        delay = 40  # delay of the converter's filter
         expected = tone(0, 6400 - delay, amplitude_v)
         np.testing.assert_allclose(heard[delay + 256 :], expected[256:], atol=0.03 * amplitude_v)
 
@@ -168,7 +168,7 @@ def test_an_output_in_use_is_reported_as_busy_to_a_second_program(digitizer, out
 
 
 def test_a_rate_that_the_output_would_change_is_refused_and_frees_the_output(digitizer):
-    # The USB-6211 divides 20 MHz: it has no 12 345.6 Hz.
+    # The USB-6211 divides 20 MHz by an integer, which cannot give 12 345.6 Hz.
     with pytest.raises(SettingRefused, match=r"daq\.output\.sample_rate_hz"):
         DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_345.6}), digitizer)
     DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_500.0}), digitizer).close()
@@ -183,13 +183,11 @@ def test_a_rate_that_the_output_would_change_is_refused_and_frees_the_output(dig
         ("Dev1/ao0", {"sample_rate_hz": 2e5}, ConfigurationError, r"not support a rate.*1000 to 96000"),
     ],
 )
-def test_an_output_that_the_device_does_not_have_is_refused_in_one_sentence(
-    digitizer, physical, changes, kind, said
-):
+def test_an_unsupported_output_setting_is_refused_in_one_sentence(digitizer, physical, changes, kind, said):
     with pytest.raises(kind, match=said) as failure:
         DaqmxOutput.open(physical, CONFIG.model_copy(update=changes), digitizer)
     assert "\n" not in str(failure.value)
-    opened_output(digitizer).close()  # nothing stayed reserved
+    opened_output(digitizer).close()  # no device stays reserved
 
 
 def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output, virtual):
@@ -198,7 +196,7 @@ def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output,
     digitizer.start()
     digitizer.read(1280)
     virtual.faults.lose_daq_server()
-    for _ in range(2):  # a second attempt does not count as silence
+    for _ in range(2):  # a repeated attempt does not count as silence
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE PLAYING.*0\.5 s.*switch the amplifier off"):
             output.stop()
     virtual.faults.heal()
@@ -206,7 +204,7 @@ def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output,
         digitizer.close()
 
 
-def test_the_daqmx_output_driver_passes_the_contract_tests(output):
+def test_the_daqmx_output_reports_its_rate_lead_and_identity(output):
     promised: AnalogOutput = output
     assert (promised.sample_rate_hz, promised.ahead_samples) == (RATE_HZ, 6400)
     assert promised.identity.model == "USB-4431"

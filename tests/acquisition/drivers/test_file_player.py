@@ -1,4 +1,4 @@
-"""A recording played back: the same plan records it again, sample for sample."""
+"""Playback of a recording: the same plan records the same samples again."""
 
 import h5py
 import numpy as np
@@ -28,7 +28,7 @@ def original(rig, tmp_path):
 
 @pytest.fixture
 def playing(rig, original):
-    """Give the rig on which the recording takes the place of generator and converter."""
+    """Return a function that makes the rig on which the recording replaces generator and converter."""
 
     def rig_of(**daq):
         options = {"recording": str(original)}
@@ -106,7 +106,7 @@ def test_playback_with_another_sensor_scale_is_refused(playing, rig):
         open_bench(playing().model_copy(update={"vibrometer": other}))
 
 
-def test_a_replayed_recording_needs_no_bench_check_and_no_waiver(playing, tmp_path):
+def test_playback_needs_no_bench_check_and_no_waiver(playing, tmp_path):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         with pytest.raises(ConfigurationError, match="plays back a recording"):
             check_bench(bench, tmp_path)

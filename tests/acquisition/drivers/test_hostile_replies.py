@@ -1,4 +1,4 @@
-"""Replies that no instrument should give: a sentence of bounded length, and the output is off."""
+"""Impossible replies of instruments give a short error and leave the output off."""
 
 import socket
 import threading
@@ -17,7 +17,7 @@ from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.daqmx.data_calls import DATA_CALLS
 from vibench.virtual_rig.generator.scpi_instrument import Reply
 
-from .conftest import Logged
+from .conftest import MessageLog
 
 LONGEST_SENTENCE = 2000
 REPLIES = {
@@ -36,8 +36,8 @@ REPLIES = {
 QUERIES = ("SYST:ERR?", "VOLT?", "FREQ?", "STAT?", "DATA:DATA?")
 
 
-class Hostile(Logged):
-    """Answers one query in its own way once ``query`` is set."""
+class HostileGenerator(MessageLog):
+    """A generator that gives a chosen reply to one query once ``query`` is set."""
 
     query = ""
     answer = b""
@@ -51,7 +51,7 @@ class Hostile(Logged):
 @pytest.mark.parametrize("query", QUERIES)
 @pytest.mark.parametrize("name", REPLIES)
 def test_a_generator_with_hostile_replies_ends_switched_off(bus, name, query):
-    plugged = bus.plug_in(listener=Hostile)
+    plugged = bus.plug_in(listener=HostileGenerator)
     generator = AFG1022X.open(plugged.config)
     generator.load_sine(100.0, 1.0)
     generator.start()
@@ -73,7 +73,7 @@ def test_a_generator_with_hostile_replies_ends_switched_off(bus, name, query):
 
 @pytest.mark.parametrize("name", [name for name in REPLIES if "complaint" not in name])
 def test_a_hostile_identity_reply_is_refused_with_a_short_error(bus, name):
-    plugged = bus.plug_in(listener=Hostile)
+    plugged = bus.plug_in(listener=HostileGenerator)
     plugged.log.query, plugged.log.answer = "*IDN?", REPLIES[name]
     with pytest.raises(InstrumentError) as refused:
         AFG1022X.open(plugged.config)
@@ -82,8 +82,8 @@ def test_a_hostile_identity_reply_is_refused_with_a_short_error(bus, name):
 
 
 @contextmanager
-def babbler():
-    """An instrument on a socket that answers the first query without end."""
+def endless_instrument():
+    """Serve an instrument on a socket that answers the first query without end; yields its address."""
     server = socket.create_server(("127.0.0.1", 0))
 
     def babble():
@@ -103,8 +103,8 @@ def babbler():
         thread.join()
 
 
-def test_an_endless_reply_is_an_error():
-    with babbler() as resource:
+def test_an_endless_reply_raises_an_error():
+    with endless_instrument() as resource:
         instrument = ScpiInstrument(lambda: open_link(resource, "@py"), "the generator")
         try:
             with pytest.raises(InstrumentError, match=r"\*IDN\? was answered with more than 300 bytes"):
@@ -122,7 +122,7 @@ COUNTS = {
 
 @pytest.mark.parametrize("announced", [0, -1, 1])
 @pytest.mark.parametrize("sent", COUNTS)
-def test_a_wrong_number_of_samples_is_an_error(rig, monkeypatch, sent, announced):
+def test_a_wrong_number_of_samples_raises_an_error(rig, monkeypatch, sent, announced):
     usual = DATA_CALLS["ReadBinaryI32"]
 
     def read(system, request):
@@ -137,7 +137,7 @@ def test_a_wrong_number_of_samples_is_an_error(rig, monkeypatch, sent, announced
             bench.digitizer.read(64)
 
 
-def test_a_failed_call_with_a_success_code_is_an_error(rig):
+def test_a_failed_call_with_a_success_code_raises_an_error(rig):
     with VirtualRig(rig) as virtual:
         virtual.faults.fail_daq("StartTask", 0)
         connected = rig.daq.model_copy(update={"server": virtual.daq_address})
@@ -149,7 +149,7 @@ def test_a_failed_call_with_a_success_code_is_an_error(rig):
 
 
 class Converter:
-    """A converter that flags a channel that nobody configured."""
+    """A converter that reports an overload of an unknown channel."""
 
     roles = ("drive_voltage",)
 
@@ -157,7 +157,7 @@ class Converter:
         return Block(0, np.zeros((1, samples)), (Overload("\x1b[2J" * 1000, 0, 1),))
 
 
-def test_an_overload_of_an_unknown_channel_is_an_error():
+def test_an_overload_of_an_unknown_channel_raises_an_error():
     with pytest.raises(InstrumentError, match="reports overloads of") as refused:
         read_block(Converter(), 8)
     assert str(refused.value).isprintable()
@@ -170,7 +170,7 @@ def test_a_non_numeric_scale_gives_no_converter_step():
     assert linear_step_v([float("nan"), 1e-6], 5.0) is None
 
 
-def test_a_listener_that_never_accepts_is_an_absent_instrument():
+def test_a_port_that_never_accepts_a_connection_is_reported_as_a_lost_instrument():
     """pyvisa-py raises a bare Exception when connecting takes too long."""
     with ExitStack() as closing:
         listener = closing.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))

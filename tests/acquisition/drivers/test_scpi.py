@@ -1,4 +1,4 @@
-"""The SCPI dialogue, and everything that can go wrong in it."""
+"""The SCPI dialogue with an instrument, and its errors."""
 
 import errno
 from collections import deque
@@ -15,7 +15,7 @@ LOST = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_connection_lost)
 
 
 class Instrument:
-    """Answers questions from a table, keeps an error queue, and drops dead when told to."""
+    """Answers queries from a table, has an error queue, and fails with `dies_with`."""
 
     def __init__(self, **answers):
         self.timeout = 3000.0
@@ -85,7 +85,7 @@ def test_an_endless_error_queue_raises_an_error():
         port(instrument).command("FREQ 1")
 
 
-def test_an_empty_first_answer_repeats_the_query():
+def test_a_query_is_repeated_after_an_empty_first_answer():
     instrument = Instrument(IDN=[b"\n", b"TEKTRONIX,AFG1022\n"])
     instrument.answers["*IDN?"] = instrument.answers.pop("IDN")
     assert port(instrument).query_patiently("*IDN?") == "TEKTRONIX,AFG1022"
@@ -106,7 +106,7 @@ def test_a_non_numeric_answer_raises_an_error_with_query_and_answer(reply):
         port(instrument).query_number("FREQ?")
 
 
-def test_a_timeout_is_an_error_that_states_how_long_was_waited():
+def test_a_timeout_raises_an_error_that_states_the_waiting_time():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [TIMEOUT]
     with pytest.raises(InstrumentError, match=r"'FREQ\?' within 3 s") as caught:
@@ -132,19 +132,19 @@ def test_every_error_of_a_lost_device_is_recognised(death, act):
         getattr(port(instrument), act)("FREQ?")
 
 
-def test_the_answer_to_an_interrupted_query_is_discarded():
+def test_a_late_answer_to_an_interrupted_query_is_discarded():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [KeyboardInterrupt()]
     instrument.answers["VOLT?"] = [b"1.5\n"]
     ours = port(instrument)
     with pytest.raises(KeyboardInterrupt):
         ours.query("FREQ?")
-    instrument.due.append(b"1000\n")  # the answer to FREQ? that nobody fetched
+    instrument.due.append(b"1000\n")  # the late answer to FREQ?
     assert ours.query("VOLT?") == "1.5"
     assert instrument.timeout == 3000.0
 
 
-def test_a_query_after_a_timeout_gets_its_own_answer():
+def test_a_query_can_be_repeated_after_a_timeout():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [TIMEOUT, b"1000\n"]
     ours = port(instrument)
@@ -168,7 +168,7 @@ def test_codes_with_newline_bytes_are_read():
 @pytest.mark.parametrize(
     "reply", [b"\n", b"123\n", b"#\n", b"#0\n", b"#2x4\x00\x01\n", b"#16\x00\x01\n", b"#13\x00\x01\x02\n"]
 )
-def test_a_malformed_block_is_an_error(reply):
+def test_a_malformed_block_raises_an_error(reply):
     instrument = Instrument()
     instrument.answers["DATA?"] = [reply]
     with pytest.raises(InstrumentError, match=r"block|announced"):

@@ -1,4 +1,4 @@
-"""A sound card as converter and output: real sounddevice on a simulated PortAudio, and the analogue world."""
+"""A sound card as converter and output: real sounddevice, simulated PortAudio and analogue world."""
 
 from functools import partial
 from types import SimpleNamespace
@@ -36,10 +36,10 @@ def audio():
 
 @pytest.fixture
 def opened(card_rig, audio):
-    """Open the bench on the card, its jacks wired to the world that the rig describes."""
+    """Return a function that opens the bench on the card, wired to the simulated world of its rig."""
     benches = []
 
-    def opens():
+    def open_card_bench():
         simulated_rig = card_rig()
         world = World(simulated_rig, Silent())
         real = simulated_rig.model_copy(update={"virtual": None})
@@ -49,7 +49,7 @@ def opened(card_rig, audio):
         benches.append(bench)
         return bench
 
-    yield opens
+    yield open_card_bench
     for bench in benches:
         bench.close()
 
@@ -87,7 +87,7 @@ def test_a_sound_card_records_its_output_without_gaps(opened, tmp_path, excitati
     assert analyse(path) is not None
 
 
-def test_noise_that_needs_a_generator_is_refused_before_anything_plays(opened, tmp_path):
+def test_noise_that_needs_a_generator_is_refused_before_output(opened, tmp_path):
     plan = Measurement(
         name="card",
         excitation=WhiteNoise(amplitude_vpp=0.5, band_start_hz=40, band_stop_hz=400),

@@ -1,4 +1,4 @@
-"""A USB instrument that this account may not use is there, and is told so."""
+"""Missing permission for a connected USB instrument is reported with advice."""
 
 import pytest
 
@@ -11,11 +11,11 @@ AFG = "USB0::0x0699::0x0353::C010101::INSTR"
 
 @pytest.fixture
 def bus(tmp_path, monkeypatch):
-    """A USB bus with one device on it, whose node may or may not be written."""
+    """Return a function that puts one device on a USB bus, with or without write permission."""
     monkeypatch.setattr(_visa_link, "USB_DEVICES", tmp_path / "devices")
     monkeypatch.setattr(_visa_link, "USB_NODES", tmp_path / "nodes")
 
-    def plugged(vendor, product, may_write):
+    def plug_device(vendor, product, may_write):
         device = tmp_path / "devices" / "1-2"
         device.mkdir(parents=True)
         (tmp_path / "devices" / "1-0:1.0").mkdir()
@@ -26,7 +26,7 @@ def bus(tmp_path, monkeypatch):
             node.parent.mkdir(parents=True)
             node.touch()
 
-    return plugged
+    return plug_device
 
 
 @pytest.mark.parametrize(
