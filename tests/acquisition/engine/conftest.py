@@ -1,4 +1,4 @@
-"""Real engine processes with the virtual rig, and ways to wait for them without guessing times."""
+"""Real engine processes with the virtual rig, and functions that wait for their states."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ LOOK_S = 0.01
 
 @pytest.fixture(autouse=True)
 def own_state(tmp_path_factory, monkeypatch) -> None:
-    """Keep locks out of the user's folder."""
+    """Use a temporary state folder for locks."""
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
 
 
@@ -38,21 +38,21 @@ def shipped_rig() -> Rig:
 
 @pytest.fixture
 def engine() -> Iterator[Callable[..., EngineProcess]]:
-    """Start engines; they are ended with the test."""
+    """Return a function that starts an engine, which ends with the test."""
     with ExitStack() as running:
         yield lambda supervision=Supervision.ATTENDED: running.enter_context(start_engine(supervision))
 
 
 @pytest.fixture(scope="module")
 def shared_engine() -> Iterator[EngineProcess]:
-    """One engine for all tests that leave it as they have found it: to start one takes two seconds."""
+    """One engine for all tests that restore its state: starting one takes two seconds."""
     with start_engine() as engine:
         yield engine
 
 
 @pytest.fixture
 def client(shared_engine: EngineProcess) -> Iterator[EngineClient]:
-    """The attending viewer of an engine without a bench."""
+    """The attending viewer of an engine whose bench is closed."""
     client = shared_engine.client
     yield client
     client.stop(StopLevel.OFF)
@@ -63,7 +63,7 @@ def client(shared_engine: EngineProcess) -> Iterator[EngineClient]:
 
 
 def until(client: EngineClient, is_there: Callable[[EngineStatus], bool]) -> EngineStatus:
-    """Ask until something is so."""
+    """Poll the status until a condition holds; return the status."""
     give_up_s, pause = time.monotonic() + PATIENCE_S, threading.Event()
     while not is_there(status := client.status()):
         if time.monotonic() > give_up_s:
@@ -72,8 +72,8 @@ def until(client: EngineClient, is_there: Callable[[EngineStatus], bool]) -> Eng
     return status
 
 
-def until_there(path: Path) -> None:
-    """Look until a file is there, and ask nobody."""
+def until_exists(path: Path) -> None:
+    """Wait until a file exists, without requests to the engine."""
     give_up_s, pause = time.monotonic() + PATIENCE_S, threading.Event()
     while not path.exists():
         assert time.monotonic() < give_up_s, f"{path} was never finished"
@@ -85,13 +85,13 @@ def until_state(client: EngineClient, *states: EngineState) -> EngineStatus:
 
 
 def opened(client: EngineClient, rig: Rig) -> EngineStatus:
-    """Let an engine open a bench, and wait for it."""
+    """Open a bench in the engine and wait until it is ready."""
     client.open(rig)
     return until_state(client, EngineState.READY)
 
 
 def campaign(*names: str, duration_s: float = 600.0) -> Campaign:
-    """Long dwells: far longer than any test lets them last."""
+    """Return a campaign of dwells that are longer than any test."""
     excitation = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2}
     excitation["duration_s"] = duration_s
     each = [{"name": name, "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": excitation} for name in names]

@@ -1,4 +1,4 @@
-"""An attendant alone keeps an attended run going; it says when its program stands still, and ends with it."""
+"""The keep-alive process alone sends requests for a window; it reports when the window is blocked."""
 
 import os
 import signal
@@ -29,8 +29,8 @@ Event().wait()
 """
 
 
-def running(process, rig, folder):
-    """Whom to ask about a run that plays, without attending to it."""
+def start_run(process, rig, folder):
+    """Start a run and return a client that watches it without attending."""
     client = process.client
     client.open(rig)
     until_state(client, EngineState.READY)
@@ -41,8 +41,8 @@ def running(process, rig, folder):
 
 
 @contextmanager
-def attending(process):
-    """A program that lives until it is told to hang, and the number of its attendant's process."""
+def watched_program(process):
+    """Run a program that can be made to block; yields it and the number of its keep-alive process."""
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(process.pid)],
         stdin=subprocess.PIPE,
@@ -56,14 +56,14 @@ def attending(process):
 
 
 @pytest.mark.parametrize(("granted_s", "hung_s"), [(0.5, 2.0), (2.0, 8.0), (4.0, 10.0), (10.0, 10.0)])
-def test_a_blocked_window_gets_at_most_the_longest_allowed_timeout(granted_s, hung_s):
+def test_a_blocked_window_gets_four_times_its_timeout_and_at_most_10_s(granted_s, hung_s):
     assert hung_patience_s(granted_s) == hung_s
 
 
 @pytest.mark.thorough
 def test_the_keep_alive_process_reports_a_blocked_window_and_ends_its_run(engine, shipped_rig, tmp_path):
     process = engine()
-    with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
+    with watched_program(process) as (program, _), start_run(process, shipped_rig, tmp_path) as visitor:
         Event().wait(2.0)
         assert visitor.status().state in DRIVING
         hung_s = monotonic()
@@ -77,7 +77,7 @@ def test_the_keep_alive_process_reports_a_blocked_window_and_ends_its_run(engine
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped program hangs")
 def test_the_keep_alive_process_sends_nothing_for_a_suspended_window(engine, shipped_rig, tmp_path):
     process = engine()
-    with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
+    with watched_program(process) as (program, _), start_run(process, shipped_rig, tmp_path) as visitor:
         os.kill(program.pid, signal.SIGSTOP)
         status = until_state(visitor, EngineState.READY)
     assert "no viewer has" in status.rows[0].reason
@@ -87,13 +87,13 @@ def test_the_keep_alive_process_sends_nothing_for_a_suspended_window(engine, shi
 @pytest.mark.thorough
 def test_the_keep_alive_process_ends_when_its_program_is_killed(engine, shipped_rig, tmp_path):
     process = engine()
-    with attending(process) as (program, pid), running(process, shipped_rig, tmp_path) as visitor:
+    with watched_program(process) as (program, pid), start_run(process, shipped_rig, tmp_path) as visitor:
         program.kill()
         status = until_state(visitor, EngineState.READY)
     assert "no viewer has" in status.rows[0].reason
     clock = Event()
     for _ in range(500):
-        if process_start(pid) is None:  # also where nobody has taken note of its end yet
+        if process_start(pid) is None:  # true even before the operating system has removed the process
             break
         clock.wait(0.02)
     assert process_start(pid) is None

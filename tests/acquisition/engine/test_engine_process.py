@@ -1,4 +1,4 @@
-"""A real engine process on the virtual rig: the job, the stops, and what happens when nobody looks."""
+"""A real engine process on the virtual rig: runs, stops, refusals, and lost viewers."""
 
 import os
 import re
@@ -42,14 +42,14 @@ from vibench.acquisition.plan import Campaign
 from vibench.acquisition.recording import RecordingState
 from vibench.virtual_rig import VirtualRig
 
-from .conftest import campaign, opened, until, until_state, until_there
+from .conftest import campaign, opened, until, until_exists, until_state
 
 SILENT_V = 0.02
 """Of the recorded drive: its noise, and the last stair of a ramp."""
 
 
 def on_server(rig, virtual):
-    """Give the rig as one that is not virtual: its instruments are those of another."""
+    """Return the rig as a real one, whose instruments are those of another virtual rig."""
     return rig.model_copy(
         update={
             "virtual": None,
@@ -59,16 +59,16 @@ def on_server(rig, virtual):
     )
 
 
-def running(client, rig, tmp_path, *names):
+def start_run(client, rig, tmp_path, *names):
     opened(client, rig)
     client.arm(campaign(*names or ("run",)), tmp_path)
     client.start()
     return until(client, lambda status: status.run is not None and status.run.segment == "dwell")
 
 
-def kept(path, reason):
-    """Open what was recorded; its last samples are silent and it says why it ended."""
-    until_there(path)
+def stop_events(path, reason):
+    """Return the events of a recording, which must end silent and state the reason."""
+    until_exists(path)
     with open_recording(path) as recording:
         assert recording.state is RecordingState.STOPPED
         assert re.search(reason, recording.reason), recording.reason
@@ -76,7 +76,7 @@ def kept(path, reason):
         return [(event.kind, event.text) for event in recording.events]
 
 
-class TestTheJob:
+class TestRuns:
     @pytest.mark.thorough
     def test_a_bench_is_opened_checked_armed_run_and_closed(self, client, shipped_rig, tmp_path):
         assert client.status().state is EngineState.CLOSED
@@ -93,7 +93,7 @@ class TestTheJob:
         plan = client.arm(campaign("run", duration_s=3.0), tmp_path / "new")
         titles = ["What", "Level", "Limits", "Duration", "Saved in", "Without a viewer"]
         assert [line.partition(":")[0] for line in plan.lines] == titles
-        # What may break, not the length of a ramp or the points of a period.
+        # The quantity that is closest to its limit has one of these units.
         assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
         assert re.fullmatch(
             r"Without a viewer: aborted after [\d.]+ s; after [\d.]+ s if the window hangs", plan.lines[5]
@@ -110,7 +110,7 @@ class TestTheJob:
 
     @pytest.mark.thorough
     def test_the_newest_samples_match_the_recording(self, client, shipped_rig, tmp_path):
-        running(client, shipped_rig, tmp_path)
+        start_run(client, shipped_rig, tmp_path)
         newest_samples = client.look(most=10_000)
         client.stop(StopLevel.ABORT)
         until_state(client, EngineState.READY)
@@ -123,7 +123,7 @@ class TestTheJob:
 
     @pytest.mark.thorough
     def test_a_mark_is_stored_with_its_sample(self, client, shipped_rig, tmp_path):
-        before = running(client, shipped_rig, tmp_path).samples
+        before = start_run(client, shipped_rig, tmp_path).samples
         client.mark("the sphere was heard")
         client.stop(StopLevel.ABORT)
         until_state(client, EngineState.READY)
@@ -134,22 +134,22 @@ class TestTheJob:
 
     @pytest.mark.thorough
     def test_a_held_run_continues_after_resume(self, client, shipped_rig, tmp_path):
-        running(client, shipped_rig, tmp_path)
+        start_run(client, shipped_rig, tmp_path)
         client.stop(StopLevel.HOLD)
         until_state(client, EngineState.HELD)
         client.resume()
         until_state(client, EngineState.RUNNING)
 
     def test_a_stop_ends_the_campaign_and_not_only_its_measurement(self, client, shipped_rig, tmp_path):
-        running(client, shipped_rig, tmp_path, "first", "second")
+        start_run(client, shipped_rig, tmp_path, "first", "second")
         client.stop(StopLevel.RAMP, "enough for today")
         rows = until_state(client, EngineState.READY).rows
         assert [row.state for row in rows] == ["stopped", "queued"]
-        assert client.status().rows == rows  # not sent again, and not forgotten
-        assert ("end", "enough for today") in kept(tmp_path / "first.h5", "enough for today")
+        assert client.status().rows == rows  # rows are sent once, and remain known
+        assert ("end", "enough for today") in stop_events(tmp_path / "first.h5", "enough for today")
 
 
-class TestACheckIsStopped:
+class TestStoppedChecks:
     def test_any_client_can_stop_a_check(self, client, shipped_rig, tmp_path):
         opened(client, shipped_rig)
         client.check(tmp_path)
@@ -191,7 +191,7 @@ class TestRefusals:
         client.stop(StopLevel.OFF)
         client.disarm()
 
-    def test_a_plan_past_a_limit_is_refused_when_it_is_armed(self, client, shipped_rig, tmp_path):
+    def test_arming_a_plan_beyond_a_limit_is_refused(self, client, shipped_rig, tmp_path):
         opened(client, shipped_rig)
         low = campaign("low").measurements[0]
         hard = low.excitation.model_copy(update={"amplitude_vpp": 10.0, "frequency_hz": 20.0})
@@ -235,7 +235,7 @@ class TestRefusals:
         reason="run as Windows here, this process has other locks than its engines",
     )
     @pytest.mark.thorough
-    def test_two_engines_cannot_open_one_bench(self, engine, shipped_rig):
+    def test_an_engine_cannot_open_a_bench_used_by_another_process(self, engine, shipped_rig):
         with VirtualRig(shipped_rig) as virtual:
             served = on_server(shipped_rig, virtual)
             mine = BenchLock.of(served)
@@ -250,7 +250,7 @@ class TestRefusals:
 
 @pytest.mark.thorough
 def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, client, shipped_rig, tmp_path):
-    """On a busy computer sixty sweeps took more than the five seconds of any answer; the window gave up."""
+    """Arming sixty sweeps on a busy computer may exceed the usual answer timeout of five seconds."""
     opened(client, shipped_rig)
     sweeps = [
         {
@@ -271,12 +271,14 @@ def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, cli
         hasty.disarm()
 
 
-class TestNobodyLooks:
-    def test_an_attended_run_is_aborted_if_viewer_requests_stop(self, client, shipped_rig, tmp_path):
-        running(client, shipped_rig, tmp_path)
-        events = kept(
+class TestMissingViewers:
+    def test_an_attended_run_is_aborted_when_its_viewer_sends_no_requests(
+        self, client, shipped_rig, tmp_path
+    ):
+        start_run(client, shipped_rig, tmp_path)
+        events = stop_events(
             tmp_path / "run.h5", r"no viewer has sent a request for \d+\.\d s"
-        )  # asks nothing meanwhile
+        )  # the viewer sends no requests meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
         messages = until_state(client, EngineState.READY).messages
         told = [message for message in messages if message.what.startswith("The viewer was lost")][-1]
@@ -284,8 +286,8 @@ class TestNobodyLooks:
         assert "unattended" in told.next_step
 
     @pytest.mark.thorough
-    def test_a_drive_far_from_its_limits_gets_the_requested_timeout(self, client, shipped_rig, tmp_path):
-        """And one at its limits half a second, whatever was granted."""
+    def test_a_drive_far_from_its_limits_gets_a_longer_viewer_timeout(self, client, shipped_rig, tmp_path):
+        """A drive near its limits gets half a second only."""
         opened(client, shipped_rig)
         quiet, loud = campaign("run"), campaign("run").model_dump()
         plan = client.arm_request(CampaignRequest(campaign=quiet, folder=tmp_path, longest_patience_s=3.0))
@@ -302,7 +304,7 @@ class TestNobodyLooks:
 
     @pytest.mark.thorough
     def test_an_unattended_campaign_continues_without_its_window(self, engine, shipped_rig, tmp_path):
-        """The engine is attended; this campaign is not, and the engine ends after it."""
+        """The engine is attended but this campaign is not; the engine ends after the campaign."""
         process = engine()
         process.client.open(shipped_rig)
         until_state(process.client, EngineState.READY)
@@ -313,17 +315,15 @@ class TestNobodyLooks:
         process.client.start()
         until(process.client, lambda status: status.samples > 0)
         process.leave()
-        until_there(tmp_path / "run.h5")
+        until_exists(tmp_path / "run.h5")
         with open_recording(tmp_path / "run.h5") as recording:
             assert recording.state is RecordingState.COMPLETE
         assert process._process.wait(20) == 0
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
     @pytest.mark.thorough
-    def test_a_frozen_engine_does_not_stop_its_run_for_a_missing_viewer(
-        self, client, shared_engine, shipped_rig, tmp_path
-    ):
-        before = running(client, shipped_rig, tmp_path).samples
+    def test_a_run_continues_after_its_engine_was_frozen(self, client, shared_engine, shipped_rig, tmp_path):
+        before = start_run(client, shipped_rig, tmp_path).samples
         with frozen(shared_engine.pid):
             Event().wait(1.2)
         until(client, lambda status: status.samples > before + 100_000)
@@ -332,9 +332,9 @@ class TestNobodyLooks:
     def test_a_frozen_viewer_does_not_block_the_engine(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
-        running(client, shipped_rig, tmp_path)
+        start_run(client, shipped_rig, tmp_path)
         with EngineClient.attach(process.address) as frozen:
-            # Asks for much, and reads nothing of it.
+            # requests much data and reads nothing
             for _ in range(20):
                 send(frozen._connection, VERBS["look"].message(most=500_000))
             before = client.status().samples
@@ -348,16 +348,16 @@ class TestNobodyLooks:
         client.arm(campaign("run", duration_s=15.0), tmp_path)
         client.start()
         path = tmp_path / "run.h5"
-        until_there(path)
+        until_exists(path)
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
 
-    def test_an_armed_engine_disarms_if_viewer_requests_stop(
+    def test_an_armed_engine_disarms_when_its_viewer_sends_no_requests(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         opened(client, shipped_rig)
         client.arm(campaign("run"), tmp_path)
-        # Visitors may look, come and go: they attend to nothing.
+        # Visitors may look and leave: they do not attend.
         with EngineClient.attach(shared_engine.address) as visitor:
             until_state(visitor, EngineState.READY)
 
@@ -376,14 +376,14 @@ class TestNobodyLooks:
             assert viewer.stdout.readline() == "running\n"
             viewer.send_signal(number)
             ended = "the program that started|" if number is signal.SIGKILL else ""
-            kept(tmp_path / "run.h5", f"{ended}no viewer has")
+            stop_events(tmp_path / "run.h5", f"{ended}no viewer has")
         finally:
             viewer.kill()
             viewer.wait()
             viewer.stdout.close()
 
 
-class TestItsEnd:
+class TestEndOfTheEngine:
     @pytest.mark.thorough
     def test_an_unused_unattended_engine_ends_after_a_timeout(self):
         arguments = ["--attendance", "unattended", "--forgotten-s", "1"]
@@ -400,25 +400,25 @@ class TestItsEnd:
 
     @pytest.mark.thorough
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-    def test_a_signal_ramps_down_and_ends_the_process(self, shipped_rig, tmp_path, number):
+    def test_a_signal_ramps_down_the_run_and_ends_the_engine(self, shipped_rig, tmp_path, number):
         with start_engine() as process:
-            running(process.client, shipped_rig, tmp_path)
+            start_run(process.client, shipped_rig, tmp_path)
             os.kill(process.pid, number)
-            kept(tmp_path / "run.h5", signal.Signals(number).name)
+            stop_events(tmp_path / "run.h5", signal.Signals(number).name)
             process._process.wait(20)
         assert not process.is_alive
 
     @pytest.mark.thorough
     def test_leaving_the_context_of_an_engine_ends_its_run(self, shipped_rig, tmp_path):
         with start_engine() as process:
-            running(process.client, shipped_rig, tmp_path)
+            start_run(process.client, shipped_rig, tmp_path)
         assert not process.is_alive
-        kept(tmp_path / "run.h5", "a request ended the engine")
+        stop_events(tmp_path / "run.h5", "a request ended the engine")
 
     @pytest.mark.thorough
     def test_a_client_of_a_killed_engine_gets_an_error(self, engine, shipped_rig, tmp_path):
         process = engine()
-        running(process.client, shipped_rig, tmp_path)
+        start_run(process.client, shipped_rig, tmp_path)
         process._process.kill()
         with pytest.raises(EngineGone, match="switch the amplifier off"):
             until(process.client, lambda status: False)

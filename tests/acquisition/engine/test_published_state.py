@@ -1,4 +1,4 @@
-"""What viewers see of a run: begun anew with each recording, and its rows only when they are news."""
+"""The state that viewers see of a run: reset for each recording, rows only when they change."""
 
 import shutil
 from threading import Event
@@ -36,7 +36,7 @@ def published(tmp_path):
     return published
 
 
-def test_a_second_attempt_is_published_as_a_new_run(published, tmp_path):
+def test_a_repeated_measurement_is_published_as_a_new_run(published, tmp_path):
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
     first = published.status()

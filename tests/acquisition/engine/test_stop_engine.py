@@ -1,4 +1,4 @@
-"""Who stops an engine is told whether what it drives has heeded that."""
+"""A stop of an engine is confirmed only if the drive has ended."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ BENCH = BenchFacts(
 
 @pytest.fixture
 def driving(tmp_path, monkeypatch):
-    """An engine whose run has told of a block at 1.5 Vpp, and then of nothing more."""
+    """An engine whose run has published one block at 1.5 Vpp and then hangs."""
     monkeypatch.setattr(stop_files, "HEEDED_S", 0.3)
     engine = Engine(Supervision.UNATTENDED)
     run = Progress(RunState.RECORDING, None, Block(0, np.zeros((1, 100))), 0.1, 10.0, 1.5, 260.0)

@@ -1,4 +1,4 @@
-"""Nothing keeps a stop from a living engine: a stall, thousands of connections, no descriptors, no socket."""
+"""A stop reaches a living engine despite stalls, thousands of connections, and missing descriptors."""
 
 import json
 import os
@@ -37,7 +37,7 @@ from vibench.acquisition.stopping.program import engines_folder
 from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import stop_path, write_stop_file
 
-from .conftest import campaign, until, until_state, until_there
+from .conftest import campaign, until, until_exists, until_state
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and descriptors as Linux has them")
 
@@ -47,7 +47,7 @@ resource = pytest.importorskip("resource", reason="limits of a process as POSIX 
 
 @pytest.fixture(scope="module")
 def one_state(tmp_path_factory):
-    """One state folder for all: there the one engine of these tests is found."""
+    """One state folder for all tests, in which the engine of this module is found."""
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("state")
         patch.setenv("VIBENCH_STATE_DIR", str(folder))
@@ -56,12 +56,12 @@ def one_state(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def own_state(one_state):
-    """Instead of one for each test."""
+    """Replace the fixture that makes a state folder for each test."""
 
 
 @pytest.fixture(scope="module")
 def process(one_state):
-    """An unattended engine with an open bench: to start one takes seconds."""
+    """An unattended engine with an open bench; starting one takes seconds."""
     with start_engine(Supervision.UNATTENDED) as process:
         process.client.open(load_rig("virtual_rig"))
         until_state(process.client, EngineState.READY)
@@ -71,7 +71,7 @@ def process(one_state):
 @pytest.fixture
 def running(process, tmp_path):
     """The engine in the middle of a long dwell."""
-    with suppress(EngineGone):  # it may have let go of this viewer
+    with suppress(EngineGone):  # the engine may have disconnected this viewer
         process.client.close()
     process.client = EngineClient.attach(process.address, ConnectionRole.ATTENDING)
     process.client.arm(campaign("run"), tmp_path)
@@ -85,7 +85,7 @@ def running(process, tmp_path):
 
 @contextmanager
 def connections(address, count, said=b""):
-    """Connections that say nothing, or no more than the beginning of something."""
+    """Open connections that send nothing or the beginning of a message."""
     with ExitStack() as all_of_them:
         for _ in range(count):
             each = all_of_them.enter_context(socket.socket())
@@ -99,10 +99,10 @@ def connections(address, count, said=b""):
 
 @contextmanager
 def without_descriptors(process):
-    """Let a process open nothing more than it has open."""
+    """Leave a process no free file descriptor."""
     before = resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
     highest = max(int(each.name) for each in Path(f"/proc/{process.pid}/fd").iterdir())
-    # What is closed from now on is free again, and no more than that.
+    # Descriptors that the process closes from now on can be used again.
     resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (highest + 1, before[1]))
     try:
         yield
@@ -110,14 +110,14 @@ def without_descriptors(process):
         resource.prlimit(process.pid, resource.RLIMIT_NOFILE, before)
 
 
-def ended_by(tmp_path, reason):
-    until_there(tmp_path / "run.h5")
+def require_ending(tmp_path, reason):
+    until_exists(tmp_path / "run.h5")
     with open_recording(tmp_path / "run.h5") as recording:
         assert recording.reason == reason
         return recording
 
 
-class TestAStallDoesNotMakeAnEngineUnstoppable:
+class TestStalls:
     @pytest.mark.thorough
     def test_a_stop_during_a_stall_is_carried_out_afterwards(self, running, tmp_path):
         with frozen(running.pid):
@@ -125,23 +125,23 @@ class TestAStallDoesNotMakeAnEngineUnstoppable:
             assert told.pid == running.pid
             assert stop_engine(told, StopLevel.ABORT, "smoke") is StopDelivery.KEPT
             assert [each.pid for each in announced_engines()] == [running.pid]
-        ended_by(tmp_path, "smoke")
+        require_ending(tmp_path, "smoke")
         assert list(engines_folder().glob("*.stop-*")) == []
 
     @pytest.mark.thorough
-    def test_a_stop_after_a_stall_reaches_the_engine(self, running, tmp_path):
+    def test_a_stop_after_a_stall_is_confirmed_by_the_engine(self, running, tmp_path):
         with frozen(running.pid), pytest.raises(EngineSilent, match=r"does not answer within 0\.3 s"):
             EngineClient.attach(running.address, patience_s=0.3)
         assert stop_engine(the_engine(running.pid), "abort", "afterwards") is StopDelivery.TOLD
-        ended_by(tmp_path, "afterwards")
+        require_ending(tmp_path, "afterwards")
 
 
-class TestConnectionsWithoutATokenKeepNobodyOut:
+class TestConnectionsWithoutToken:
     def test_two_thousand_idle_connections_do_not_block_a_stop(self, running, tmp_path):
         before = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
         with connections(running.address, 2000):
             assert stop_engine(the_engine(None), StopLevel.ABORT, "in spite of all") in StopDelivery
-            ended_by(tmp_path, "in spite of all")
+            require_ending(tmp_path, "in spite of all")
             now = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
             assert now <= before + WAITING_MOST + VIEWERS_MOST
 
@@ -178,26 +178,26 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
                 viewers.enter_context(EngineClient.attach(process.address)) for _ in range(VIEWERS_MOST + 3)
             ]
             attached[-1].status()
-            process.client.status()  # it attends: visitors go first
+            process.client.status()  # the attending viewer stays; visitors are disconnected first
             with pytest.raises(EngineGone):
                 attached[0].status()
 
 
-class TestNoDescriptorIsLeft:
+class TestMissingDescriptors:
     def test_a_stop_works_without_free_file_descriptors(self, running, tmp_path):
         with without_descriptors(running):
             assert stop_engine(the_engine(None), StopLevel.ABORT, "no descriptors") in StopDelivery
-            ended_by(tmp_path, "no descriptors")
+            require_ending(tmp_path, "no descriptors")
 
-    def test_a_stop_written_as_a_file_is_carried_out(self, running, tmp_path):
+    def test_a_stop_file_ends_the_run_without_free_file_descriptors(self, running, tmp_path):
         with without_descriptors(running):
             write_stop_file(
                 stop_path(str(engines_folder()), running.pid, process_start(running.pid), "abort"), "put down"
             )
-            until_there(tmp_path / "run.h5")
+            until_exists(tmp_path / "run.h5")
 
 
-class TestAFolderIsRemoved:
+class TestRemovedFolder:
     def test_the_engine_reports_a_removed_folder_and_continues(self, running, tmp_path):
         shutil.rmtree(tmp_path)
         told = until_state(running.client, EngineState.READY).messages[-1]

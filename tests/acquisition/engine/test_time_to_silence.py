@@ -1,4 +1,4 @@
-"""The table of docs/safety.md, measured again at a few of its cells: by the wall's clock, at the terminal."""
+"""Times to silence of docs/safety.md, measured in real time at the terminal for a few cases."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[3]
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and limits as Linux has them")
 
 
-def measured(*options, name="time_to_silence.py"):
+def run_benchmark(*options, name="time_to_silence.py"):
     script = str(ROOT / "benchmarks" / name)
     return subprocess.run(
         [sys.executable, script, *options], capture_output=True, text=True, check=False, env={**os.environ}
@@ -21,7 +21,7 @@ def measured(*options, name="time_to_silence.py"):
 
 @pytest.mark.thorough
 def test_two_cases_of_the_safety_table_meet_their_times_to_silence():
-    told = measured("--cells", "0.007", "--seed", "7")
+    told = run_benchmark("--cells", "0.007", "--seed", "7")
     assert told.returncode == 0, told.stdout + told.stderr
     assert told.stdout.count(" s\n") == 2
 
@@ -30,22 +30,22 @@ def test_two_cases_of_the_safety_table_meet_their_times_to_silence():
 def test_stops_and_kills_end_in_silence_and_saved_cases_are_not_repeated(tmp_path):
     stops, kills = tmp_path / "stops.jsonl", tmp_path / "kills.jsonl"
     for options in (["--save", stops, "--seed", "3"], ["--save", kills, "--dead-man"]):
-        told = measured(*map(str, options), "--count", "2", name="stops_from_outside.py")
+        told = run_benchmark(*map(str, options), "--count", "2", name="stops_from_outside.py")
         assert told.returncode == 0, told.stdout + told.stderr
         assert told.stdout.count(" s of ") == 2
-    again = measured("--save", str(stops), "--seed", "3", "--count", "2", name="stops_from_outside.py")
+    again = run_benchmark("--save", str(stops), "--seed", "3", "--count", "2", name="stops_from_outside.py")
     assert again.stdout == ""
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_a_quarter_of_the_safety_table_meets_the_times_to_silence():
-    told = measured("--cells", "0.25", "--seed", "8")
+    told = run_benchmark("--cells", "0.25", "--seed", "8")
     assert told.returncode == 0, told.stdout + told.stderr
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_a_running_engine_is_always_found():
-    told = measured("--tries", "600", "--commands", "12")
+def test_a_running_engine_is_found_in_600_tries():
+    told = run_benchmark("--tries", "600", "--commands", "12")
     assert told.returncode == 0, told.stdout + told.stderr

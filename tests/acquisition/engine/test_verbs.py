@@ -1,4 +1,4 @@
-"""Every verb of the engine is complete: request, permission, method, call."""
+"""Every request of the protocol has a message, permitted states, a handler method and a client method."""
 
 import inspect
 import json
@@ -48,7 +48,7 @@ def test_stopping_and_viewing_are_allowed_in_every_state():
 
 
 @pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS.keys())
-def test_handler_and_client_have_the_parameters_of_the_request(verb):
+def test_handler_and_client_methods_have_the_parameters_of_their_request(verb):
     asked = [name for name in verb.request.model_fields if name != "ask"]
     for owner in (EngineClient, RequestHandler):
         _, *parameters = inspect.signature(getattr(owner, verb.method)).parameters
@@ -65,7 +65,7 @@ def test_a_request_that_the_state_does_not_permit_is_refused(handler, word):
 
 
 def test_a_closing_bench_refuses_requests(shipped_rig):
-    """To arm between the wish to close and the deed ended the connection of whoever asked."""
+    """A request between the decision to close and the closing once ended the client's connection."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)
     handler = RequestHandler(engine, jobs)
@@ -84,14 +84,14 @@ def test_a_closing_bench_refuses_requests(shipped_rig):
 
 
 def test_a_closed_bench_can_be_opened_at_once(shipped_rig):
-    """The closing thread shows the state a moment before it is done, and opening was refused in between."""
+    """The closing thread publishes the state just before it ends; opening in between must succeed."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)
     handler = RequestHandler(engine, jobs)
     engine.open(shipped_rig)
     shown = engine.published.enter
 
-    def seen(state):
+    def enter_and_open(state):
         shown(state)
         if state is EngineState.CLOSED:
             engine.published.enter = shown
@@ -100,15 +100,15 @@ def test_a_closed_bench_can_be_opened_at_once(shipped_rig):
             finally:
                 jobs.leave()
 
-    engine.published.enter = seen
+    engine.published.enter = enter_and_open
     handler.carry_out(VERBS["close"], {})
     jobs.run()
     told = [each.what for each in engine.published.status().messages]
     assert told.count(f"{shipped_rig.name} is open") == 2
 
 
-def looked_after_until(handler, is_over):
-    """Let an engine's round go by again and again, as its server does; nobody attends it."""
+def enforce_deadlines_until(handler, is_over):
+    """Enforce the engine's deadlines repeatedly, as its server does, without an attending viewer."""
     give_up_s = monotonic() + PATIENCE_S
     while not is_over():
         assert monotonic() < give_up_s
@@ -117,24 +117,24 @@ def looked_after_until(handler, is_over):
 
 @pytest.mark.thorough
 def test_an_armed_run_stays_armed_long_enough_to_be_started(shipped_rig, tmp_path):
-    """What was armed before the attendant's first beat was taken back at once, and nobody said why."""
+    """The deadline begins with arming, also if the viewer has sent no request before."""
     engine = Engine(Supervision.ATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     engine.open(shipped_rig)
     deserted_s = monotonic() + 2.0
-    looked_after_until(handler, lambda: monotonic() > deserted_s)
+    enforce_deadlines_until(handler, lambda: monotonic() > deserted_s)
     request = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.WAIVED)
     handler.carry_out(VERBS["arm"], {"campaign_request": request})
     handler.enforce_deadlines()
     assert engine.published.state is EngineState.ARMED
-    looked_after_until(handler, lambda: engine.published.state is not EngineState.ARMED)
+    enforce_deadlines_until(handler, lambda: engine.published.state is not EngineState.ARMED)
     last = engine.published.status().messages[-1]
     assert (last.what.partition(":")[0], last.done) == ("The viewer was lost", "Disarmed.")
     engine.close()
 
 
-class MetByAnother(Engine):
-    """An engine of which somebody else asks something just when its switch or its bench is looked up."""
+class InterruptedEngine(Engine):
+    """An engine that calls `met_by` when its switch is read, and `arming_met_by` when its bench is read."""
 
     met_by = arming_met_by = staticmethod(lambda: None)
 
@@ -154,8 +154,8 @@ class MetByAnother(Engine):
         self._switch = switch
 
 
-def test_a_stop_concurrent_with_a_start_stops_the_run(tmp_path):
-    engine = MetByAnother(Supervision.UNATTENDED)
+def test_a_stop_concurrent_with_the_start_of_a_check_reaches_the_check(tmp_path):
+    engine = InterruptedEngine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     engine.published.enter(EngineState.READY)
     engine.met_by = lambda: handler.carry_out(VERBS["check"], {"folder": tmp_path, "new_reference": False})
@@ -164,9 +164,9 @@ def test_a_stop_concurrent_with_a_start_stops_the_run(tmp_path):
     assert engine.switch.request.reason == "smoke"
 
 
-def test_a_stop_concurrent_with_arming_is_kept(shipped_rig, tmp_path):
-    """A long campaign was armed after the stop, and started."""
-    engine = MetByAnother(Supervision.UNATTENDED)
+def test_a_stop_concurrent_with_arming_refuses_to_arm(shipped_rig, tmp_path):
+    """A campaign must not start if a stop was requested while it was being armed."""
+    engine = InterruptedEngine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     engine.open(shipped_rig)
     engine.arming_met_by = lambda: handler.carry_out(
@@ -211,7 +211,7 @@ def test_requests_and_answers_round_trip(handler):
 
 
 def test_a_hold_that_the_drive_cannot_keep_is_refused(shipped_rig, tmp_path):
-    """The hold was confirmed, but it ramped the run down and ended it as carried out."""
+    """A run with a dead man cannot be held; a confirmed hold would end it as complete."""
     generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
     engine, refusals = Engine(Supervision.UNATTENDED), []
     handler = RequestHandler(engine, JobQueue(engine))
@@ -237,7 +237,7 @@ def test_a_run_that_cannot_be_held_counts_as_stopped(shipped_rig, tmp_path):
     generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
     engine = Engine(Supervision.UNATTENDED)
     engine.open(shipped_rig.model_copy(update={"generator": generator}))
-    engine.switch.hold()  # before the run: the engine cannot know yet
+    engine.switch.hold()  # before the run, when the engine cannot know that the run cannot be held
     request = CampaignRequest(campaign=campaign("m", duration_s=1.0), folder=tmp_path, check=CheckRule.WAIVED)
     (point,) = engine.measure(request)
     assert point.outcome is PointOutcome.STOPPED

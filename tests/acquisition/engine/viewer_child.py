@@ -1,4 +1,4 @@
-"""A viewer to be killed or frozen: starts an engine, runs a campaign on it, and looks at it for ever."""
+"""A viewer that a test kills or freezes: it starts an engine, runs a campaign, and watches it for ever."""
 
 import sys
 from pathlib import Path

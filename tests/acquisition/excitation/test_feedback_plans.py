@@ -1,4 +1,4 @@
-"""Plans with feedback: values like any other, whose course is open but bounded."""
+"""Plans with feedback: their length is not known in advance but bounded."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ every_plan = pytest.mark.parametrize("plan", SMART, ids=[each.name for each in S
 
 
 @every_plan
-def test_a_feedback_plan_round_trips_through_json(plan):
+def test_a_feedback_plan_is_unchanged_after_writing_and_reading_json(plan):
     assert Measurement.model_validate_json(plan.model_dump_json()) == plan
     assert isinstance(plan.excitation, AbstractFeedback)
 
@@ -43,7 +43,7 @@ def test_a_preview_shows_the_recorded_steps_at_the_largest_setting(plan):
 
 
 @every_plan
-def test_the_longest_time_of_a_feedback_plan_includes_every_wait(plan):
+def test_the_duration_of_a_feedback_plan_includes_silence_and_ramps(plan):
     assert duration_s(plan) == HUSH_S + 2 * plan.ramp_s + plan.excitation.playing_s
 
 

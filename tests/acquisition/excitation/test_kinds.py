@@ -1,4 +1,4 @@
-"""A kind of excitation is one row, and says of itself what others would have to ask of its name."""
+"""Each kind of excitation is one registry entry that declares its properties."""
 
 from typing import get_args
 
@@ -69,7 +69,7 @@ def test_the_excitation_union_and_the_registry_list_the_same_plans():
 
 
 @pytest.mark.parametrize("word", ["white_noise", "multisine_noise"])
-def test_white_noise_is_read_by_its_name_and_by_the_name_of_version_0_1(word):
+def test_white_noise_is_also_read_under_its_name_of_version_0_1(word):
     read = TypeAdapter(Excitation).validate_python({"kind": word, "amplitude_vpp": 1, **BAND})
     assert read == WhiteNoise(amplitude_vpp=1, **BAND)
     assert (read.kind, present_word(word)) == ("white_noise", "white_noise")

@@ -1,4 +1,4 @@
-"""Multisine arithmetic, checked by Fourier transform and closed form."""
+"""Multisine waveforms, checked by Fourier transform and closed forms."""
 
 import numpy as np
 import pytest
@@ -17,16 +17,16 @@ OVERSAMPLING = 16
 
 
 def played_amplitudes(values):
-    """Line amplitudes of what a holding converter puts out, from a finely sampled picture of it."""
+    """Return line amplitudes of a zero-order-hold output, from a finely sampled staircase."""
     held = np.repeat(values, OVERSAMPLING)
     spectrum = 2 * np.abs(np.fft.rfft(held)) / len(held)
-    # The picture itself holds each of its fine samples; take that second hold off again.
+    # The staircase holds each of its fine samples; remove the droop of this second hold.
     fine = np.arange(len(spectrum))
-    return spectrum * np.abs(hold_droop(fine, MEMORY_POINTS)) / _picture_droop(fine)
+    return spectrum * np.abs(hold_droop(fine, MEMORY_POINTS)) / _staircase_droop(fine)
 
 
-def _picture_droop(harmonics):
-    """Gain of a sum of OVERSAMPLING equal samples at each harmonic of the memory: a Dirichlet kernel."""
+def _staircase_droop(harmonics):
+    """Return the gain of a sum of OVERSAMPLING equal samples at each harmonic: a Dirichlet kernel."""
     x = np.pi * harmonics / MEMORY_POINTS
     with np.errstate(invalid="ignore", divide="ignore"):
         kernel = np.abs(np.sin(x) / (OVERSAMPLING * np.sin(x / OVERSAMPLING)))
@@ -66,7 +66,7 @@ def test_waveforms_of_a_plan_are_cached():
 def test_realisations_of_a_multisine_are_uncorrelated():
     first, second = flat_periods(BAND, realisations=2, seed=5)
     correlation = np.corrcoef(first, second)[0, 1]
-    # Two random-phase multisines of L lines correlate like a mean of L cosines: sd 1/sqrt(2 L).
+    # The correlation of two random-phase multisines of L lines is a mean of L cosines: sd 1/sqrt(2 L).
     assert abs(correlation) < 5 / np.sqrt(2 * len(BAND))
 
 
@@ -85,7 +85,7 @@ def test_requesting_more_realisations_does_not_change_the_first_phases():
 def test_the_chosen_crest_factor_is_below_the_mean_of_random_phases():
     (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
     crest = np.max(np.abs(values)) / np.sqrt(np.mean(values**2))
-    # Single draws of 991 lines scatter from 3.18 to 4.53.
+    # Crest factors of single realisations of 991 lines range from 3.18 to 4.53.
     assert 2.9 < crest < 3.6
 
 
@@ -111,7 +111,7 @@ def test_spectrum_of_held_samples_matches_a_finely_sampled_staircase():
     picture = np.repeat(values, OVERSAMPLING)
     fine = 2 * np.fft.rfft(picture)[: 2 * MEMORY_POINTS] / len(picture)
     lines = held_lines(values, spans=4)
-    # The picture's samples stand at the start of their hold; centring them shifts by half a fine sample.
+    # Staircase samples lie at the start of their hold; centring them shifts by half a fine sample.
     harmonics = np.arange(2 * MEMORY_POINTS)
     centred = fine * np.exp(-1j * np.pi * harmonics / len(picture)) * np.sinc(harmonics / len(picture))
     np.testing.assert_allclose(lines[1:], centred[1:], atol=1e-12)
@@ -127,6 +127,6 @@ def test_no_value_of_a_multisine_exceeds_the_range(seed, first, count):
 def test_the_first_spectral_image_matches_the_zero_order_hold():
     (values,) = flat_periods(np.array([1000]), 1, seed=1)
     lines = np.abs(held_lines(values, spans=4))
-    # -17.1 dB at 7192 Hz for 1000 Hz out of 8192 points a second (the hold's gain over itself).
+    # -17.1 dB at 7192 Hz for 1000 Hz and 8192 points per second (ratio of the hold's gains).
     image_db = 20 * np.log10(lines[MEMORY_POINTS - 1000] / lines[1000])
     assert image_db == pytest.approx(-17.14, abs=0.01)

@@ -1,4 +1,4 @@
-"""What every kind of excitation promises, and what each one plays."""
+"""Requirements of every kind of excitation, and the signal of each kind."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_a_preview_stays_within_half_the_peak_to_peak_setting(plan):
 
 def test_the_preview_spectrum_has_the_rms_of_the_signal(plan):
     shown = plan.preview(4096.0)
-    # Parseval: half the square of each line's peak is its share of the mean square.
+    # Parseval: half the square of a line's peak is its contribution to the mean square.
     mean_square = np.sum(shown.spectrum_v[1:] ** 2) / 2 + shown.spectrum_v[0] ** 2
     assert np.sqrt(mean_square) == pytest.approx(shown.rms_v, rel=1e-3)
 
@@ -136,7 +136,7 @@ def test_an_unplayable_plan_names_the_allowed_values(kind, fields, sentence):
 
 def test_noise_excites_exactly_the_lines_of_its_band():
     plan = WhiteNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=800, repetition_hz=0.5)
-    # At a multiple of the playback rate a held waveform has its lines on the bins, images above half of it.
+    # At a multiple of the playback rate the lines of a held waveform lie on the bins, and images above half.
     shown = plan.preview(8192 * 0.5 * 4)
     strong = shown.frequency_hz[(shown.spectrum_v > 1e-9) & (shown.frequency_hz < 2048)]
     np.testing.assert_allclose(strong, np.arange(20, 800.5, 0.5))
@@ -154,7 +154,7 @@ def test_odd_multisine_leaves_out_one_of_every_four_odd_lines():
     left_out = np.isin(odd, plan.detection_lines)
     assert np.all(np.sum(left_out, axis=1) == 1)
     assert sorted(plan.excited_lines + plan.detection_lines) == list(range(1, 800, 2))
-    # Random, not regular: all four places are used.
+    # The four places are chosen at random: all are used.
     assert set(np.argmax(left_out, axis=1)) == {0, 1, 2, 3}
 
 
@@ -237,11 +237,11 @@ def test_only_the_first_step_of_a_sweep_settles_and_all_form_one_segment():
 
 def test_the_phase_is_continuous_from_one_tone_to_the_next():
     shown = SineSweep(amplitude_vpp=2, start_hz=100, stop_hz=140, duration_s=4, step_s=0.3).preview(51200)
-    # A continuous sine of at most 140 Hz moves at most this much from sample to sample.
+    # A continuous sine of at most 140 Hz changes by at most this much per sample.
     assert np.max(np.abs(np.diff(shown.volts))) <= 2 * np.pi * 140 / 51200
 
 
-def test_the_sweep_of_the_paper_has_a_whole_number_of_steps():
+def test_the_sweep_of_the_paper_has_an_integer_number_of_steps():
     steps = list(SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=200, step_s=0.1).steps())
     assert len(steps) == 2000
 
@@ -278,7 +278,7 @@ class TestStreamedNoise:
 
     def test_streamed_noise_has_the_range_over_the_crest_factor_as_rms(self):
         samples = self.PLAN.source.samples(0, 400_000, self.RATE)
-        # 2 B T independent values: relative sd of the rms 1 / sqrt(4 B T).
+        # 2 B T independent values: the relative standard deviation of the rms is 1 / sqrt(4 B T).
         spread = 1 / np.sqrt(4 * 750 * 400_000 / self.RATE)
         assert np.sqrt(np.mean(samples**2)) == pytest.approx(1 / 4.5, rel=5 * spread)
 

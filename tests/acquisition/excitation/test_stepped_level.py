@@ -1,4 +1,4 @@
-"""Levels at one frequency: which ones, how long, how loud, and what is refused."""
+"""Levels at one frequency: their values, durations, amplitudes, and refusals."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def levels(excitation):
     ]
 
 
-def test_levels_go_up_to_the_amplitude_and_down_and_state_their_direction():
+def test_levels_rise_to_the_amplitude_then_fall_and_state_their_direction():
     rising = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
     told = levels(plan())
     assert [way for way, _ in told] == ["up"] * 8 + ["down"] * 8
@@ -41,7 +41,7 @@ def test_level_steps_have_no_ramp_and_no_phase_jump():
     assert preview.duration_s == plan().playing_s == 16 * 0.75
 
 
-def test_limits_are_checked_at_the_highest_level():
+def test_limits_are_checked_at_every_level():
     rig = load_rig("virtual_rig")
     loud = plan(amplitude_vpp=10.0, frequency_hz=20.0)
     with pytest.raises(LimitExceeded):
@@ -53,7 +53,7 @@ def test_limits_are_checked_at_the_highest_level():
         for one in (plan(), *dwells)
     )
     assert used.keys() == each[-1].keys()
-    # Near the resonance of m1 bound to m2 the base may move less at a higher level: all of them count.
+    # Near the resonance of m1 bound to m2 the base may move less at a higher level: every level counts.
     for what, use in used.items():
         assert use == pytest.approx(max(level[what] for level in each), rel=1e-6), what
 

@@ -1,4 +1,4 @@
-"""A stranger's package adds a kind of measurement, and edits nothing of ours."""
+"""A third-party package adds a kind of measurement without changes to vibench."""
 
 import os
 import subprocess
@@ -50,8 +50,8 @@ second_hz = 180
 """
 
 
-def offer(folder, target):
-    """Put a package with an entry point into a folder, as pip does."""
+def install_kind(folder, target):
+    """Install a package with an entry point into a folder, as pip does."""
     information = folder / "somebodys_kind-1.0.dist-info"
     information.mkdir()
     (information / "METADATA").write_text("Metadata-Version: 2.1\nName: somebodys-kind\nVersion: 1.0\n")
@@ -60,7 +60,7 @@ def offer(folder, target):
     (folder / "two.toml").write_text(PLAN)
 
 
-def vibench(folder, *arguments):
+def run_vibench(folder, *arguments):
     return subprocess.run(
         [sys.executable, "-m", "vibench.cli", *map(str, arguments)],
         cwd=folder,
@@ -73,10 +73,10 @@ def vibench(folder, *arguments):
 
 @pytest.mark.thorough
 def test_a_third_party_kind_is_planned_measured_and_reported(tmp_path):
-    offer(tmp_path, "two_tones:TwoTones")
-    measured = vibench(tmp_path, "measure", "two.toml", "--out", "two")
+    install_kind(tmp_path, "two_tones:TwoTones")
+    measured = run_vibench(tmp_path, "measure", "two.toml", "--out", "two")
     assert measured.returncode == 0, measured.stderr
-    analysed = vibench(tmp_path, "analyse", "two", "--out", "report")
+    analysed = run_vibench(tmp_path, "analyse", "two", "--out", "report")
     assert analysed.returncode == 0, analysed.stderr
     (page,) = (tmp_path / "report").glob("*.html")
     assert "Two tones at 0.1 Vpp: Response II up to" in page.read_text(encoding="utf-8")
@@ -92,10 +92,10 @@ def test_a_third_party_kind_is_planned_measured_and_reported(tmp_path):
     ],
 )
 def test_a_broken_third_party_kind_affects_only_its_own_plans(tmp_path, target, reason):
-    offer(tmp_path, target)
-    refused = vibench(tmp_path, "measure", "two.toml", "--out", "two", "--estimate")
+    install_kind(tmp_path, target)
+    refused = run_vibench(tmp_path, "measure", "two.toml", "--out", "two", "--estimate")
     assert refused.returncode == 1
     assert "'two_tones' of vibench.excitations is" in refused.stderr
     assert reason in refused.stderr
-    usual = vibench(tmp_path, "measure", "quick", "--out", "quick", "--estimate")
+    usual = run_vibench(tmp_path, "measure", "quick", "--out", "quick", "--estimate")
     assert usual.returncode == 0, usual.stderr

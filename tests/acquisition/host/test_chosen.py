@@ -1,4 +1,4 @@
-"""Where a member of an enum is asked for, its word does as well; a wrong word is answered by others."""
+"""Options accept enum members and their text values; a wrong text is refused with the allowed values."""
 
 import pytest
 

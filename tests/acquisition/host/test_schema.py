@@ -1,4 +1,4 @@
-"""JSON Schemas of the TOML files: as wide as what is loaded, and narrow enough to show a slip."""
+"""JSON Schemas of the TOML files accept every file that loads, and find errors."""
 
 import json
 import shutil
@@ -55,16 +55,16 @@ scale = 0.125
 
 
 def as_json(text):
-    """Read TOML as an editor hands it to a schema: dates are strings."""
+    """Convert TOML to JSON data as an editor does for a schema: dates are strings."""
     return json.loads(json.dumps(tomllib.loads(text), default=str))
 
 
-def faults(kind, text):
+def schema_errors(kind, text):
     return list(jsonschema.Draft4Validator(json_schema(kind)).iter_errors(as_json(text)))
 
 
 @pytest.mark.parametrize("kind", MODELS)
-def test_a_schema_is_draft_4_and_equals_the_shipped_file(kind):
+def test_a_schema_uses_draft_4_and_equals_the_shipped_file(kind):
     pytest.importorskip(
         "vibench_fast_loop", reason="pip install -e extensions/fast_loop brings a kind of plan"
     )
@@ -78,7 +78,7 @@ def test_a_schema_is_draft_4_and_equals_the_shipped_file(kind):
 
 
 def keys(part):
-    """Give every key of a schema that is a keyword, names of properties and definitions apart."""
+    """Return all keywords of a schema, without names of properties and definitions."""
     match part:
         case list():
             return {key for each in part for key in keys(each)}
@@ -98,7 +98,7 @@ def test_every_shipped_file_names_its_schema_and_passes_it(kind):
         up = "../" * (1 + FOLDERS[kind].count("/"))
         assert text.startswith(f"#:schema {up}schemas/{kind}-1.schema.json\n"), path
         assert (path.parent / text.split()[1]).is_file()
-        assert faults(kind, text) == [], path
+        assert schema_errors(kind, text) == [], path
 
 
 @pytest.mark.parametrize("package", ["controller_package", "instrument_package"])
@@ -107,7 +107,7 @@ def test_the_bench_of_an_example_names_its_schema_and_passes_it(package):
     text = path.read_text(encoding="utf-8")
     assert text.startswith("#:schema ")
     assert (path.parent / text.split()[1]).resolve() == shipped_folder("schemas") / "rig-1.schema.json"
-    assert faults("rig", text) == []
+    assert schema_errors("rig", text) == []
 
 
 @pytest.mark.parametrize("name", shipped_specimens())
@@ -116,7 +116,7 @@ def test_every_shipped_specimen_names_its_schema_and_passes_it(name):
     text = path.read_text(encoding="utf-8")
     assert text.startswith("#:schema ../../../../schemas/specimen-1.schema.json\n")
     assert (path.parent / text.split()[1]).is_file()
-    assert faults("specimen", text) == []
+    assert schema_errors("specimen", text) == []
 
 
 def test_a_specimen_may_state_its_format_version(tmp_path):
@@ -124,13 +124,13 @@ def test_a_specimen_may_state_its_format_version(tmp_path):
     text = 'format_version = 1\nmodel = "gong2025"\nname = "mine"\n'
     path.write_text(text, encoding="utf-8")
     assert load_specimen(path).name == "mine"
-    assert faults("specimen", text) == []
+    assert schema_errors("specimen", text) == []
     for wrong in ("2", "true", '"1"', "0"):
         path.write_text(text.replace("= 1", f"= {wrong}"), encoding="utf-8")
         with pytest.raises(ValueError, match="is not version 1, which this vibench reads") as refused:
             load_specimen(path)
         assert "\n" not in str(refused.value)
-        assert faults("specimen", path.read_text(encoding="utf-8")) != []
+        assert schema_errors("specimen", path.read_text(encoding="utf-8")) != []
 
 
 @pytest.mark.parametrize(
@@ -159,7 +159,7 @@ def test_every_loadable_file_passes_the_schema(kind, text, tmp_path):
     path = tmp_path / "file.toml"
     path.write_text(text, encoding="utf-8")
     load_toml(path, MODELS[kind])
-    assert faults(kind, text) == []
+    assert schema_errors(kind, text) == []
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_every_loadable_file_passes_the_schema(kind, text, tmp_path):
         ("mapping", 'source = "1"', 'sauce = "1"'),
     ],
 )
-def test_the_schema_also_finds_the_errors_that_loading_refuses(kind, old, new, tmp_path):
+def test_the_schema_finds_the_errors_that_loading_refuses(kind, old, new, tmp_path):
     named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper", "map": "map"}
     right = (
         MAPPING
@@ -196,7 +196,7 @@ def test_the_schema_also_finds_the_errors_that_loading_refuses(kind, old, new, t
     path.write_text(wrong, encoding="utf-8")
     with pytest.raises(ConfigurationError):
         load_toml(path, MODELS[kind])
-    assert faults(kind, wrong) != []
+    assert schema_errors(kind, wrong) != []
 
 
 def test_a_written_file_names_its_schema_and_loads_unchanged(tmp_path):
@@ -206,7 +206,7 @@ def test_a_written_file_names_its_schema_and_loads_unchanged(tmp_path):
     uri = text.split("\n")[0].removeprefix("#:schema ")
     assert uri == (shipped_folder("schemas") / "campaign-1.schema.json").as_uri()
     assert load_campaign(tmp_path / "mine.toml") == campaign
-    assert faults("campaign", text) == []
+    assert schema_errors("campaign", text) == []
 
 
 ONE_SIDED = 'model = "gong2025"\ngap_m = [30e-6, inf]'
@@ -215,14 +215,14 @@ ONE_SIDED = 'model = "gong2025"\ngap_m = [30e-6, inf]'
 @pytest.mark.parametrize("kind", [SpecimenDescription, SpecimenTable])
 def test_a_specimen_that_is_written_names_its_schema_and_passes_it(kind, tmp_path):
     (tmp_path / "one_sided.toml").write_text(ONE_SIDED, encoding="utf-8")
-    assert faults("specimen", ONE_SIDED) == []
+    assert schema_errors("specimen", ONE_SIDED) == []
     for name in (*shipped_specimens(), str(tmp_path / "one_sided.toml")):
         described = kind.model_validate(load_specimen(name).model_dump())
         save_toml(described, tmp_path / "mine.toml")
         text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
         schema = shipped_folder("schemas") / "specimen-1.schema.json"
         assert text.startswith(f"#:schema {schema.as_uri()}\n")
-        assert faults("specimen", text) == []
+        assert schema_errors("specimen", text) == []
         assert load_specimen(str(tmp_path / "mine.toml")) == load_specimen(name)
 
 
@@ -231,7 +231,7 @@ def test_the_schema_finds_errors_in_a_specimen(slip, tmp_path):
     (tmp_path / "mine.toml").write_text(f'model = "gong2025"\n{slip}\n', encoding="utf-8")
     with pytest.raises(ValueError, match=slip.split(" ", maxsplit=1)[0]):
         load_specimen(str(tmp_path / "mine.toml"))
-    assert faults("specimen", f'model = "gong2025"\n{slip}') != []
+    assert schema_errors("specimen", f'model = "gong2025"\n{slip}') != []
 
 
 @pytest.mark.parametrize("version", ["2", "0", '"1"', "true", "1.0"])
@@ -251,7 +251,7 @@ def test_an_editor_check_reports_an_error_and_accepts_a_valid_file(tmp_path):
         pytest.skip("pip install vibench[test] brings taplo")
 
     def check(path):
-        # What a folder's taplo.toml or a catalogue on the web says must not matter.
+        # Ignore a taplo.toml in the folder and catalogues on the web.
         command = [taplo, "check", "--no-auto-config", str(path)]
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
 

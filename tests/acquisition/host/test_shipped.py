@@ -1,4 +1,4 @@
-"""Files that come with vibench are found by name from any folder; the user's own come first."""
+"""Shipped files are found by name from any folder; a user's file takes precedence."""
 
 import pytest
 
@@ -36,7 +36,7 @@ def test_an_unknown_file_name_is_refused_with_a_list_of_known_names(tmp_path, mo
 
 def test_a_folder_does_not_hide_a_shipped_file_of_the_same_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "virtual_rig").mkdir()  # as in a checkout
+    (tmp_path / "virtual_rig").mkdir()  # as in the folder of a checkout
     assert named("virtual_rig", "hardware_configs").name == "virtual_rig.toml"
     (tmp_path / "mine").mkdir()
     with pytest.raises(ConfigurationError, match="'mine' is a folder, not a file nor one that"):

@@ -1,4 +1,4 @@
-"""A file's faults are told by the keys of the file, whatever they are called."""
+"""Errors in a TOML file name the keys of the file."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from vibench.acquisition.host.toml_file import FrozenModel, load_toml
 
 
 def refusal(load, path, text, *kind):
-    """What is said of a file of that text."""
+    """Return the error message of loading a file with this text."""
     path.write_text(text)
     with pytest.raises(ConfigurationError) as refused:
         load(path, *kind)
