@@ -1,8 +1,8 @@
 """Entry point of the `vibench` command, with a fast path for `vibench stop`.
 
-The drive is on until `vibench stop` acts, and loading all libraries takes half a second of processor time.
-Therefore, this module imports only the standard library. Special cases, and systems other than Linux, use the
-complete command.
+The drive stays on until `vibench stop` acts, and loading all libraries takes half a second of processor time.
+This module therefore imports only the standard library. Special cases, and operating systems other than
+Linux, use the complete command.
 """
 
 import gc
@@ -17,7 +17,7 @@ LEVELS = ("ramp", "abort", "off")
 
 
 class RunningProgram:
-    """Program announced by a file whose name contains process id and start time."""
+    """Running program, announced by a file whose name contains its process id and start time."""
 
     def __init__(self, path: str, pid: str, start: str, is_alive: Callable[[], bool]) -> None:
         self.path = path
@@ -31,7 +31,7 @@ class RunningProgram:
             self._facts = b""
 
     def name(self) -> str:
-        """Return the purpose of the program and its process id, in printable characters."""
+        """Return what the program does, and its process id, in printable characters."""
         import json
 
         try:
@@ -43,22 +43,22 @@ class RunningProgram:
 
 
 def main() -> None:
-    """Stop the programs if the arguments are a simple stop command; otherwise run the complete command."""
+    """Stop programs if the arguments are a simple stop command; otherwise run the complete command."""
     if sys.argv[1:2] == ["stop"] and sys.platform == "linux":
         request = parse_stop(sys.argv[2:])
         code = None if request is None else stop_programs(*request)
         if code is not None:
             sys.exit(code)
-    # pydantic searches the metadata of every installed package for plug-ins; none is used here.
+    # pydantic would search every installed package for plug-ins; none is used here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(10_000)  # imports leave little garbage; collecting took a fifth of the start-up
+    gc.set_threshold(10_000)  # importing leaves little garbage; collecting took a fifth of the start
     from vibench.cli import main as run_command
 
     run_command()
 
 
 def parse_stop(words: Sequence[str]) -> tuple[str, str, str] | None:
-    """Return level, reason and process id of a simple stop command; None if the arguments are not one."""
+    """Return level, reason and process id of a simple stop command; None for all other arguments."""
     split = [part for word in words for part in (word.split("=", 1) if word[:2] == "--" else [word])]
     given = dict(zip(split[::2], split[1::2], strict=False))
     if len(split) != 2 * len(given) or not given.keys() <= {"--level", "--reason", "--pid"}:
@@ -70,7 +70,7 @@ def parse_stop(words: Sequence[str]) -> tuple[str, str, str] | None:
 
 
 def stop_programs(level: str, reason: str, pid: str) -> int | None:
-    """Stop the selected programs and return the exit code; None if the complete command is needed."""
+    """Stop the selected programs; return the exit code, or None if the complete command is needed."""
     try:
         programs = [each for each in running_programs() if pid in ("", each.pid)]
         living = [each for each in programs if each.is_alive()]
@@ -96,7 +96,7 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
 
 
 def running_programs() -> Iterator[RunningProgram]:
-    """Yield the programs announced on this computer; raises OSError if one runs on another computer."""
+    """Yield the programs announced on this computer; raise OSError if one runs on another computer."""
     folder = os.path.join(_state_folder(), "engines")  # noqa: PTH118
     boot, space = _own_place()
     for name in sorted(os.listdir(folder)):  # noqa: PTH208
@@ -126,7 +126,7 @@ def _own_place() -> tuple[str, str]:
 
 
 def _start_of(pid: str) -> str:
-    """Return the start time of a process in the format of proc(5); empty if the process does not run."""
+    """Return the start time of a process as in proc(5); empty if it does not run."""
     try:
         with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
             state, *others = file.read().rpartition(")")[2].split()
@@ -140,7 +140,7 @@ def _is_process(pid: str, start: str) -> bool:
 
 
 def _is_locked(path: str) -> bool:
-    """Return whether the file is locked: the program that created it keeps a lock while it runs."""
+    """Return whether a file is locked, as by the program that created it while this runs."""
     import fcntl
 
     try:

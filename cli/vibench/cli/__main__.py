@@ -1,6 +1,6 @@
-"""The `vibench` command: the table of commands, and the handling of errors of all commands.
+"""The `vibench` command: the table of commands, and how their errors are reported.
 
-Commands are listed by name, and each is imported only when it is called.
+Listing the commands imports none of them; each is imported when it is called.
 """
 
 import errno
@@ -41,7 +41,7 @@ from .output import ExitCode, errors
 
 
 class Panel(StrEnum):
-    """Headings of the list of commands."""
+    """Headings in the list of commands."""
 
     MEASURE = "Measure"
     ANALYSE = "Analyse"
@@ -53,21 +53,21 @@ class Panel(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """Module, function and requirements of a command."""
+    """Where a command is defined, and what it requires."""
 
     panel: Panel
     function: str
     extras: tuple[str, ...] = ()
-    """Optional dependencies (extras) that the command needs; an extra that includes others comes first."""
+    """Extras (optional dependencies) that the command needs; one that includes others comes first."""
     space_mb: int = 300
-    """Address space that the libraries and threads of the command need [MB]."""
+    """Address space that libraries and threads of the command need [MB]."""
     advice: str = ""
-    """What to do if the command cannot run."""
+    """What the user should do if the command cannot run."""
     help: str = ""
-    """Help text of a group of commands, because a group has no function with a docstring."""
+    """Help text of a group of commands; single commands use the docstring of their function."""
 
     def load(self) -> typer.Typer:
-        """Import the command as an application with one command."""
+        """Import the command; return it as an application with this one command."""
         module, name = self.function.split(":")
         found = getattr(importlib.import_module(f".{module}", __package__), name)
         if isinstance(found, typer.Typer):
@@ -78,7 +78,7 @@ class Place:
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from the source file because importing is slow."""
+        """First line of the function's docstring, read from its file, because importing takes long."""
         module, name = self.function.split(":")
         source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         docstring = source.partition(f"\ndef {name}(")[2].partition('"""')[2]
@@ -86,14 +86,14 @@ class Place:
 
 
 class LateCommand(TyperCommand):
-    """Placeholder in the list of commands; the command itself is imported when it is called."""
+    """Placeholder in the list of commands; the command is imported when it is called."""
 
     def __init__(self, name: str, place: Place) -> None:
         super().__init__(name, rich_help_panel=place.panel)
         self._place = place
 
     def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the line is not shortened
-        """Return the description in the list of commands."""
+        """Return the line for the list of commands."""
         return self._place.summary
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
@@ -111,12 +111,12 @@ class LateCommand(TyperCommand):
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
-"""Base class of usage errors: from click, or from the copy of click inside newer versions of typer."""
+"""Base class of usage errors, from click or from the copy of click in newer versions of typer."""
 
 
 @contextmanager
 def explain_refusals(args: Sequence[str]) -> Iterator[None]:
-    """Context that refuses empty arguments, and adds the given and allowed values to usage errors."""
+    """Refuse empty arguments, and add given and allowed values to usage errors, inside this context."""
     words = ["", *words_of(args)]
     empty = next((before for before, word in pairwise(words) if not word), None)
     try:
@@ -130,9 +130,9 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
-        if type(error) is typer.BadParameter:  # exactly this class, because a missing option is a subclass
+        if type(error) is typer.BadParameter:  # not a subclass, such as a missing option
             error.exit_code = ExitCode.FAILED
-        if args:  # without arguments, the message is the help
+        if args:  # without arguments, the message is the help text
             error.message = printable(error.message)
         raise
 
@@ -161,7 +161,7 @@ def _is_number(text: str) -> bool:
 
 
 def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
-    """Return the class of a command group with these commands, in this order."""
+    """Return the class of a group that has these commands, in this order."""
 
     class LateCommands(SectionedGroup):
         def __init__(self, **settings: Any) -> None:
@@ -176,7 +176,7 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
-"""Address space [MB] to simulate or analyse (775 measured), and to open a bench (1807 measured)."""
+"""Address space [MB] for simulating or analysing (775 measured), and for opening a bench (1807 measured)."""
 COMMANDS = {
     "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
     "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
@@ -232,7 +232,7 @@ def print_version(*, is_requested: bool) -> None:
 
 
 class LogLevel(StrEnum):
-    """Amount of log output on standard error."""
+    """How much is logged on standard error."""
 
     WARNING = "warning"
     INFO = "info"
@@ -242,7 +242,7 @@ class LogLevel(StrEnum):
 
 
 class OneLine(logging.Formatter):
-    """Formatter that writes a log message as one line, without control characters from names or replies."""
+    """Formatter that writes a log message on one line, without control characters from names or replies."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
         """Return a message as one line."""
@@ -250,18 +250,18 @@ class OneLine(logging.Formatter):
 
 
 class LogBeside(logging.StreamHandler[TextIO]):
-    """Handler that logs in a thread, so that a suspended terminal or unread pipe does not delay a run."""
+    """Handler that logs in a separate thread, so that a blocked terminal or pipe does not delay a run."""
 
     def __init__(self) -> None:
         super().__init__()
         self._beside = Beside("log")
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue a line."""
+        """Queue a message to be written."""
         self._beside.do(lambda: super(LogBeside, self).emit(record))
 
     def close(self) -> None:
-        """Wait at most 1 s until the remaining lines are written, then close the log."""
+        """Wait at most 1 s for the remaining messages to be written, then close the log."""
         self._beside.wait(1.0)
         super().close()
 
@@ -288,15 +288,15 @@ def vibench(
     """Set up logging for all commands."""
     handler = LogBeside()
     handler.setFormatter(OneLine("%(asctime)s %(name)s: %(message)s"))
-    # Log only vibench, because other libraries log a traceback for every broken message of a client.
+    # Log only vibench: other libraries would log a traceback for every broken message of a client.
     ours = logging.getLogger("vibench")
     ours.handlers = [handler]
     ours.setLevel(log_level.upper())
 
 
 def main() -> None:
-    """Run the command line; for an error that a user can fix, print one sentence and exit with 1 or 3."""
-    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; suppresses gRPC's log of ended calls
+    """Run the command line; for an error that the user can fix, print a sentence and exit with 1 or 3."""
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; no log about ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
         app()
@@ -306,12 +306,12 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # a path is the cause, because all files contain valid text
+    except UnicodeEncodeError as error:  # caused by a path; all files contain valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # An unusable path may appear in any command, so such errors are handled here for all commands.
+        # Every command may be given an unusable path, so these errors are handled here for all of them.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise
@@ -322,12 +322,12 @@ def main() -> None:
 def _disk_trouble(error: Exception) -> str:
     if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
         return ""
-    name = str(error.filename2 or error.filename or "a file")  # for a copy, the second name is the target
+    name = str(error.filename2 or error.filename or "a file")  # after a copy, filename2 is the target
     return DISK_ERRORS[error.errno].format(name=shortened(name, NAME_SHOWN))
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Return the message if lack of memory or too many open files caused the error, also indirectly."""
+    """Return a message if memory or open files ran out, which may be the cause of another error."""
     if error is None:
         return ""
     text = str(error)
@@ -351,7 +351,7 @@ DISK_ERRORS = {
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
 }
-"""Messages by number of the system error, for the errors that a user can fix."""
+"""Messages for the disk errors that a user can fix, by error number."""
 _NO_MEMORY = (
     os.strerror(errno.ENOMEM),
     "can't start new thread",
@@ -359,15 +359,15 @@ _NO_MEMORY = (
     "without setting an exception",
     "without exception set",
 )
-"""Error messages of the system, Python and the loader when memory is exhausted."""
+"""Error messages of the operating system, Python and the loader when memory has run out."""
 
 
 NAME_SHOWN = 80
-"""Number of characters shown of a name that is too long."""
+"""Number of characters that are shown of a name that is too long."""
 
 
 def complain(error: BaseException) -> None:
-    """Print the sentence of an error, then the errors that followed it."""
+    """Print the sentence of an error, then those of the errors that followed it."""
     errors.print(Text("error:", style="bold red"), str(error))
     for note in getattr(error, "__notes__", ()):
         errors.print(f"  {note}")

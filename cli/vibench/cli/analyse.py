@@ -46,14 +46,14 @@ from .specimen_option import SpecimenOption, read_specimen
 
 
 class DrivenBy(StrEnum):
-    """Input of the simulation that is overlaid on a measurement."""
+    """Input that drives the simulation overlaid on a measurement."""
 
     VOLTAGE = "voltage"
     BASE = "base"
 
     @property
     def simulation(self) -> Simulation:
-        """The corresponding `Simulation` value for the analysis."""
+        """The `Simulation` of the analysis that this input selects."""
         return {DrivenBy.VOLTAGE: Simulation.UNDER_VOLTAGE, DrivenBy.BASE: Simulation.UNDER_BASE}[self]
 
 
@@ -185,7 +185,7 @@ def _analyse(
     as_json: bool,
 ) -> None:
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
-    # The path "." has no name.
+    # The path "." has no name, so use its absolute form.
     place = recording if recording.name.strip(".") else recording.resolve()
     name = place.name.removesuffix(".part").removesuffix(".h5")
     folder = free_path(place.parent / f"{name}_analysis") if out is None else out
@@ -246,7 +246,7 @@ def _analyse(
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
-    """Write a report for each further channel that shows a motion."""
+    """Write a report for each other channel that measures a motion."""
     from vibench.analysis.report import write_report
 
     for role, results in others.items():
@@ -260,7 +260,7 @@ def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_js
 def hidden_motions(
     results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
-    """Yield the estimated, unmeasured motion of m1 for each analysed recording; print an error if none."""
+    """Yield the estimated motion of m1 for each recording; print an error where that fails."""
     for facts in results.facts if hidden is not _Hidden.OMITTED else ():
         with open_recording(facts.path) as recording:
             try:
@@ -275,13 +275,13 @@ def hidden_motions(
 def fit_specimen(
     paths: Sequence[Path], name: str, observer: Observer, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
-    """Fit the specimen to recordings; the options of the report do not affect the fit."""
+    """Return the specimen fitted to recordings; options for the report have no effect on it."""
     measured = analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer)
     return update_model(measured, also_free, observer)
 
 
 def complain_about(results: CampaignResults) -> None:
-    """Print each failed analysis or simulation; exit with an error if an analysis failed."""
+    """Print each failed analysis and simulation; exit with an error code if an analysis failed."""
     for failure in results.failures:
         word = "error" if failure.what is FailedStep.ANALYSIS else "note"
         errors.print(f"{word}: {failure.with_recording}")

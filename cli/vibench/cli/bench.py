@@ -103,7 +103,7 @@ def new(
 ) -> None:
     """Set up a bench: ask questions, write its file, check wiring, noise, a first 5 mV, gains and signs.
 
-    The report is stored beside the file. Exit code 1 if a finding forbids energising the bench.
+    The report is stored beside the file. Exit code 1 if a finding forbids switching the amplifier on.
     """
     page = new_bench(target, named(template, "hardware_configs"), answers)
     if page.verdict is Verdict.FAIL:

@@ -1,4 +1,4 @@
-"""`vibench bench new`: set up and check a new bench, and write a report of it."""
+"""`vibench bench new`: set up and check a new bench, and write a report about it."""
 
 import signal
 import sys
@@ -40,12 +40,12 @@ from .paths import free_path
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
-"""Answers that mean that a wire is not plugged in."""
+"""Answers that mean that a cable is not plugged in."""
 
 
 @dataclass(frozen=True)
 class Answers:
-    """Content of an answer file: values of the configuration, operator, wiring and knobs."""
+    """Content of a file of answers: values of the configuration, operator, wiring and knobs."""
 
     given: Mapping[str, str]
 
@@ -56,26 +56,26 @@ class Answers:
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """The usual questions, and one question for each other value that the answer file sets."""
+        """The usual questions, and one for every other value that the file of answers contains."""
         usual = {question.key for question in QUESTIONS} | {_WIRED, _OPERATOR, _KNOBS}
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
     def ask(self, question: Question, choices: Sequence[str], held: str) -> str:
-        """Return the answer to a question of the configuration; an empty one keeps the template's value."""
+        """Return the answer to a question about the configuration; empty to keep the template's value."""
         answer = self.given.get(question.key, "")
         if choices:
-            console.print(f"seen: {', '.join(choices)}")
+            console.print(f"found: {', '.join(choices)}")
         console.print(f"{question.text} [{held}] {answer}")
         return answer
 
     def wired(self, pair: str) -> str:
-        """Return the answer to the question whether a pair of connectors is wired; empty for no."""
+        """Return the answer whether a pair of connectors is wired; empty for no."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer
 
     def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
-        """Return the confirmation of all settings made by hand; raises CheckFailed if it is missing."""
+        """Return the confirmation of all settings made by hand; raise CheckFailed if it is missing."""
         if self.given.get(_KNOBS) != "as in the file":
             raise CheckFailed(
                 "settings made by hand are not confirmed; compare them with the configuration, then give "
@@ -90,7 +90,7 @@ class Answers:
 
 
 def _name_in_a_comment(answer: str) -> str:
-    """Return the name without unprintable characters such as line ends, because a comment contains it."""
+    """Return the name without line ends and other unprintable characters, for use in a comment."""
     return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 
@@ -132,7 +132,7 @@ def _configure(template: Path, target: Path, seen: InstrumentList, note: str) ->
 
 
 def _confirm_wire(target: Path, pair: str) -> str:
-    """Ask whether a wire is plugged in; Ctrl-C may end the program at once, because the output is off."""
+    """Ask whether a cable is plugged in; Ctrl-C may end the program at once, because nothing is driven."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
@@ -146,7 +146,7 @@ def _confirm_wire(target: Path, pair: str) -> str:
 
 
 def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
-    """Ask the questions, write the configuration, run the checks of a new bench, and write the report."""
+    """Ask the questions, write the configuration, check the new bench, and write the report."""
     given = None if answers is None else Answers.read(answers)
     if given is None and not sys.stdin.isatty():
         raise ConfigurationError("the questions need a terminal, but there is none; give --answers FILE.toml")
@@ -167,7 +167,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     with replace_file(kept) as coming:
         coming.write_text(page.text, encoding="utf-8")
     console.print(paragraph(page.text))
-    console.print(f"kept: {kept}")
+    console.print(f"report: {kept}")
     return page
 
 

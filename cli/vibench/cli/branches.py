@@ -59,10 +59,10 @@ def branches(
     *,
     options: Annotated[RequestOptions[BranchRequest], Fields(OPTIONS)],
     error: Annotated[
-        str | None, option("Relative error of harmonic balance, as 1%; shooting is far more exact.", "E")
+        str | None, option("Error of harmonic balance, such as 1%; shooting is far more accurate.", "E")
     ] = None,
     time_limit: Annotated[
-        str | None, option("Time limit of the search, as 20s; gives the branches found.", "T", name="--time")
+        str | None, option("Time limit of the search, such as 20s; keeps what was found.", "T", name="--time")
     ] = None,
     holdable: Annotated[
         Path | None,
@@ -115,7 +115,7 @@ def branches(
 def _drive(
     amplitude: str | None, frequency: str | None, like: Path | None
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return the measured curves to overlay, and the request's fields for range and level."""
+    """Return the measured curves to overlay, and the fields of the request for range and level."""
     if like is not None:
         if amplitude is not None:
             raise InvalidRequest(
@@ -145,7 +145,7 @@ def _drive(
 def _resonance(
     amplitude: str | None, frequency: str | None, like: Path | None, resonance: str
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return no curves, and the request's fields to follow a phase resonance over the amplitude."""
+    """Return no curves, and the fields of the request that follow a phase resonance over amplitude."""
     if amplitude is None or frequency is not None or like is not None:
         raise InvalidRequest(
             f"--resonance {resonance} is followed over the amplitude; also give --amplitude START:STOP, and "

@@ -49,10 +49,10 @@ def chain(
     *,
     options: Annotated[RequestOptions[ChainRequest], Fields(OPTIONS)],
     error: Annotated[
-        str | None, option("Relative error to reach in each steady-sine transmission, such as 1%.", "E")
+        str | None, option("Largest relative error of each transmission under a sine, such as 1%.", "E")
     ] = None,
     time_limit: Annotated[
-        str | None, option("Time limit of each steady run, as 2s; gives the best result.", "T", name="--time")
+        str | None, option("Time limit of each steady run, such as 2s.", "T", name="--time")
     ] = None,
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
@@ -102,7 +102,7 @@ def _lengths(text: str) -> tuple[int, ...]:
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
-    """Return the request's fields for the base motion; without a motion, the drive is NONE."""
+    """Return the fields of the request for the base motion; without options, there is no drive."""
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(
@@ -136,7 +136,7 @@ def _is_above(first: str, second: str) -> bool:
 
 
 def _run_in_words(run: ChainRun) -> str:
-    """Return a run as one line, with the values of the first and the last cell."""
+    """Return a run as one line, with values of the first and of the last cell."""
     where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
     first, last = run.transmission[0, 0], run.transmission[0, -1]
     across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "

@@ -37,7 +37,7 @@ LOOK_S = 1.0
 
 
 class Analyst:
-    """Analysis of recordings in another process, with the results in the order of submission."""
+    """Analyses recordings in another process; results keep the order in which recordings were submitted."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool
@@ -48,7 +48,7 @@ class Analyst:
         self.submitted = 0
 
     def take(self, recording: Path) -> None:
-        """Submit a recording."""
+        """Submit a recording for analysis."""
         self.submitted += 1
         self._folder = recording.parent
         take = self._parts.append
@@ -56,7 +56,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order, waiting for each; raises AnalysisError if the process has ended."""
+        """Yield the results in order, waiting for each; raise AnalysisError if the process has ended."""
         for number in range(self.submitted):
             while number == len(self._parts):
                 self._pool.poll(LOOK_S)
@@ -78,7 +78,7 @@ class Analyst:
 
 @contextmanager
 def second_process(name: str, draws: int) -> Iterator[Analyst]:
-    """Start an analysis process; after an error, unfinished analyses are dropped."""
+    """Start an analysis process; after an error, analyses that are not finished are dropped."""
     pool = Pool(1)
     try:
         yield Analyst(pool, name, draws)

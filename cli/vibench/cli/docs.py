@@ -42,7 +42,7 @@ def docs(
 
 
 def build(target: Path, extent: str) -> None:
-    """Build the site, with warnings as errors; raises MissingLibrary if Sphinx or an extension is missing."""
+    """Build the site, with warnings as errors; raise MissingLibrary if Sphinx or an extension is missing."""
     for library in ("sphinx", "myst_nb", "furo"):
         if find_spec(library) is None:
             raise MissingLibrary(
@@ -52,8 +52,8 @@ def build(target: Path, extent: str) -> None:
     room_for_folder(target)
     with tempfile.TemporaryDirectory() as scratch:
         root = Path(scratch)
-        # Pages link to files beside their folder, and a shipped folder may be read-only, so build from a
-        # copy.
+        # Build from a copy: pages link to files outside their folder, and the folder of an installation may
+        # be read-only.
         for folder in ("docs", "examples", "campaigns", "studies", "hardware_configs"):
             shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)
         command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]

@@ -1,4 +1,4 @@
-"""`vibench doctor`: facts about this installation, for pasting into a problem report."""
+"""`vibench doctor`: facts about this installation, to be pasted into a problem report."""
 
 import os
 import platform
@@ -24,7 +24,7 @@ from .paths import AsJson
 
 NOT_INSTALLED = "not installed"
 FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
-"""Optional dependencies (extras) that only developers need."""
+"""Extras (optional dependencies) that only developers need."""
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = {
     STATE_VARIABLE: "folder for locks, bench checks and measured run times; by default the user's own",
@@ -37,7 +37,7 @@ VARIABLES: Mapping[str, str] = {
     "QT_QPA_PLATFORM": "Qt's platform plug-in; 'offscreen' without a display",
     "PYQTGRAPH_QT_LIB": "Qt binding of the plots; default PySide6",
 }
-"""The environment variables of vibench and their meaning, as in docs/installation.md."""
+"""Environment variables of vibench and their meaning, as in docs/installation.md."""
 SECRET = frozenset({TOKEN_VARIABLE})
 
 
@@ -66,7 +66,7 @@ def doctor(as_json: AsJson = False) -> None:
 
 
 def installation() -> dict[str, str]:
-    """Return versions and folders of vibench, Python and the system."""
+    """Return versions and folders of vibench, Python and the operating system."""
     library = " ".join(platform.libc_ver()).strip()
     return {
         "version": version("vibench"),
@@ -78,7 +78,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield each library with its version; for a missing library, the extra that installs it."""
+    """Yield each library with its version; for a missing one, the extra that installs it."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
@@ -86,7 +86,7 @@ def libraries() -> Iterator[tuple[str, str]]:
         asking.setdefault(name, []).append(extra[1] if extra else "")
     sizes = Counter(extra for extras in asking.values() for extra in extras)
     for name, extras in asking.items():
-        # Several extras may contain the library; propose the one with the fewest libraries.
+        # Several extras may contain the library; name the one with the fewest libraries.
         smallest = min(set(extras) - FOR_DEVELOPERS, key=sizes.__getitem__, default=None)
         if name == "vibench" or smallest is None:
             continue
@@ -109,7 +109,7 @@ def engine() -> Iterator[tuple[str, str]]:
 
 
 def folders() -> Iterator[tuple[str, str]]:
-    """Yield the folders in which vibench stores data, and whether they are writable."""
+    """Yield the folders in which vibench stores data, and whether they can be written to."""
     yield "state", _place(state_place())
     yield "this folder", _place(Path.cwd())
 
@@ -121,7 +121,7 @@ def _place(folder: Path) -> str:
 
 
 def instruments() -> Iterator[tuple[str, str]]:
-    """Yield the visible instruments, with libraries, drivers and permissions."""
+    """Yield the instruments found, with libraries, drivers and permissions."""
     try:
         need_extra("bench")
     except MissingLibrary as error:

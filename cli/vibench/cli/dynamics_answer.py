@@ -1,4 +1,4 @@
-"""Common functions of the commands for branches, exponents and chains: compute, report, save."""
+"""Common functions of the commands for branches, exponents and chains: compute, print, store."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 SHOWN = 24
-"""Largest number of rows on the terminal; JSON and file contain all rows."""
+"""Largest number of rows printed on the terminal; JSON and file contain all rows."""
 
 
 def room_for(file: str, out: Path | None) -> None:
-    """Check before computing that the folder is writable and contains no result yet."""
+    """Check, before computing, that the folder can be written to and contains no result yet."""
     if out is None:
         return
     room_for_folder(out)
@@ -35,9 +35,9 @@ def room_for(file: str, out: Path | None) -> None:
 def compute_parts(
     parts: Iterator[Part], tell: Callable[[int, Part], None]
 ) -> tuple[tuple[Part, ...], float, bool]:
-    """Compute all parts and report each with its number; Ctrl-C stops after the current part.
+    """Compute all parts, and report each with its number; Ctrl-C stops after the current part.
 
-    Returns the parts, the elapsed time [s], and whether all parts are computed.
+    Return the parts, the elapsed time [s], and whether all parts were computed.
     """
     found: list[Part] = []
     began = time.perf_counter()
@@ -62,7 +62,7 @@ def keep(
     *,
     is_path_printed: bool,
 ) -> None:
-    """Write the file, its figure and its tables into a folder, if one was given."""
+    """Write the results, their figure and its tables into a folder, if one was given."""
     if out is None:
         return
     out.mkdir(parents=True, exist_ok=True)
@@ -73,12 +73,12 @@ def keep(
 
 
 def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
-    """Print a result as JSON, with its provenance."""
+    """Print a result as JSON, with the versions of the software."""
     print_json({**document, "is_complete": is_complete, "software": software()})
 
 
 def leave(*, is_complete: bool) -> None:
-    """Exit with code STOPPED if the result is incomplete; otherwise do nothing."""
+    """Exit with the code `STOPPED` if the result is incomplete."""
     if not is_complete:
         errors.print("stopped: the result contains what was computed until then")
         raise typer.Exit(ExitCode.STOPPED)

@@ -1,4 +1,4 @@
-"""Progress bars from the engine's status: one for the measurement, one for the campaign."""
+"""Progress bars that show the engine's status: one for the recording, one for the campaign."""
 
 from collections.abc import Callable
 from threading import Event, Thread
@@ -54,7 +54,7 @@ class EngineBars:
         self._shown.__exit__(kind, error, trace)
 
     def draw(self, status: EngineStatus) -> None:
-        """Draw the changes since the last status."""
+        """Draw what has changed since the last status."""
         for row in status.rows:
             self._row(row)
         for message in status.messages:
@@ -103,9 +103,9 @@ def sentence(message: EngineMessage) -> str:
 
 
 class Watching:
-    """Display of the newest status in a separate thread; a blocked terminal delays only that thread.
+    """Display of the newest status, in a separate thread that alone waits for a blocked terminal.
 
-    After a stop, it prints on standard error who stopped the engine, and whether the output is off.
+    After a stop, print on standard error who stopped the engine, and whether its output is off.
     """
 
     def __init__(self, ask: Callable[[], EngineStatus], engine: Engine) -> None:
@@ -120,7 +120,7 @@ class Watching:
 
     def __exit__(self, *_: object) -> None:
         self._ending.set()
-        # A blocked terminal must not keep the command from ending.
+        # Do not wait longer: a blocked terminal must not keep the command from ending.
         self._thread.join(timeout=2.0)
 
     def _draw(self) -> None:

@@ -34,7 +34,7 @@ def examples(
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Return the files of a shipped folder and its subfolders, without the scripts of `vibench figure`."""
+    """Return the files of a shipped folder, with subfolders but without scripts for `vibench figure`."""
     return sorted(
         path
         for path in folder.rglob("*")
@@ -45,13 +45,13 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def names_of(paths: list[Path]) -> list[str]:
-    """Return the name of each file without suffix, with its folder if two names are equal."""
+    """Return the name of each file without suffix; with its folder if several have the same name."""
     often = Counter(path.stem for path in paths)
     return [path.stem if often[path.stem] == 1 else f"{path.parent.name}/{path.stem}" for path in paths]
 
 
 def copy_all(found: dict[str, list[Path]], target: Path) -> None:
-    """Copy all shipped folders to ``target``; raises ConfigurationError if one of the files exists."""
+    """Copy all shipped folders to ``target``; raise ConfigurationError if a file exists there."""
     room_for_folder(target)
     copies = {
         path: target / folder / path.relative_to(shipped_folder(folder))

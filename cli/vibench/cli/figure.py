@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Numbers of the figures that show the experiment and need recordings."""
+"""Numbers of the figures that show measurements and so need recordings."""
 
 
 def figure(
@@ -49,7 +49,7 @@ def figure(
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
-    # Check the inputs of all figures before drawing the first.
+    # Check the inputs of all figures before the first is drawn.
     figure_studies = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
@@ -79,7 +79,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":
-    """Return the function that draws figures of the experiment; the recordings are analysed once."""
+    """Return the function that draws measured figures; the recordings are analysed only once."""
     if not wanted:
         return lambda _: iter(())
     if folder is None:

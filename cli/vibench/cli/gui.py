@@ -13,7 +13,7 @@ from .options import option
 from .paths import BenchPath
 
 WINDOW = "vibench.gui"
-"""Package to run in a new process; it is not imported here, because commands must work without Qt."""
+"""Package that runs in a new process; it is not imported, because commands must work without Qt."""
 
 
 def gui(

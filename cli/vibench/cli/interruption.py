@@ -1,4 +1,4 @@
-"""Ctrl-C as a request to stop after the current work is saved; a second Ctrl-C ends the program."""
+"""Ctrl-C as a request to stop once the current work is stored; a second Ctrl-C ends the program."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -8,7 +8,7 @@ from types import FrameType
 
 @contextmanager
 def watch_interrupt() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether Ctrl-C was pressed."""
+    """Yield a function that returns whether Ctrl-C was pressed since."""
     before = signal.getsignal(signal.SIGINT)
     pressed: list[int] = []
 

@@ -58,7 +58,7 @@ def map_motions(
         list[Path] | None, option("Overlay level and responses of a recording on the map.", "RECORDING.h5")
     ] = None,
     kicks: Annotated[
-        int, option("For a basin map: number of kicks of each motion, at three sizes.", "N", min=0)
+        int, option("Map of initial states: number of random kicks per motion and size.", "N", min=0)
     ] = 0,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
@@ -114,7 +114,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Print the caption, the motions, and for a basin map its boundary and the effect of kicks."""
+    """Print caption and motions and, for a map of initial states, its boundary and the effect of kicks."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(results, motion)}")
@@ -148,7 +148,7 @@ def _roughness(results: MapResults) -> UncertaintyExponent | None:
 
 
 def document(results: MapResults, stability: tuple[KickStability, ...], file: Path) -> dict[str, object]:
-    """Return a summary of a map as a JSON document; the points are in the file."""
+    """Return a summary of a map as a JSON document; the points themselves are in the file."""
     audit = results.audit
     rough = _roughness(results)
     return {

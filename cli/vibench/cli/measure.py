@@ -68,7 +68,7 @@ def print_estimate(
     shares: Sequence["TimeShare"] = (),
     ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
 ) -> None:
-    """Print number of recordings, time, size, free space, and the expected uncertainty of results."""
+    """Print number of recordings, time, size, free space, and the expected uncertainty of the results."""
     match form:
         case Form.JSON:
             document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
@@ -91,13 +91,13 @@ def print_estimate(
 
 
 def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:
-    """Return the expected results of each measurement, with their uncertainties."""
+    """Return the expected results of each measurement, each with its uncertainty."""
     found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
     return {name: each for name, each in found.items() if each}
 
 
 def estimate_text(expected: CampaignEstimate) -> str:
-    """Return an estimate as text of a few lines."""
+    """Return an estimate as text of several lines."""
     most = "at most " if expected.searching else ""
     length = f"{most}{timedelta(seconds=round(expected.duration_s))}"
     kept = f" ({expected.kept} kept)" if expected.kept else ""
@@ -115,14 +115,14 @@ def estimate_text(expected: CampaignEstimate) -> str:
 
 
 def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | None, float]]:
-    """Return expected and longest recording times [s] of measurements with `until`."""
+    """Return expected and longest recording time [s] of each measurement that has `until`."""
     waiting = [each for each in campaign.measurements if each.until is not None]
     found = vibench.analysis.expected_recorded_s
     return {each.name: (found(each, rig), vibench.analysis.recorded_s(each)) for each in waiting}
 
 
 def duration_s(text: str) -> float:
-    """Return a time such as ``30min``, ``1.5 h`` or ``90 s`` in seconds."""
+    """Return the seconds in a time such as ``30min``, ``1.5 h`` or ``90 s``."""
     try:
         seconds = number_of(text, "s", "min", "h")
     except ValueError:
@@ -157,7 +157,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the messengers for the command and for mail; raises ConfigurationError if one is not usable."""
+    """Return the messengers for command and mail; raise ConfigurationError if one cannot be used."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))
@@ -250,7 +250,7 @@ def measure(
 
 @contextmanager
 def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[Engine]:
-    """Open a bench in this process, with progress bars and a server for `vibench watch` and `stop`."""
+    """Open a bench in this process, with progress bars, so that `vibench watch` and `stop` can reach it."""
     engine = Engine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     try:

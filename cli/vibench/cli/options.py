@@ -1,7 +1,7 @@
 """Command-line options that are fields of a pydantic model.
 
-Name, type, default and docstring of a field define the option, as they define form fields, JSON keys and HDF5
-attributes. In the signature of a command, one parameter of type `RequestOptions` stands for all these
+Name, type, default and docstring of a field define the option, as they also define form fields, JSON keys and
+HDF5 attributes. In the signature of a command, one parameter of type `RequestOptions` stands for all of these
 options.
 """
 
@@ -36,7 +36,7 @@ _OTHER_NAMES = {
     "gaps_m": "gap",
     "damping_times_s": "damping-time",
 }
-"""Options whose name differs from the field's name."""
+"""Names of options that differ from the name of the field."""
 _ALLOWED = {
     "greater_than": "it must be above {gt:g}",
     "greater_than_equal": "it must be {ge:g} or more",
@@ -44,12 +44,12 @@ _ALLOWED = {
     "less_than_equal": "it must be {le:g} or less",
     "finite_number": "it must be a finite number",
 }
-"""Allowed values in words, by type of pydantic error."""
+"""Text about the allowed values, by type of pydantic's error."""
 
 
 @dataclass(frozen=True)
 class Fields:
-    """Annotation of a `RequestOptions` parameter: the fields that become options, in order."""
+    """Annotation of a `RequestOptions` parameter: the fields that become options, in this order."""
 
     names: tuple[str, ...]
     panel: str | None = None
@@ -57,18 +57,18 @@ class Fields:
 
 @dataclass(frozen=True)
 class RequestOptions(Generic[Request]):
-    """The options that the user gave for a request; all other fields have defaults."""
+    """The options that the user gave for a request; fields without an option have their defaults."""
 
     model: type[Request]
     typed: Mapping[str, Any]
 
     def request(self, **others: object) -> Request:
-        """Return the request, with other fields set by the command; raises InvalidRequest."""
+        """Return the request with other fields set by the command; raise InvalidRequest if invalid."""
         return validated(self.model, {**others, **self.typed})
 
 
 def validated(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request with these field values; raises InvalidRequest, naming the first invalid value."""
+    """Return a request with these values; raise InvalidRequest with the first value not allowed."""
     from pydantic import ValidationError
 
     try:
@@ -98,7 +98,7 @@ def option(
     min: int | None = None,  # noqa: A002
     max: int | None = None,  # noqa: A002
 ) -> OptionInfo:
-    """Return an option that is not a field of a model; give ``name`` if it differs from the parameter."""
+    """Return an option that is not a field of a model; ``name`` if it is not that of the parameter."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(
         *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max
@@ -114,7 +114,7 @@ def _option(model: "type[BaseModel]", name: str, panel: str | None) -> OptionInf
 
 
 def _help(model: "type[BaseModel]", name: str) -> str:
-    """Return the help of an option: the docstring and the default of the model's field."""
+    """Return the help text of an option: the docstring of the model's field, and its default."""
     from vibench.analysis.prediction.field_docstrings import field_docstring
 
     default = model.model_fields[name].default
@@ -128,7 +128,7 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return the type without limits or ``| None``; str for a union, because the model parses the text."""
+    """Return the type without limits and ``| None``; str for a union, whose text the model reads."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
@@ -138,9 +138,9 @@ def _plain(annotation: Any) -> Any:
 
 
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command's function with a signature for typer, in which every field is an option.
+    """Return a command's function with a signature for typer in which every field is an option.
 
-    A switch takes no value, and has no ``--no-name`` unless that is declared.
+    A switch has no value, and also no ``--no-name`` unless that is declared.
     """
     signature = inspect.signature(function, eval_str=True)
     parameters: list[inspect.Parameter] = []
@@ -193,13 +193,13 @@ def words_of(args: Sequence[str]) -> list[str]:
 
 
 class SectionedCommand(TyperCommand):
-    """Command whose help is plain text, with a section for each heading of options.
+    """Command whose help is plain text, with a section for each heading.
 
-    The boxes that typer would draw need rich, which takes 75 ms to load.
+    typer would draw boxes, for which it needs rich, which takes 75 ms to load.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; refuse numbers that are valid only in Python, such as 1_0."""
+        """Parse the arguments; refuse numbers that only Python accepts, such as 1_0."""
         kinds = getattr(self.callback, "__annotations__", {})
         numbers: list[Any] = [each for each in self.params if _plain(kinds.get(each.name)) in (float, int)]
         for name, word in pairwise(words_of(args)):
@@ -209,7 +209,7 @@ class SectionedCommand(TyperCommand):
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write sections for arguments, options and every other heading."""
+        """Write a section for arguments, for options, and for each other heading."""
         sections: dict[str, list[tuple[str, str]]] = {}
         models = getattr(self.callback, "fields", {})
         for each in self.get_params(ctx):
@@ -225,11 +225,11 @@ class SectionedCommand(TyperCommand):
 
 
 _WHOLE = 1000
-"""Length limit of a command's description in a list [characters]; larger than any description."""
+"""Largest number of characters of a command's line in a list; no line is that long."""
 
 
 class SectionedGroup(TyperGroup):
-    """Command group whose help lists the commands by heading, with the whole first line of their help."""
+    """Group whose help lists the commands by heading, each with the whole first line of its help."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
         """Write a section for each heading."""

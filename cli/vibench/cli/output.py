@@ -1,4 +1,4 @@
-"""Output of commands: consoles for text and for errors, JSON on standard output, and exit codes."""
+"""Output of commands: consoles for text and errors, JSON on standard output, and exit codes."""
 
 import json
 import sys
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 
 class ExitCode(IntEnum):
-    """Exit codes of all commands: docs/installation.md."""
+    """Exit codes of all commands; see docs/installation.md."""
 
     DONE = 0
     """The command did everything that was requested."""
     FAILED = 1
-    """An error, a value that is not allowed, or a failed part; standard error has a sentence about it."""
+    """There was an error, a forbidden value, or a failed part; standard error says which."""
     MISUSED = 2
     """A command or an option is unknown or missing."""
     STOPPED = 3
-    """The command was stopped without a failure; ``--resume`` continues."""
+    """The command was stopped, without a failure; ``--resume`` continues its work."""
 
 
 LONGEST_LINE = 1800
-"""Largest number of characters of a printed line, because a name in a file may have any length."""
+"""Largest number of characters of a printed line; names in files may be longer."""
 
 
 class PrintableConsole(Console):
-    """Console that escapes control and formatting characters, because names may contain them."""
+    """Console that escapes control and formatting characters, which names may contain."""
 
     def print(self, *objects: Any, **settings: Any) -> None:
         """Print each string as one line; use `paragraph` for text of several lines."""
@@ -52,20 +52,20 @@ def _shown(each: Any) -> Any:
     return shortened(printable(each), LONGEST_LINE) if isinstance(each, str) else each
 
 
-# Without markup and emoji, because names and paths may look like them.
+# No markup and no emoji codes, because names and paths may look like them.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def words(text_format: str) -> "TextColumn":
-    """Return a column of progress bars that shows names unchanged."""
+    """Return a column of progress bars that shows names as they are."""
     from rich.progress import TextColumn
 
     return TextColumn(text_format, markup=False)
 
 
 def bold(text: object) -> Text:
-    """Return bold text, without interpreting brackets."""
+    """Return bold text in which brackets have no meaning."""
     return Text(printable(str(text)), style="bold")
 
 
@@ -75,7 +75,7 @@ def paragraph(text: str) -> Text:
 
 
 def print_table(rows: "Table") -> None:
-    """Print a table; text is wrapped only between words, so that no number is cut."""
+    """Print a table in which text is wrapped between words only, so that numbers are not cut."""
     for column in rows.columns:
         words_of = [word for text in (column.header, *column.cells) for word in str(text).split()]
         column.min_width = max((len(word) for word in words_of), default=0)
@@ -83,13 +83,13 @@ def print_table(rows: "Table") -> None:
 
 
 def print_warnings(sentences: Iterable[str]) -> None:
-    """Print warnings on standard error, so that standard output holds only results."""
+    """Print warnings on standard error, because standard output is for results."""
     for sentence in sentences:
         errors.print(f"warning: {sentence}")
 
 
 def leave_output_to_json() -> None:
-    """Send text for people to standard error, so that standard output holds one JSON document."""
+    """Send text to standard error, so that standard output contains only the JSON document."""
     console.file = sys.stderr
 
 

@@ -32,7 +32,7 @@ def pack(
     if as_json:
         leave_output_to_json()
     here = folder.resolve()
-    # Not with_suffix, because a folder name may contain a dot: "0.5Vpp".
+    # Not with_suffix: the name of a folder may contain a dot, such as "0.5Vpp".
     crate = file_at(out, here.parent / f"{here.name}.zip")
     facts = CrateFacts(licence, tuple(author or ()), title, description, organisation, organisation_url)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

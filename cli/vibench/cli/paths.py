@@ -30,7 +30,7 @@ AllowExternal = Annotated[
 
 
 def external_data(allowed: bool) -> AbstractContextManager[None]:
-    """Return a context in which HDF5 files may refer to other files, if ``allowed``."""
+    """Return a context in which HDF5 files may refer to other files, if that is allowed."""
     if not allowed:
         return nullcontext()
     from vibench.sim.hdf5_files.door import allow_external_data
@@ -52,13 +52,13 @@ def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
 
 
 def room_for_folder(path: Path) -> None:
-    """Check before computing that a folder can be created and written to; leave no file in it.
+    """Check, before computing, that a folder exists or can be created, and can be written to.
 
-    Raises ConfigurationError when the folder or its parent is a file or not writable.
+    Raises ConfigurationError when a file is in the way, or writing is not permitted.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     try:
-        # Test by writing: permissions do not restrict administrators, and /proc accepts no folders.
+        # Test by writing: permissions do not stop administrators, and /proc accepts no folders.
         with tempfile.TemporaryDirectory(dir=standing):
             return
     except OSError as error:
@@ -70,7 +70,7 @@ def room_for_folder(path: Path) -> None:
 
 
 def room_for_page(path: Path) -> None:
-    """Check before computing that a page can be written.
+    """Check, before computing, that a file can be written at this path.
 
     Raises ConfigurationError when the path is a folder, or its folder cannot be created.
     """
@@ -84,9 +84,9 @@ SUFFIXES = frozenset({".csv", ".h5", ".json", ".mat", ".nxs", ".toml", ".uff", "
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Return the path of a new file: ``out`` itself, or ``usual`` in the folder ``out``.
+    """Return the path of a new file: ``out`` or, if that is a folder, the usual name in it.
 
-    A new ``out`` without suffix becomes a folder. Raises ConfigurationError for another format's suffix.
+    If ``out`` has no suffix, it becomes a folder. Raises ConfigurationError for another format's suffix.
     """
     if out is None:
         return usual
@@ -100,7 +100,7 @@ def file_at(out: Path | None, usual: Path) -> Path:
 
 
 def free_path(path: Path) -> Path:
-    """Return the given path if it is unused, otherwise with -2, -3, ... before its suffix."""
+    """Return the path if nothing is there, otherwise with -2, -3, ... before the suffix."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

@@ -16,11 +16,11 @@ SHOWN_FAILURES = 5
 Workers = Annotated[int | None, option("Threads; by default one per processor.", "N", min=1)]
 Cluster = Annotated[str | None, option("Compute on the workers of this Dask scheduler.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
-"""For each failed point, its axis values and the reason."""
+"""For each failed point, its values on the axes and the reason."""
 
 
 def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:
-    """Print failed points, or after a stop the number of finished points, and exit with an error code."""
+    """Print failures or, after a stop, the number of finished points; then exit with an error code."""
     if print_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:
@@ -31,7 +31,7 @@ def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> No
 def print_failures(plan: "GridPlan", failures: Failures) -> int:
     """Print the failed points and the reasons on standard error; return their number."""
     for where, why in failures[:SHOWN_FAILURES]:
-        # Omit axes with a single value.
+        # Leave out axes that have a single value.
         axes = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
         place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in axes)
         errors.print(f"error: {place}: {why}")

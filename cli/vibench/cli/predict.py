@@ -40,7 +40,7 @@ from .specimen_option import AXES, SPECIMEN, read_specimen
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
-"""Largest number of rows on the terminal; JSON and file contain all rows."""
+"""Largest number of rows printed on the terminal; JSON and file contain all rows."""
 
 
 def predict(
@@ -101,7 +101,7 @@ def predict(
             and cluster is None
             and study_solver(request) is solve_scene
         ):
-            # Solve a single point directly, without workers and file.
+            # A single point is solved directly, without workers and file.
             taken_s, kept, where = [math.nan], 1, request.coordinates(0)
             try:
                 scene = request.scene((0,) * len(request.axes), Rest())
@@ -139,7 +139,7 @@ def predict(
 
 
 def _refuse_beside_target(typed: Collection[str]) -> None:
-    """Refuse options whose values follow from a requested error or time."""
+    """Refuse options whose values a requested error or time determines."""
     targets = [name for name in ("error", "time_s") if name in typed]
     others = [name for name in ("accuracy", "duration_s", "budget_s") if name in typed]
     if targets and others:
@@ -150,7 +150,7 @@ def _refuse_beside_target(typed: Collection[str]) -> None:
 
 
 def _refine(scene: Scene) -> ScenePrediction:
-    """Solve one scene with a target; print each improved result."""
+    """Solve one scene with a target, and print each better result."""
     from vibench.sim import refine_scene
 
     for found in refine_scene(scene):
@@ -178,7 +178,7 @@ def _seconds(name: str, text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Explain how the points are solved; one paragraph for adjacent points solved in the same way."""
+    """Explain how the points are solved, with a paragraph for successive points solved alike."""
     from vibench.sim import plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
@@ -192,15 +192,15 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on adjacent points solved alike; details are for the point with the largest p.
+    """Return a paragraph on successive points solved alike; details are those of the point with largest p.
 
-    Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes the start-up of the
-    process.
+    Each entry has frequency [Hz], plan and computing time [s]; the time is NaN if it includes the start of
+    the process.
     """
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost
     text = " ".join(plan.sentences)
-    if not has_target:  # if a target was given, the result states the time
+    if not has_target:  # with a target, the result states the time
         text += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
@@ -248,7 +248,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return how many starts reach the point's motion, as 5/8; "lost" or empty if none were simulated."""
+    """Return how many starts reach the point's motion, such as 5/8; "lost" or empty if unknown."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
@@ -259,7 +259,7 @@ def _share_text(point: ScenePrediction) -> str:
 
 
 def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
-    """Return a table of the motions at points with several motions; None without such a point."""
+    """Return a table of the motions at points that have several; None if there are none."""
     several = [
         (point, motion)
         for point in points
@@ -284,7 +284,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return a text on sensitive dependence on the start, and on the additional starts simulated."""
+    """Return a text on points with sensitive dependence on the start, and their additional starts."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

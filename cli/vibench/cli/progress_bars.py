@@ -1,4 +1,4 @@
-"""Progress bars on standard error; without a terminal, one line every ten seconds."""
+"""Progress bars on standard error; without a terminal, a line every ten seconds."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -18,12 +18,12 @@ from vibench.sim.background import Observer, Progress
 from .output import console, errors, words
 
 LINE_INTERVAL_S = 10.0
-"""Interval between progress lines without a terminal [s]."""
+"""Interval between progress lines if there is no terminal [s]."""
 
 
 @contextmanager
 def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]:
-    """Draw progress bars on a terminal; without one, print lines."""
+    """Draw progress bars on a terminal; if there is none, print lines."""
     if bars.console.is_terminal:
         with bars:
             yield bars
@@ -44,7 +44,7 @@ def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]
 
 
 def progress_line(bars: Bars) -> str:
-    """Return all bars as one line of text."""
+    """Return the state of all bars as one line of text."""
     return "; ".join(
         each.description
         if each.total is None
@@ -59,7 +59,7 @@ MINUTES_OF_AN_HOUR = 60.0
 
 @contextmanager
 def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
-    """Show one bar, and yield the function that updates it."""
+    """Show one bar; yield the function that updates it."""
     with show_bars(bars):
         bar = bars.add_task(what, total=total, left="")
 
@@ -88,7 +88,7 @@ def study_bar(points: int) -> AbstractContextManager[Observer]:
 
 
 def reading_bar() -> AbstractContextManager[Observer]:
-    """Show stage and progress of an analysis; the bar disappears at the end."""
+    """Show stage and progress of an analysis; the bar disappears when it ends."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     return _bar(Bars(*columns, TimeElapsedColumn(), console=errors, transient=True), "opening", None)
 
@@ -104,7 +104,7 @@ def _duration(seconds: float) -> str:
 
 @contextmanager
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar, and yield a callback that takes the number of new values."""
+    """Show a progress bar; yield the function that takes the number of further values."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     with show_bars(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)

@@ -1,4 +1,4 @@
-"""Parsing of `--frequency` and `--amplitude`: one value or a range."""
+"""Reading of `--frequency` and `--amplitude`: one value or a range."""
 
 import math
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ _EXAMPLES = {
         3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
     },
 }
-"""Descriptions of the allowed forms, by parameter and number of parts."""
+"""Allowed forms in words, by parameter and number of parts."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """One value, or two limits with an optional step."""
+    """One value, or two limits with or without a step."""
 
     start: float
     stop: float | None = None
@@ -32,9 +32,9 @@ class Range:
 
 
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: str | None = None) -> Range:
-    """Parse ``260``, ``50:600`` or ``50:600:1``; ``parts`` gives the allowed numbers of parts.
+    """Read ``260``, ``50:600`` or ``50:600:1``; ``parts`` are the allowed numbers of parts.
 
-    ``option`` is the name of the option if it differs from the parameter's name.
+    ``option`` is the name of the option, if it is not that of the parameter.
     Raises InvalidRequest for other text.
     """
     try:
@@ -66,7 +66,7 @@ def _number(part: str) -> float:
 
 
 def frequencies(text: str) -> tuple[float, ...]:
-    """Parse ``260`` or ``10:600:1``.
+    """Read ``260`` or ``10:600:1`` as frequencies [Hz].
 
     Raises InvalidRequest for other text, or too many values.
     """

@@ -1,4 +1,4 @@
-"""`vibench serve-rig`: the virtual instruments for other programs."""
+"""`vibench serve-rig`: the virtual instruments, for other programs."""
 
 import signal
 import threading
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ServedPace(StrEnum):
-    """Time base of a served rig."""
+    """Speed at which a served rig runs."""
 
     WALL = "wall"
     FREE = "free"

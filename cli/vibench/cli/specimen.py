@@ -56,7 +56,7 @@ def show_specimen(
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
-    """Return quantities derived from a specimen: stiffnesses, resonances, damping ratios."""
+    """Return quantities computed from a specimen: stiffnesses, resonances, damping ratios."""
     return {
         "masses_kg": specimen.masses,
         "stiffnesses_n_per_m": specimen.stiffnesses,
@@ -95,7 +95,7 @@ _UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m
 
 
 def _heading(name: str) -> str:
-    """Return a heading from the name of a quantity in code: ``"gaps [m]"`` for ``gaps_m``."""
+    """Return a heading for the name of a quantity in code: ``"gaps [m]"`` for ``gaps_m``."""
     ending = next((each for each in _UNITS if name.endswith(each)), "")
     words = name.removesuffix(ending).replace("_", " ")
     return f"{words} [{_UNITS[ending]}]" if ending else words

@@ -1,4 +1,4 @@
-"""Options of several commands: the specimen, and parameters that replace values of the specimen."""
+"""Options of several commands: the specimen, and parameters that replace its values."""
 
 from typing import Annotated, TypeVar
 
@@ -11,9 +11,9 @@ from .options import RequestOptions, option
 from .output import print_warnings
 
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
-"""Fields that become options in every command with a specimen."""
+"""Fields that are options of every command with a specimen."""
 AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
-"""Axes of a study, each with the field of `SpecimenChoice` that gives its single value."""
+"""Axes of a study that have a single value here, and the field of `SpecimenChoice` for this value."""
 SpecimenOption = Annotated[
     str | None, option("Specimen file, or a name listed by `vibench specimen`.", "NAME|FILE.toml")
 ]
@@ -21,7 +21,7 @@ Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
 def read_specimen(specimen: str | None) -> SpecimenTable:
-    """Return the specimen of this name or file, by default the paper's; raises InvalidRequest if unknown."""
+    """Return the specimen by name or file, by default the paper's; raise InvalidRequest if unknown."""
     if specimen is None:
         return usual_specimen()
     try:
@@ -35,7 +35,7 @@ def specimen_request(
 ) -> Choice:
     """Return a request with a specimen; warn about implausible amplitudes and gaps.
 
-    ``amplitude`` is the text of the option, already checked. Raises InvalidRequest for an invalid option.
+    ``amplitude`` is the text of the option, checked before. Raises InvalidRequest for other invalid options.
     """
     request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])

@@ -67,7 +67,7 @@ def study(
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
-    """Return a summary of the results as a JSON document; the values are in the file."""
+    """Return a summary of the results as a JSON document; the values themselves are in the file."""
     return {
         "file": str(out),
         "points": results.study.grid.size,
@@ -83,7 +83,7 @@ _DIGEST = 16
 
 
 class KeptStudies:
-    """Solver that stores each study in a folder; the file name is a hash of the request."""
+    """Solver that stores each study in a folder, in a file named by a hash of the study."""
 
     def __init__(self, folder: Path, workers: int | None) -> None:
         self._folder = folder
@@ -91,7 +91,7 @@ class KeptStudies:
         self._failed = 0
 
     def __call__(self, study: Study) -> StudyResults:
-        """Solve the missing points of a study and return its results."""
+        """Solve the points of a study that are missing in its file; return its results."""
         self._folder.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
         with watch_interrupt() as is_stopped, study_bar(study.grid.size) as observer:
@@ -112,6 +112,6 @@ class KeptStudies:
         return results
 
     def complain(self) -> None:
-        """Exit with an error code if any study has failed points; the other results are kept."""
+        """Exit with an error code if any study has failed points; all other results are stored."""
         if self._failed > 0:
             raise typer.Exit(ExitCode.FAILED)

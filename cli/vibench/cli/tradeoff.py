@@ -1,4 +1,4 @@
-"""`vibench tradeoff`: error over computing time of every method, for a scene or the paper's four cases."""
+"""`vibench tradeoff`: error against computing time of every method, for a scene or four cases."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -20,7 +20,7 @@ from .paths import AsJson, room_for_folder
 from .specimen_option import AXES, SPECIMEN, read_specimen
 
 _PAPER_HZ = 260.0
-"""Drive frequency of the paper's four cases [Hz]: no contact, two chaotic motions, and a strong drive."""
+"""Drive frequency [Hz] of the paper's four cases: no contact, two chaotic motions, and a strong drive."""
 
 
 def tradeoff(
@@ -33,7 +33,7 @@ def tradeoff(
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
 ) -> None:
-    """Measure error over computing time of each method, for your scene or the paper's cases at 260 Hz."""
+    """Compare error and computing time of each method, for your scene or the paper's cases at 260 Hz."""
     given = {"error": error, "time_s": time_limit}
     target = {name: value for name, value in given.items() if value is not None}
     scenes = {"amplitude": amplitude, "frequency": frequency}
@@ -84,11 +84,11 @@ def _study(
 
 
 def _print_curve(name: str, points: list[CurvePoint]) -> None:
-    rows = Table(title=f"error over time: {name}", title_justify="left")
+    rows = Table(title=f"error against computing time: {name}", title_justify="left")
     for heading in ("method", "time [s]", "error", "", "Response I", "II"):
         rows.add_column(heading)
     for each in points:
-        kind = "stated" if each.is_stated else "from the best"
+        kind = "stated" if each.is_stated else "against the best"
         numbers = f"{each.time_s:.2g}", f"{each.error:.1g}", kind
         mark = f"{each.method} (chosen)" if each.is_chosen else each.method
         rows.add_row(mark, *numbers, f"{each.response_i:.5g}", f"{each.response_ii:.5g}")

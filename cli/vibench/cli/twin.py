@@ -40,17 +40,17 @@ from .watch import Pid
 
 NICE = 5
 POLL_S = 0.01
-"""Interval between polls during a run [s]."""
+"""Interval between two polls during a run [s]."""
 IDLE_S = 0.2
-"""Interval between polls without a run [s]."""
+"""Interval between two polls if there is no run [s]."""
 PIECE_S = 0.1
-"""Duration of samples processed and reported at once [s]."""
+"""Duration of the samples that are processed and reported at once [s]."""
 LATEST_S = 3.0
-"""Largest delay [s]; above it, the twin skips samples."""
+"""Largest delay behind the measurement [s]; above it, the twin skips samples."""
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25
-"""Largest displayed error of a forecast, as a share of the smaller gap."""
+"""Largest error of the forecast that is displayed, over the smaller gap."""
 
 
 @dataclass
@@ -60,7 +60,7 @@ class _Following:
     specimen: Specimen
     live: LiveTwin
     rows: tuple[int, int]
-    """Rows of base acceleration and m0's velocity among the channels."""
+    """Row numbers of base acceleration and m0 velocity among the channels."""
     run_id: int = -1
     plan: str = ""
     missed: int = 0
@@ -69,7 +69,7 @@ class _Following:
     is_kept: bool = False
 
     def look(self) -> float:
-        """Process and report new samples; return the waiting time before the next call [s]."""
+        """Process and report new samples; return the time until the next call [s]."""
         status = self.client.status()
         if status.state not in DRIVING or status.run is None or not _shows_m0(status):
             return IDLE_S
@@ -80,7 +80,7 @@ class _Following:
         if waiting <= 0:
             return POLL_S
         is_late = waiting > LATEST_S * rate_hz
-        # More samples may have arrived since; if there are too many, the request drops the oldest.
+        # More samples may have arrived since; if they are too many, the request skips the oldest.
         most = round((PIECE_S if is_late else 2 * LATEST_S) * rate_hz)
         piece = self.client.look(self.live.next_sample, most=most)
         if piece.run_id != self.run_id or piece.volts.shape[1] == 0:
@@ -113,7 +113,7 @@ class _Following:
         self.client.tell_twin(self._status(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
-        """Store the parameters and the usual level, once known, as a baseline to check later runs."""
+        """Store parameters and usual level, once known, as a baseline for checking later runs."""
         live, watch = self.live, self.live.watch
         if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
             return
@@ -126,7 +126,7 @@ class _Following:
             levels = {**before.levels, self.plan: watch.usual}
             try:
                 keep_baseline(before.model_copy(update={"levels": levels}), path)
-            except OSError as error:  # such as a full disk; the twin continues without a stored baseline
+            except OSError as error:  # such as a full disk; the twin continues without storing
                 reason = f"{path} could not be written ({error.strerror})"
                 print_warnings([f"{reason}: the usual level of this run is not stored; free disk space"])
 
@@ -156,12 +156,12 @@ class _Following:
 
 
 def _shows_m0(status: EngineStatus) -> bool:
-    """Return whether the vibrometer measures m0; during a scan it measures other points."""
+    """Return whether the vibrometer measures m0; in a scan it measures other points."""
     return status.bench is not None and "m0_velocity" in [each.role for each in status.bench.channels]
 
 
 def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the forecast and its errors, up to the largest displayed error; empty without a forecast."""
+    """Return the forecast and its errors, up to the largest error to display; empty if there is none."""
     if newest.forecast is None:
         return (), ()
     error = newest.forecast.error
@@ -201,7 +201,7 @@ def _rig_of(client: EngineClient) -> Rig:
             return client.open_rig()
         except EngineGone:
             raise
-        except AcquisitionError:  # the bench is still opening
+        except AcquisitionError:  # the bench is still being opened
             time.sleep(IDLE_S)
 
 

@@ -1,4 +1,4 @@
-"""`vibench verify`: check recordings against their seals."""
+"""`vibench verify`: check recordings against their seals (signed digests)."""
 
 from collections import Counter
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""`vibench warm`: obsolete, kept because scripts may call it."""
+"""`vibench warm`: without effect, kept because scripts may call it."""
 
 from .output import console
 

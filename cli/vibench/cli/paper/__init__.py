@@ -1,4 +1,4 @@
-"""Figures and claims of the paper; the modules are the shipped scripts of studies/paper.
+"""Figures and claims of the paper; the modules of this package are the shipped scripts of studies/paper.
 
 >>> from vibench.cli.paper.options import FigureOptions
 >>> FigureOptions(gap_m=30e-6).specimen().gap_m
