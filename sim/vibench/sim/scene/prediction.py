@@ -106,9 +106,9 @@ class TargetReport:
     time_s: float
     """Computing time since the request [s]."""
     starts: int
-    """Number of starts in the mean; 1 without sensitive dependence on the start."""
+    """Number of starts averaged; 1 without sensitive dependence on the start."""
     windows: int
-    """Number of consecutive windows per start in the mean."""
+    """Number of consecutive windows per start that are averaged."""
     is_met: bool
     """Whether the reached error is at most the requested one."""
     needed_s: tuple[float, float, float] | None
