@@ -140,7 +140,7 @@ Outcome advance(State &state, Tangent &tangent, const Tables &tables, double unt
   return outcome;
 }
 
-// Compiled for one tangent vector, which is faster, and for up to six.
+// Compiled twice: for one tangent vector, which is faster, and for up to six.
 Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
                 Record &record) {
   if (tangent.changes == 1) return advance<1>(state, tangent, tables, until, tolerance, record);
@@ -181,7 +181,7 @@ VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
   return sizeof(Tables) + (law == POWERS ? sizeof(PowerTables) : 0);
 }
 
-// Fills `tables`, which has vibench_size_of_tables(law) bytes. The scene's shapes must exist as long.
+// Fills `tables`, which has vibench_size_of_tables(law) bytes. The scene's shapes must outlive the tables.
 VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   fill_tables(*tables, *scene);
@@ -274,7 +274,7 @@ VIBENCH_API int64_t vibench_size_of_cubic_tables(int64_t law) {
   return sizeof(CubicTables) + (law == POWERS ? sizeof(CubicPowerTables) : 0);
 }
 
-// Fills `tables`, which has vibench_size_of_cubic_tables(law) bytes. The scene's shapes must exist as long.
+// Fills `tables`, which has vibench_size_of_cubic_tables(law) bytes. The scene's shapes must outlive them.
 VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   bool has_powers = scene->specimen.law == POWERS;

@@ -15,12 +15,12 @@ constexpr int DRIVEN = 3, FLYING = 4;     // index of the drive's term, after th
 constexpr int ORDERS = 12;                // number of series terms over a grid step; the next is 0.25^12 / 12!
 constexpr double FOUR = 4.0;              // number of grid steps taken together far from the stops
 constexpr int SHORT = 6, LONG = 10;       // number of sine and cosine terms for angles up to 0.25 and 1 [rad]
-constexpr int WAITING = 1;                // number of lanes clear of the stops at which a march may end
+constexpr int WAITING = 1;                // a march ends when at most this many lanes are clear of the stops
 constexpr int TOUCH_CORRECTIONS = 3;      // number of Newton steps to a touch from a second-order guess
 constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root from a guess with a few % error
 constexpr int HIGHEST = 8;                // order of the highest derivative of p at a touch
 constexpr double LONGEST_PART = 0.25;     // longest collision over the drive period, so that LONG terms suffice
-constexpr int64_t MOST_EVENTS = 10000;    // largest mean number of events per drive period; motions have fewer
+constexpr int64_t MOST_EVENTS = 10000;    // limit of the mean number of events per drive period
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
 using Lanes = Vector<LANES>;
@@ -113,7 +113,7 @@ class BatchRun {
   int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
 
   int64_t taken = 0;  // number of motions taken from the batch
-  unsigned moving = 0, careful = 0;  // bits of lanes that advance, and of lanes limited to single steps
+  unsigned moving = 0, careful = 0;  // bits of lanes that advance, and of lanes that take only single steps
 
   // ---- One lane
 
@@ -357,7 +357,7 @@ class BatchRun {
   // Advances the time. The drive's term is recomputed, so that its rounding errors do not accumulate.
   void pass(Mask of, Lanes time) {
     left = left - select(of, time, 0.0);
-    // The series needs a small angle: a quarter of the phase plus half a turn, then the fourth power.
+    // The series needs a small angle: (phase + half a turn) / 4. Its result is raised to the fourth power.
     LanePhasor turned = turned_by_series<LONG>((0.5 - left * frequency) * (0.5 * PI));
     LanePhasor half{fused(turned.re, turned.re, -(turned.im * turned.im)), 2.0 * (turned.re * turned.im)};
     LanePhasor whole{fused(half.im, half.im, -(half.re * half.re)), -2.0 * (half.re * half.im)};

@@ -13,13 +13,13 @@ constexpr int BLOCK = 8;             // cells in parallel; in a window a force r
 constexpr int NUMBERS = 3;           // displacements of a cell, at indices P, AT_X, AT_Z; their rates follow
 constexpr int PIECE_TERMS = 8;
 constexpr double LONGEST_WINDOW = 0.5;  // limit of fastest rate times length, so that AHEAD terms suffice [rad]
-constexpr double IDLE_WINDOWS = 2.0;  // length of a window without contacts, over the longest other window
+constexpr double IDLE_WINDOWS = 2.0;  // longest window without contacts, divided by the longest other window
 constexpr int MOST_TOUCHES = 1000;   // largest number of touches of a cell in a window
 constexpr int MOST_STRETCHES = 100000;  // largest number of flights, contacts and steps of a cell in a window
 // A window is cut at a late touch only if this saves time: if the number of cells integrated separately, plus
 // one for each CELLS_AS_ONE cells of the chain, is at most MOST_CUT. Otherwise contact steps cost less.
 constexpr int64_t MOST_CUT = 12, CELLS_AS_ONE = 16;
-constexpr double SOON = 1e-3;        // a window is not cut at a touch in this first part of it
+constexpr double SOON = 1e-3;        // a touch in this first fraction of a window does not cut it
 constexpr double HAIR = 1e-12;       // a contact from a touch in this last part continues in the next window
 constexpr double ROUNDED_PIECE = 1e-9;  // a smaller remaining part of a piece of the drive is rounding error
 // Constants for steps under a power law, whose windows are short; see power_law.hpp.
@@ -134,7 +134,7 @@ struct CellCourse {
   const double *operator[](int number) const { return of[number]; }
 };
 
-// Returns the largest magnitude over a flight, at least `best`. It is searched only if a bound allows more.
+// Returns the largest magnitude over a flight, at least `best`. Searches only if a bound is above `best`.
 inline double course_peak(double best, const double *series, double length) {
   double ends = larger(magnitude(series[0]), magnitude(polynomial_at(series, length).value));
   if (ends + derivative_bound(series, length, 2) * length * length / 8.0 <= best) return best;
@@ -522,7 +522,7 @@ class ChainRun {
     return worst;
   }
 
-  // Updates the peaks of cells without contact, and adds the forces of the other cells to their lines.
+  // Updates the peaks of cells without contact, and adds contact forces of other cells to their lines.
   void see_window(double length) {
     Phasor end = conjugate(drive_later(length));
     for (int64_t i = 0, n = 0; i < at.cells; i++) {

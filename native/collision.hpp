@@ -13,7 +13,7 @@ enum ShapeRow { TO_DURATION = POINTS, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, 
 enum DurationColumn { DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY };
 constexpr double SOFTEST = -0.3, HARDEST = 0.5, SPACING = (HARDEST - SOFTEST) / 40;  // tabulated presses
 constexpr double LONGEST = 3.5;         // duration at the HARDEST press, in units of depth over speed
-constexpr double LONGEST_COLLISION = 0.4;  // largest fastest rate times duration for the series [rad]
+constexpr double LONGEST_COLLISION = 0.4;  // limit of fastest rate times duration, for the series [rad]
 constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5
 constexpr double LEAST_TOLERANCE = 1e-7;  // sixteen points are not accurate enough for stricter tolerances
 constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance

@@ -11,7 +11,7 @@ constexpr int MOST_PHASES = 100000;  // largest number of flights and contacts i
 constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for the rounding error of an interval's length
 constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // length of a piece in steps of the last level
 constexpr int PIECE_ORDER = 16;  // number of series terms over a piece under a power law
-constexpr double TRY_TWICE = 5e-4;  // below this part of the allowed misfit, the next step is twice as long
+constexpr double TRY_TWICE = 5e-4;  // misfit over the allowed misfit, below which the next step is doubled
 
 // ---- The base
 
@@ -26,7 +26,7 @@ INLINE CubicForce<double> base_force(const double *base, const Specimen &s) {
            s.k0 * base[2] + 3.0 * s.c0 * base[3], s.k0 * base[3]}};
 }
 
-// Returns the same force as a polynomial in t - `by`.
+// Returns a base force as a polynomial in t - `by`.
 template <class T> INLINE CubicForce<T> shifted(const CubicForce<double> &force, const T &by) {
   const double (&f)[CUBIC] = force.terms;
   return {{f[0] + by * (f[1] + by * (f[2] + by * f[3])), f[1] + by * (2.0 * f[2] + 3.0 * f[3] * by),
@@ -46,7 +46,7 @@ template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates
   rates[VZ] = t.inverse2 * (hold - pull);
 }
 
-// Computes the same rates while m1 rests on a rigid stop and forms one body with m2.
+// Computes the rates like `flight_rates`, but while m1 rests on a rigid stop and forms one body with m2.
 template <class T> INLINE void held_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);

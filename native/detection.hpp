@@ -81,8 +81,8 @@ inline double first_contact(const double *series, double length, const Room &roo
   return NEVER;
 }
 
-// Does the same on a stretch of at most LONGEST_TURN. If p provably has no extreme on it, it can only touch
-// the stop ahead, and only once, so Newton's method is safe.
+// Returns the same as `first_contact`, for a length of at most LONGEST_TURN. If p provably has no extreme on
+// this stretch, p can only touch the stop ahead, and only once, so Newton's method is safe.
 inline double first_touch(const double *series, double length, const Room &room) {
   double change = room.bound * LONGEST_TURN;  // largest change of d2p/dt2 on such a stretch
   double side = series[1] > 0.0 ? 1.0 : -1.0;

@@ -119,7 +119,7 @@ struct StateMatrix {
   INLINE void add(int i, int j, double value) { rows[i].set(j, rows[i][j] + value); }
 };
 
-// x' A
+// Returns the row x' A.
 INLINE StateRow operator*(const StateRow &x, const StateMatrix &a) {
   StateRow sum = x[0] * a.rows[0];
   for (int i = 1; i < TRACKED; i++) sum = sum + x[i] * a.rows[i];
@@ -143,7 +143,7 @@ INLINE void carry_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix
   for (int i = 0; i < TRACKED; i++) matrix.rows[i] = 0.5 * (whole.rows[i] + turned.rows[i]);
 }
 
-// Propagates both backwards over a sample's update: (I - K H)' M (I - K H) + H' H / S; H selects X' + W.
+// Propagates adjoint and M backwards over an update: (I - K H)' M (I - K H) + H' H / S; H selects X' + W.
 INLINE void use_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &covariance, double innovation,
                      double variance) {
   if (variance == 0.0) return;

@@ -27,7 +27,7 @@ inline double series_peak(double best, const double *series, double low, double 
   return best;
 }
 
-// Does the same for the cubic with the given values and rates at both ends of a step.
+// Returns the same for the cubic with the given values and rates at both ends of a step.
 inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
   double rise = (last.value - first.value) / step;
   double series[AHEAD] = {first.value, first.rate, (3.0 * rise - 2.0 * first.rate - last.rate) / step,

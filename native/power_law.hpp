@@ -13,8 +13,8 @@ constexpr int LEVELS = 40;           // number of step lengths, usually with the
 constexpr int INSTANTS = GAUSS + 2;  // instants of an observed step: its start, its Gauss points, its end
 constexpr double LONGEST_POWER_TURN = 3.0;  // longest step times the fastest rate [rad]
 constexpr int FIRST_LEVEL = 8;       // level of the first step: a sixteenth of the longest step
-constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance, as its
-                             // relative effect on the motion. The error of the step is smaller
+constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance; a
+                             // misfit is its relative effect on the motion. The error of the step is smaller
 constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // iteration ends at a relative change below this
                                                              // part of the tolerance, or below this value
 constexpr int MOST_SUBSTITUTIONS = 30;
@@ -65,7 +65,7 @@ struct PowerForce {
     }
     return sum * inverse_reference;
   }
-  // Returns the angular frequency of a mass on k1 and a bound of the law's stiffness at `p` [rad/s].
+  // Returns the angular rate of a mass on k1 (`linear`) and on a bound of the law's stiffness at `p` [rad/s].
   double stiffest_rate(double p, double linear, double inverse_mass) const {
     double secant = p > 0.0 ? (*this)(p) / p : 0.0;
     return square_root((linear + highest * secant) * inverse_mass);
@@ -190,7 +190,7 @@ template <class T> struct PowerStep {
     return {times(numbers.p.free, begin), begin + times(numbers.move, begin)};
   }
 
-  // Conversion from and to `Motion`, which does not include the drive's phasor.
+  // Conversion from and to `Motion`, in which the drive's phasor is not included.
   void begin_at(const Motion<T> &m) {
     const T numbers[WIDE] = {m.at[Y] - m.at[Z],   m.at[X],  m.at[Z],           m.at[VY] - m.at[VZ],
                              m.at[VX], m.at[VZ], constant<T>(0.0), constant<T>(0.0)};

@@ -67,7 +67,7 @@ STRUCTURE(LinearMotion,
 // Motion of m1 on a rigid or linear stop: a linear motion about another rest position.
 STRUCTURE(HeldMotion,
   LinearMotion motion;
-  Phasor pulls[7];             // quantity that keeps m1 on the stop, per unit phasor; the drive's is last
+  Phasor pulls[7];             // per unit phasor: quantity that keeps m1 on the stop; the last is the drive's
   double let_go;               // constant part of this quantity, divided by the gap
   double rests;                // constant part of |p|, divided by the gap
 )
@@ -103,8 +103,8 @@ STRUCTURE(PowerShapes,
   double points[8], weights[8];
   double shares[32][8][8];     // [m][k][i]: integral up to point i of (c_i - s)^m of a unit value at point k
   double ends[32][8];          // [m][k]: the same integral up to the end
-  double at_start[8], at_end[8];  // value of the polynomial at start and end per value at each point
-  double course[9][8];         // coefficients of powers of (s - 1) per value at a point; the last at the end
+  double at_start[8], at_end[8];  // value of the polynomial at start and end, per value at each point
+  double course[9][8];         // [k][m]: coefficient of (s - 1)^m per value at point k, or (last) at the end
   double point_weights[8];     // barycentric weights of the points alone
   double instants[10], instant_weights[10], instant_slopes[10];  // start, points, end; barycentric data
 )
@@ -445,7 +445,7 @@ STRUCTURE(ChainMotion,
   double tolerance;
   double fastest;              // largest rate of chain and drive [1/s]
   Numbers windows;             // [levels]: lengths of windows, from long to short [s]
-  Numbers clashes;             // [levels]: a window is too long if it would integrate two cells this close
+  Numbers clashes;             // [levels]: a window is too long if two cells this close may have contact
   Drive drive;
   Numbers pieces;              // [pieces][8]: force of the base on the first m0 [N] instead of the drive, as
                                // a polynomial in the time since the start of each piece; or empty
