@@ -59,7 +59,7 @@ class Table:
 
 
 def table(name: str, **columns: ArrayLike) -> Table:
-    """Return a table with this name and these columns; column names end with the unit, as in ``time_s``."""
+    """Return a table from its ``name`` and ``columns``; column names end with the unit, as in ``time_s``."""
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
 
 

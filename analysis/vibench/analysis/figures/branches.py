@@ -79,7 +79,7 @@ def branches_figure(
 
 
 def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
-    """Draw ``size`` over ``place`` along a branch; stable parts are solid, unstable parts dashed."""
+    """Draw ``size`` over ``place`` into ``axes``; stable parts are solid, unstable parts dashed."""
     colour = (
         style.PREDICTED
         if line.periods == 1
