@@ -65,7 +65,7 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "- the largest Lyapunov exponent, with its standard error;",
         "- scipy's solvers at a relative tolerance of 1e-6: speed, and in brackets the state error.",
         "",
-        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after",
+        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after about",
         f"{first.solver_span_s:.1g} s.",
     )
     for each in benchmark.motions:
@@ -82,12 +82,12 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "",
         "## Sensitive dependence on the start",
         "",
-        "In the cases below, a tiny change of the initial conditions (the *start*) may lead to another final",
+        "In these cases, a tiny change of the initial conditions (the *start*) may lead to another final",
         "motion. The table compares the predicted share of starts that reach each motion with",
         f"{lotteries[0].starts} further runs, from starts a millionth of the gap apart.",
         "Each run simulates at most 300 s, so a chaotic or undecided motion may still change.",
         "`periodic, 1` repeats after one drive period. In 19 of 20 predictions, all intervals contain the",
-        "true shares, even if motions change later. Relative time: prediction over single run.",
+        "true shares, even if motions change. *Relative time* compares a prediction with a single run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",

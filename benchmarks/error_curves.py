@@ -265,7 +265,7 @@ def section(curves, models, chaos):
         f"{GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz, with 30 s from rest at each.",
         "",
         "Up to 10 µm, `hertz` takes less time than the continuous models, because motion between contacts",
-        "has a closed form. At 50 µm, models of low order are faster, but agree at few frequencies.",
+        "has a closed form. At 50 µm, models of low order are faster, but seldom agree.",
         "",
         "| model | mean time per frequency | "
         + " | ".join(f"R at {1e6 * amplitude_m:g} µm" for amplitude_m in AMPLITUDES_M)
