@@ -1,4 +1,4 @@
-"""Recordings for the tests of analysis: made once, of a specimen whose answer is known."""
+"""Recordings for the analysis tests: made once, of a specimen whose response is known."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ DWELL_PART = synthetic.Part("dwell", SETTLE_S, SETTLE_S + DWELL_S, {"frequency_h
 
 @pytest.fixture(scope="session")
 def dwell_file(dwell_motions, tmp_path_factory):
-    """Write a dwell, whole or not, in a folder of its own."""
+    """Return a function that writes a complete or shortened dwell to a new folder."""
 
     def write(level="weak", **how):
         motion, velocity, _ = dwell_motions[level]
@@ -57,7 +57,7 @@ def dwell_file(dwell_motions, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def sweep_file(tmp_path_factory):
-    """A sweep through the colliding region, at a rate that leaves a clear jump."""
+    """Write a sweep through the collision region, slow enough for a clear jump."""
     motion = synthetic.chirp(SWEEP["duration_s"], SWEEP["start_hz"], SWEEP["stop_hz"], A0_STRONG)
     velocity, _ = synthetic.response_of(motion)
     plan = SineSweep(amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * A0_STRONG, settle_s=0.0, **SWEEP)
@@ -68,7 +68,7 @@ def sweep_file(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def noise_motion():
-    """Two realisations of weak noise, one after the other, each from rest."""
+    """Base motion, m0 velocity and parts of two consecutive realisations of weak noise, each from rest."""
     lines = np.arange(NOISE["band_start_hz"], NOISE["band_stop_hz"] + 1, NOISE["repetition_hz"])
     settle_s, played_s = 3.0, NOISE["periods"] / NOISE["repetition_hz"]
     motions, velocities, parts = [], [], []
@@ -87,7 +87,7 @@ def noise_motion():
 
 @pytest.fixture(scope="session")
 def noise_file(noise_motion, tmp_path_factory):
-    """Write noise, whole or not, in a folder of its own."""
+    """Return a function that writes complete or shortened noise to a new folder."""
 
     def write(**how):
         plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
@@ -99,7 +99,7 @@ def noise_file(noise_motion, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def stepped_file(tmp_path_factory):
-    """Two steps of a stepped sine, up, each from rest so that both are in closed form."""
+    """Write two upward steps of a stepped sine, each from rest and known in closed form."""
     frequencies = (150.0, 180.0)
     motions = [synthetic.sine(4.0, each, A0_WEAK) for each in frequencies]
     base = synthetic.Motion(
@@ -129,7 +129,7 @@ def streamed_noise():
 
 @pytest.fixture(scope="session")
 def streamed_file(streamed_noise, tmp_path_factory):
-    """Write streamed noise, whole or not, in a folder of its own."""
+    """Return a function that writes complete or shortened streamed noise to a new folder."""
 
     def write(**how):
         folder = tmp_path_factory.mktemp("streamed")

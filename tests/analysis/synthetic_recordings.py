@@ -1,4 +1,4 @@
-"""Recordings of a faultless bench: the base moves as told, the specimen as simulated, the file is real."""
+"""Recording files of an ideal bench: prescribed base motion and simulated specimen."""
 
 import json
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ PROVENANCE = Provenance(
 
 @dataclass(frozen=True)
 class Motion:
-    """What the base does: a sum of signals under a ramp, in closed form up to its second derivative."""
+    """Base displacement and acceleration: a sum of ramped signals in closed form."""
 
     displacement_m: np.ndarray
     acceleration: np.ndarray
@@ -43,7 +43,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Part:
-    """A named stretch of a recording, in seconds."""
+    """A labelled part of a recording; times in seconds."""
 
     label: str
     start_s: float
@@ -52,7 +52,7 @@ class Part:
 
 
 def ramped(time_s, phase, rate, curvature, amplitude_m):
-    """amplitude * sin(phase), raised and lowered by half cosines; phase' = rate, phase'' = curvature."""
+    """Return amplitude * sin(phase) with half-cosine ramps; phase' = rate, phase'' = curvature."""
     left_s = time_s[-1] - time_s
     rising = time_s < left_s
     x = np.clip(np.where(rising, time_s, left_s) / RAMP_S, 0, 1)
@@ -68,7 +68,7 @@ def ramped(time_s, phase, rate, curvature, amplitude_m):
 
 
 def times(duration_s):
-    """Times of a motion that lasts so long and is then lowered."""
+    """Sample times [s] of a motion of this duration and its ramp-down."""
     return np.arange(round((duration_s + RAMP_S) * RATE)) / RATE
 
 
@@ -96,7 +96,7 @@ def multisine(duration_s, lines_hz, amplitude_m, seed):
 
 
 def streamed(duration_s, low_hz, high_hz, rms_m, seed):
-    """Gaussian base motion in a band, and the velocity of a mass that moves exactly twice as far."""
+    """Return Gaussian base motion in a band and the velocity of a mass with twice that displacement."""
     count = round(duration_s * RATE)
     omega = 2 * np.pi * np.fft.rfftfreq(count, 1 / RATE)
     inside = (omega >= 2 * np.pi * low_hz) & (omega <= 2 * np.pi * high_hz)
@@ -108,7 +108,7 @@ def streamed(duration_s, low_hz, high_hz, rms_m, seed):
 
 
 def response_of(motion, delay_samples=0, specimen=None):
-    """Velocity of m0 under a base motion, and when it struck; a delay shows it late."""
+    """Return the delayed velocity of m0 under a base motion, and the impact times [s]."""
     drive = Sampled(np.append(motion.displacement_m, motion.displacement_m[-1]), RATE)
     path = integrate(
         specimen or gong2025(), drive, (motion.displacement_m.size - 1) / RATE, sample_rate_hz=RATE
@@ -170,9 +170,9 @@ def write_recording(
     overloads=(),
     response=VELOCITY,
 ):
-    """Write a recording; ``hole`` is a range of lost samples, ``samples`` cuts the end off.
+    """Write a recording; ``hole`` is a range of lost samples, ``samples`` shortens the record.
 
-    ``velocity`` is what ``response`` shows.
+    ``velocity`` holds the samples of the channel ``response``.
     """
     writer = begun_recording(
         folder,
@@ -206,7 +206,7 @@ def begun_recording(
     overloads=(),
     response=VELOCITY,
 ):
-    """Begin a recording and hand over its samples; it can still grow."""
+    """Begin a recording and append its samples; return the writer, not yet finished."""
     planned = velocity.size
     kept = planned if samples is None else samples
     measurement = Measurement(name=name, excitation=excitation)

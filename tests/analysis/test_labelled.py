@@ -1,4 +1,4 @@
-"""Results as labelled Datasets: units from names, bounds beside values, one mechanism for all of them."""
+"""Results as labelled Datasets: units from names, bounds beside values, for every result class."""
 
 import dataclasses
 import importlib
@@ -139,7 +139,7 @@ def test_a_unit_is_read_from_the_longest_suffix_of_a_name(name, unit):
 
 
 def results():
-    """Yield every dataclass on a public API of the analysis that has arrays."""
+    """Yield every dataclass with arrays in the public API of the analysis."""
     for api in PUBLIC_APIS:
         face = importlib.import_module(f"vibench.analysis{api}")
         for name in face.__all__:
@@ -149,8 +149,8 @@ def results():
                 yield found
 
 
-def wholes():
-    """What a person is given whole, its arrays inside of its parts."""
+def composite_results():
+    """Yield the result classes whose arrays are inside nested parts."""
     yield from (dynamics.BranchDiagram, dynamics.ChainAnswer, dynamics.ExponentSpectrum)
     yield from (hidden_motion.FoundSpecimen, hidden_motion.HiddenMotion, hidden_motion.TrackedMotion)
     yield from (AbstractOverlay, MeasurementPrediction, UpdatedSpecimen, SpecimenFit, AbstractAnalysis)
@@ -210,7 +210,7 @@ UNIT_NOT_KNOWN = {
 
 
 def parts_of(annotation):
-    """Dataclasses that a type names, inside of tuples and unions too."""
+    """Yield the dataclasses in a type annotation, also inside tuples and unions."""
     for each in typing.get_args(annotation):
         yield from parts_of(each)
     if inspect.isclass(annotation) and dataclasses.is_dataclass(annotation):
@@ -228,8 +228,8 @@ def kinds_below(kind):
         yield from kinds_below(each)
 
 
-def reached():
-    """Every result there is, and every kind of part in them, with the annotations of its fields."""
+def reachable_kinds():
+    """Return every result class and nested part class, with the annotations of its fields."""
     for each in pkgutil.walk_packages(analysis.__path__, "vibench.analysis."):
         importlib.import_module(each.name)
     found, waiting = {}, [each for each in kinds_below(Labelled) if each.__module__.startswith("vibench.")]
@@ -246,7 +246,7 @@ def reached():
 
 def test_every_number_of_every_result_has_a_unit_or_is_a_pure_number():
     lacking = set()
-    for kind, hints in reached().items():
+    for kind, hints in reachable_kinds().items():
         numbers = {name for name, each in hints.items() if is_number(each) and not list(parts_of(each))}
         properties = inspect.getmembers(kind, lambda member: isinstance(member, property))
         numbers |= {
@@ -260,8 +260,8 @@ def test_every_number_of_every_result_has_a_unit_or_is_a_pure_number():
 
 
 def test_every_stored_quantity_names_its_unit():
-    """What is held by a type variable, as `response` of an analysis, says its units by itself."""
-    found = reached()
+    """Fields typed by a type variable, as `response` of an analysis, must state their units."""
+    found = reachable_kinds()
     silent = [
         f"{kind.__name__}.{name}"
         for kind, hints in found.items()
@@ -276,7 +276,7 @@ def test_every_stored_quantity_names_its_unit():
 def test_units_refer_to_existing_fields_only():
     wrong = [
         f"{kind.__name__}.{name}"
-        for kind, hints in reached().items()
+        for kind, hints in reachable_kinds().items()
         for name in getattr(kind, "OWN_UNITS", {})
         if name not in hints and not isinstance(getattr(kind, name, None), property)
     ]
@@ -350,7 +350,7 @@ def test_rows_with_different_units_get_a_column_of_units():
 
 
 def test_every_result_with_arrays_can_be_converted_to_a_dataset():
-    found = {*results(), *wholes()}
+    found = {*results(), *composite_results()}
     assert len(found) > 25
     assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []
 

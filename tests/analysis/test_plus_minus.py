@@ -1,4 +1,4 @@
-"""A value is written to the places that its uncertainty has, and the uncertainty with two digits."""
+"""A value is rounded to the decimal places of its uncertainty, which has two digits."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Verdicts on motions whose nature is known, simulated and synthetic."""
+"""Motion verdicts on simulated and synthetic motions of known kind."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ QUIET = np.array([1e-5, 1e-5])
 
 
 def section(rng, period=1, scatter=0.0, count=1200):
-    """Give points that repeat after ``period``, with white scatter."""
+    """Return Poincaré points that repeat after ``period`` drive periods, with white scatter."""
     centres = rng.standard_normal((period, 2))
     return centres[np.arange(count) % period] + scatter * rng.standard_normal((count, 2))
 
@@ -32,7 +32,7 @@ def test_a_periodic_motion_with_sixty_decibels_of_noise_is_not_chaotic():
     rng = np.random.default_rng(1)
     points = section(rng, 1, 1e-3)
     stated = motion_verdict(Points(points, np.full(2, 1e-3)), DRIVE_HZ)
-    # Even where the noise is thought to be a hundredth of what it is.
+    # The stated noise is a hundredth of the true noise.
     hidden = motion_verdict(Points(30 * (points - points.mean(axis=0)), np.full(2, 3e-4)), DRIVE_HZ)
     assert stated.kind is MotionKind.PERIODIC
     assert hidden.kind is not MotionKind.CHAOTIC
@@ -68,7 +68,7 @@ def test_a_decaying_motion_is_undecided():
 
 @pytest.fixture(scope="module")
 def chaos():
-    """Give 3000 points of the Hénon map: chaotic, over the size of the orbit."""
+    """Return 3000 points of the chaotic Hénon map."""
     points = np.empty((3000, 2))
     x, y = 0.1, 0.3
     for each in points:
@@ -77,7 +77,7 @@ def chaos():
     return points
 
 
-def test_a_motion_after_transient_chaos_determines_the_verdict(chaos):
+def test_the_verdict_is_that_of_the_motion_after_transient_chaos(chaos):
     points = np.vstack((chaos[:900], np.full((2100, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 2100)
@@ -92,7 +92,7 @@ def test_a_periodic_motion_that_turns_chaotic_is_chaotic(chaos):
     assert found.evidence.periods == 2100, "the block in which it was lost is not judged"
 
 
-def test_a_settled_end_is_classified_without_its_longer_transient(chaos):
+def test_a_settled_motion_is_classified_without_its_longer_transient(chaos):
     points = np.vstack((chaos[:2100], np.full((900, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 900)
@@ -161,7 +161,7 @@ def test_verdicts_from_poincare_points_match_the_simulated_specimen(frequency_hz
 
 @pytest.mark.thorough
 def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
-    """The paper's dwell: some four windows of five are chaotic, in any realisation three or more."""
+    """At least 60 % of the windows of the paper's dwell are chaotic in every realisation."""
     window, skipped, count = 1300, 300, 36
     points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + count * window)[skipped:, :2]
     points = points / points.std(axis=0)
@@ -171,7 +171,7 @@ def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
 
 
 def duffing(periods, damping=0.3, force=0.5, turn=1.2, steps=60):
-    """Points and largest exponent per period of x'' + damping x' - x + x^3 = force cos(turn t)."""
+    """Poincaré points and largest exponent per period of x'' + damping x' - x + x^3 = force cos(turn t)."""
 
     def rate(t, motion):
         x, v, dx, dv = motion
@@ -200,7 +200,7 @@ def duffing(periods, damping=0.3, force=0.5, turn=1.2, steps=60):
 
 
 def known_exponent(name):
-    """Points of a chaotic motion, and its exponent per period."""
+    """Poincaré points of a chaotic motion, and its largest exponent per period."""
     if name == "duffing":
         return duffing(1500)
     if name == "henon":
@@ -219,7 +219,7 @@ def known_exponent(name):
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["duffing", pytest.param("henon", marks=pytest.mark.slow), "stops"])
 def test_the_exponent_estimated_from_points_is_a_lower_bound(name):
-    """Of the Duffing oscillator 83.9 +- 2.1 or, in more noise, 66.3 +- 2.3 per second was said for 142.5."""
+    """Estimates for the Duffing oscillator were 83.9 and, in more noise, 66.3 per second; 142.5 is true."""
     points, exponent = known_exponent(name)
     points = points / (np.sqrt(2) * points.std(axis=0))
     rng = np.random.default_rng(1)
@@ -240,15 +240,15 @@ def test_scattered_points_give_no_exponent():
 
 
 @pytest.mark.parametrize(("seed", "number"), [(4303, 0), (52, 42), (54, 42), (51, 36), (65, 30)])
-def test_a_decaying_transient_neither_repeats_late_nor_is_quasi_periodic(seed, number):
-    """The first was "every 22 drive periods", the last turned round a closed curve."""
+def test_a_decaying_transient_is_undecided_and_not_periodic_or_quasi_periodic(seed, number):
+    """The first case was once reported as period 22, the last one as quasi-periodic."""
     _, points = regular_points(number, seed)
     assert motion_verdict(points, DRIVE_HZ).kind is MotionKind.UNDECIDED
 
 
 @pytest.mark.parametrize("number", range(5))
 def test_noise_behind_a_static_nonlinearity_is_not_chaotic(number):
-    """Narrow-band noise through a cubic was chaotic in 6 of 6 cases, through x + x²/2 in 9 of 20."""
+    """Narrow-band noise through a cubic was called chaotic in 6 of 6 cases, through x + x²/2 in 9 of 20."""
     _, points = noise_points(number, seed=2)
     found = motion_verdict(points, DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED, found.why
@@ -262,7 +262,7 @@ def test_the_shortest_period_is_found_if_it_repeats_several_times():
 
 def test_noise_without_motion_is_not_periodic():
     rng = np.random.default_rng(11)
-    # The size of the orbit is that of the noise itself: 1 / sqrt(2) of sqrt(2) its root mean square.
+    # Points are scaled by sqrt(2) times their rms: noise alone has a standard deviation of 1 / sqrt(2).
     noise = np.full(2, np.sqrt(0.5))
     found = motion_verdict(Points(noise * rng.standard_normal((1500, 2)), noise), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
@@ -288,14 +288,14 @@ def test_a_motion_that_noise_could_hide_is_not_called_periodic():
         (np.zeros((500, 2)), QUIET, -260.0, "a drive frequency of -260.0 Hz is not allowed"),
     ],
 )
-def test_lost_points_are_refused(value, noise, drive_hz, said):
-    """One lost point among five hundred chaotic ones was "quasi-periodic"."""
+def test_invalid_poincare_points_noise_or_frequency_are_refused(value, noise, drive_hz, said):
+    """A chaotic section of 500 points with one lost point was once reported as quasi-periodic."""
     with pytest.raises(AnalysisError, match=said):
         motion_verdict(Points(value, noise), drive_hz)
 
 
 def test_a_period_that_leaves_most_of_the_scatter_is_not_reported():
-    """A slow transient of 0.3 % of the orbit was "every 10 periods", which left most of its scatter."""
+    """A slow transient of 0.3 % of the orbit was once reported as period 10."""
     place, rng = np.arange(700), np.random.default_rng(1)
     moved = 0.0032 * np.exp((0.201j * np.pi - 2e-4) * place)
     value = np.column_stack((0.7 + moved.real, moved.imag)) + 1e-5 * rng.standard_normal((700, 2))

@@ -1,4 +1,4 @@
-"""The single tests for chaos, against maps and flows whose exponents are known, and against noise."""
+"""Single tests for chaos on maps and flows of known exponent, and on noise."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ def test_neighbours_of_a_map_diverge_at_the_lyapunov_exponent(series, delays, ex
 def test_neighbours_of_a_flow_diverge_at_the_lyapunov_exponent(lorenz):
     points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
     found = divergence(points, steps=400, apart=100)
-    # 400 s of this flow have an exponent of their own, some per cent from that of all time.
+    # The exponent over 400 s differs from the limit value by some per cent.
     assert found.exponent / 0.01 == pytest.approx(0.9056, rel=0.08)
 
 
@@ -106,7 +106,7 @@ def test_the_surrogate_test_rejects_linear_noise_at_its_stated_rate():
         surrogate_test(autoregression(np.random.default_rng(seed), 400), seed=seed).rejects_linear_noise
         for seed in range(60)
     )
-    # Each has a chance of 1/40: more than 5 of 60 happen in 0.2 % of all cases.
+    # Each false rejection has probability 1/40: more than 5 in 60 have probability 0.2 %.
     assert rejected <= 5
 
 

@@ -1,4 +1,4 @@
-"""Curves of a mode in closed form: peaks, differences and readings are known."""
+"""Peaks, differences and values of curves, checked on a mode in closed form."""
 
 import re
 from dataclasses import replace
@@ -83,7 +83,7 @@ def test_a_downward_sweep_is_reversed():
 
 
 def test_an_exported_svg_places_a_known_point_at_its_coordinates(tmp_path):
-    """The corner of a curve of three points, measured against the ends of the same curve."""
+    """The middle point of a three-point curve lies at its expected position between the end points."""
     frequency_hz = np.array([100.0, 300.0, 900.0])
     curve = Curve(
         "corner",
@@ -100,7 +100,7 @@ def test_an_exported_svg_places_a_known_point_at_its_coordinates(tmp_path):
     (x0, y0), (x1, y1), (x2, y2) = [
         tuple(float(part) for part in point.split()[-2:]) for point in path.strip().split("\n")
     ]
-    # half of two triplings, and two decades up of which one comes down again; y grows downwards
+    # Log axes: 300 Hz is halfway from 100 to 900 Hz; the magnitude rises 2 decades, then falls 1.
     assert (x1 - x0) / (x2 - x0) == pytest.approx(0.5, abs=1e-3)
     assert (y0 - y1) / (y0 - y2) == pytest.approx(2.0, abs=1e-3)
     axes = drawn.figure.axes[0]
@@ -130,8 +130,8 @@ def test_an_uncertainty_band_reduced_to_few_columns_covers_the_whole_band():
     assert np.array_equal(whole.band(100)[1], whole.lower)
 
 
-def respond(frequency_hz, modes_hz, damping=0.005):
-    """Sum of single modes, as Response I of a curve without known spread."""
+def response_curve(frequency_hz, modes_hz, damping=0.005):
+    """Return a Response I curve of unknown spread: the sum of single modes."""
     magnitude = np.abs(
         sum(1 / (1 - (frequency_hz / f) ** 2 + 2j * damping * frequency_hz / f) for f in modes_hz)
     )
@@ -141,9 +141,9 @@ def respond(frequency_hz, modes_hz, damping=0.005):
 
 @pytest.mark.parametrize("depth", [0.15, 0.3, 0.5])
 def test_chaotic_scatter_gives_no_modes_beside_a_resonance(depth):
-    """A peak of a chaotic stretch at 231.79 Hz was listed with a damping of 0.781 %."""
+    """A peak at 231.79 Hz in a chaotic range was once listed as a mode with 0.781 % damping."""
     frequency_hz = np.arange(60.0, 400.0, 0.3)
-    smooth = respond(frequency_hz, (95.0,))
+    smooth = response_curve(frequency_hz, (95.0,))
     edge = 0.25 * (1 + np.tanh((frequency_hz - 200) / 5)) * (1 - np.tanh((frequency_hz - 290) / 5))
     others = []
     for seed in range(60):
@@ -162,14 +162,14 @@ def test_chaotic_scatter_gives_no_modes_beside_a_resonance(depth):
     [((95, 260, 268), 0.005), ((95, 266, 500), 0.03), ((100, 120, 140), 0.01), ((94, 264, 500), 0.002)],
 )
 def test_separate_modes_are_listed_as_peaks(modes_hz, damping):
-    found = curve_peaks(respond(np.arange(40.0, 700.0, 0.1), modes_hz, damping))
+    found = curve_peaks(response_curve(np.arange(40.0, 700.0, 0.1), modes_hz, damping))
     assert [each.frequency_hz for each in found] == pytest.approx(modes_hz, rel=0.01)
 
 
 def test_colour_marks_the_recording_and_dash_the_kind_of_curve():
     frequency_hz = np.arange(60.0, 400.0)
     curves = [
-        replace(respond(frequency_hz, (95.0,)), source=source, origin=origin, response=response)
+        replace(response_curve(frequency_hz, (95.0,)), source=source, origin=origin, response=response)
         for source in ("a", "b")
         for origin in (CurveOrigin.MEASURED, CurveOrigin.SIMULATED, CurveOrigin.PREDICTED)
         for response in (CurveKind.RESPONSE_I, CurveKind.RESPONSE_II)

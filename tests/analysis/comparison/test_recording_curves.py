@@ -16,12 +16,12 @@ from vibench.analysis.results.compared_recording import kept_result
 
 
 @pytest.fixture(scope="module")
-def compared(streamed_file):
+def comparison(streamed_file):
     return compare_recording(streamed_file(), FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
-def test_a_transmission_curve_keeps_its_bounds_between_processes(compared):
-    (curve,) = pickle.loads(pickle.dumps(compared)).curves
+def test_a_transmission_curve_keeps_its_bounds_between_processes(comparison):
+    (curve,) = pickle.loads(pickle.dumps(comparison)).curves
     assert (curve.origin, curve.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSIBILITY)
     assert np.median(curve.magnitude) == pytest.approx(2.0, rel=0.01)
     assert curve.name == "streamed, transmission, measured"
@@ -29,9 +29,9 @@ def test_a_transmission_curve_keeps_its_bounds_between_processes(compared):
     assert "drive" in curve.note
 
 
-def test_a_comparison_keeps_the_whole_result_for_reports(compared):
-    result, failures = kept_result(compared)
-    assert result.analysis.facts.name == compared.name == "streamed"
+def test_a_comparison_keeps_the_whole_result_for_reports(comparison):
+    result, failures = kept_result(comparison)
+    assert result.analysis.facts.name == comparison.name == "streamed"
     assert failures == ()
 
 

@@ -1,4 +1,4 @@
-"""Branches over recordings: the level that was recorded, the figure of a report, the command's `--like`."""
+"""Branches overlaid on recordings: recorded level, report figure and the option `--like`."""
 
 import json
 
@@ -20,19 +20,19 @@ from vibench.analysis.report._report import draw_branches
 from vibench.cli.__main__ import app
 
 
-def compared(path):
+def comparison(path):
     return compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
 @pytest.fixture(scope="module")
 def level(stepped_file):
-    """Base amplitude over frequency of the recorded steps."""
-    return level_of_drive(compared(stepped_file))
+    """Recorded base amplitude [m] over frequency [Hz]."""
+    return level_of_drive(comparison(stepped_file))
 
 
 @pytest.fixture(scope="module")
 def diagram(level):
-    """Branches under that level."""
+    """Branches computed for the recorded level."""
     low, high = level[0][0], level[-1][0]
     return diagram_of(BranchRequest(recorded_level=level, start=low, stop=high, places=2, starts=0))
 
@@ -49,7 +49,7 @@ def test_the_recorded_level_matches_every_frequency_step(level, stepped_file):
 def test_a_dwell_has_no_level_over_frequency(dwell_file):
     path = dwell_file()
     with pytest.raises(NotEnoughData, match=rf"^{path.name} has no level .* choose a stepped sine"):
-        level_of_drive(compared(path))
+        level_of_drive(comparison(path))
 
 
 def test_a_report_overlays_branches_and_states_level_differences(diagram, stepped_file, tmp_path):

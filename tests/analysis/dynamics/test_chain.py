@@ -1,4 +1,4 @@
-"""Chains as they are asked for: units, recorded drives, files, figures."""
+"""Chain requests: units, recorded drives, files and figures."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ pytestmark = pytest.mark.timeout(300)
 
 
 @pytest.fixture(scope="module")
-def swept():
-    """Three cells that strike."""
+def swept_chain():
+    """Swept response of a chain of three colliding cells."""
     return chain_answer(
         ChainRequest(
             lengths=(3,), drive="swept", start_hz=150.0, stop_hz=600.0, duration_s=3.0, amplitude_m=10e-6
@@ -24,8 +24,8 @@ def swept():
     )
 
 
-def test_a_swept_chain_reports_its_simulated_motion(swept):
-    (run,) = swept.runs
+def test_a_swept_chain_reports_its_simulated_motion(swept_chain):
+    (run,) = swept_chain.runs
     drive, chain = LinearSweep(150.0, 600.0, 3.0, 10e-6), chain_of(gong2025(), 3)
     alone = integrate_chain(chain, drive, 3.0, sample_rate_hz=20e3)
     np.testing.assert_array_equal(run.impacts, alone.impacts.per_cell)
@@ -36,11 +36,11 @@ def test_a_swept_chain_reports_its_simulated_motion(swept):
     assert np.all(run.energy_error_j > 0.0)
 
 
-def test_the_chain_figure_shades_band_gaps_and_tabulates_its_curves(swept):
-    drawn = chain_figure(swept)
+def test_the_chain_figure_shades_band_gaps_and_tabulates_its_curves(swept_chain):
+    drawn = chain_figure(swept_chain)
     waves, across, cells = drawn.tables
-    assert len(across.column("transmission")) == 3 * len(swept.runs[0].over_hz)
-    assert cells.column("impacts") == tuple(swept.runs[0].impacts)
+    assert len(across.column("transmission")) == 3 * len(swept_chain.runs[0].over_hz)
+    assert cells.column("impacts") == tuple(swept_chain.runs[0].impacts)
     assert max(waves.column("wave_number_rad")) == pytest.approx(np.pi)
     assert "96.07 to 110.4 Hz" in drawn.caption
     assert drawn.png.startswith(b"\x89PNG")

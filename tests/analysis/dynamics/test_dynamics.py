@@ -1,4 +1,4 @@
-"""Branches and spectra as they are asked for: refusals, files, curves, levels of recordings, figures."""
+"""Requests for branches and exponent spectra: refusals, files, curves, recorded levels, figures."""
 
 import json
 import math
@@ -56,7 +56,7 @@ def line(frequency_hz, size, multiplier, events=(), periods=1):
     ],
 )
 def test_an_empty_branch_diagram_is_explained_by_its_method(method, said):
-    """A balance finds none among stops that knock, where shooting finds motions; "none" alone was said."""
+    """Harmonic balance may find no motion where shooting does, so the sentence names the method."""
     none = BranchDiagram(BranchRequest(start=100.0, stop=120.0, method=method, harmonics=64), (), 1.0)
     assert none.cost_sentence.startswith(said)
 
@@ -71,8 +71,8 @@ DIAGRAM = BranchDiagram(BranchRequest(start=100.0, stop=120.0), (FOLDED,), 1.0)
 
 
 @pytest.fixture(scope="module")
-def computed():
-    """Real branches of the paper's specimen between 88 and 94 Hz."""
+def paper_diagram():
+    """Computed branches of the paper's specimen between 88 and 94 Hz."""
     return diagram_of(BranchRequest(start=88.0, stop=94.0, places=2, starts=2))
 
 
@@ -108,12 +108,12 @@ def test_a_range_includes_its_ends_if_the_step_fits():
 
 
 @pytest.mark.thorough
-def test_a_branch_file_round_trips_and_is_never_overwritten(computed, tmp_path):
-    path = write_diagram(computed, tmp_path / "b.h5")
+def test_a_branch_file_round_trips_and_is_never_overwritten(paper_diagram, tmp_path):
+    path = write_diagram(paper_diagram, tmp_path / "b.h5")
     again = read_diagram(path)
-    assert again.request == computed.request
-    assert again.elapsed_s == computed.elapsed_s
-    for mine, theirs in zip(computed.lines, again.lines, strict=True):
+    assert again.request == paper_diagram.request
+    assert again.elapsed_s == paper_diagram.elapsed_s
+    for mine, theirs in zip(paper_diagram.lines, again.lines, strict=True):
         for each in fields(BranchLine):
             np.testing.assert_array_equal(getattr(mine, each.name), getattr(theirs, each.name))
     with h5py.File(path) as file:
@@ -121,7 +121,7 @@ def test_a_branch_file_round_trips_and_is_never_overwritten(computed, tmp_path):
         assert json.loads(file.attrs["request"])["amplitude_m"] == 5e-6
     before = path.read_bytes()
     with pytest.raises(InvalidRequest, match="ever overwritten"):
-        write_diagram(computed, path)
+        write_diagram(paper_diagram, path)
     assert path.read_bytes() == before
 
 
@@ -138,9 +138,9 @@ def test_a_file_without_branches_is_refused(tmp_path):
         read_diagram(tmp_path)
 
 
-def test_the_json_document_contains_every_branch_point(computed):
-    found = json.loads(json.dumps(computed.to_dict(), allow_nan=False))
-    assert sum(len(each["points"]) for each in found["branches"]) == computed.points
+def test_the_json_document_contains_every_branch_point(paper_diagram):
+    found = json.loads(json.dumps(paper_diagram.to_dict(), allow_nan=False))
+    assert sum(len(each["points"]) for each in found["branches"]) == paper_diagram.points
     point = found["branches"][0]["points"][0]
     assert point["is_stable"] is (point["largest_multiplier"] < 1.0)
     assert {event["kind"] for event in found["branches"][0]["events"]} >= {"grazing", "symmetry breaking"}
@@ -195,7 +195,7 @@ def test_holdable_motions_are_reported_in_figure_text_table_and_json():
     growth_s = FOLDED.growth_time_s
     assert np.isinf(growth_s[:3]).all()
     assert growth_s[3:] == pytest.approx([1 / (115.0 * math.log(1.2)), 1 / (105.0 * math.log(1.5))])
-    # Between the two unstable motions: the slower one can be held, the quicker one cannot.
+    # The loop is fast enough for the slower of the two unstable motions only.
     loop_s = 0.1 * math.sqrt(growth_s[3] * growth_s[4])
     diagram = BranchDiagram(BranchRequest(start=100.0, stop=120.0, loop_time_s=loop_s), (FOLDED,), 1.0)
     assert diagram.holdable[0].tolist() == [True, True, True, True, False]

@@ -1,4 +1,4 @@
-"""The caption of a map: what tells its figure from that of another specimen, law or start."""
+"""The caption of a map names specimen, contact law and start."""
 
 from types import SimpleNamespace
 
@@ -33,7 +33,7 @@ OWN = {"name": "mine", "masses_kg": (5.8e-3, 2.1e-3, 2.2e-3)}
     ],
 )
 def test_a_caption_names_every_changed_specimen_value(said, words):
-    # So small a drive touches nothing: nothing is followed.
+    # The drive is too small for contact, so nothing is integrated.
     levels = Range(start=1e-9, stop=2e-9, points=2)
     plan = Map.model_validate({"amplitude_m": levels, "periods": 100, "window_periods": 10, **said})
     assert map_caption(solve_map(plan, workers=1)).startswith(words)

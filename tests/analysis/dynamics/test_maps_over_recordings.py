@@ -1,4 +1,4 @@
-"""Maps under recordings: the recorded level as a line, with what was measured in the map's colours."""
+"""Recordings overlaid on maps: the recorded level as a line, measured responses in the map's colours."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from vibench.sim.maps import Map, Range, solve_map
 
 @pytest.fixture(scope="module")
 def small_map(stepped_file):
-    """A map around the level that was recorded; without contact, so that nothing is followed."""
+    """Map around the recorded level, of the linear specimen so that it needs no integration."""
     level = np.array(recorded_response(stepped_file).pairs)
     low, high = level[:, 0].min(), level[:, 0].max()
     return solve_map(

@@ -1,4 +1,4 @@
-"""A small recording whose every value is known: two channels, a hole, two segments."""
+"""A small recording of known values: two channels, one gap, two segments."""
 
 import json
 
@@ -19,7 +19,7 @@ def counts(channel):
 
 
 def values(channel):
-    """What the recording must read: counts times the converter's step times the sensor's scale."""
+    """Expected values: counts times the converter's step times the sensor's scale, NaN in the gap."""
     found = counts(channel) * STEP_V * (1.0, 0.125)[channel]
     found[slice(*HOLE)] = np.nan
     return found

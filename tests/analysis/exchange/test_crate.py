@@ -1,4 +1,4 @@
-"""Packed folders pass a validator of others, hold every byte, and leave the folder as it was."""
+"""RO-Crates of folders are complete, described correctly and leave the folder unchanged."""
 
 import hashlib
 import json
@@ -30,15 +30,15 @@ def crate(folder, tmp_path):
     return tmp_path / "crate.zip"
 
 
-def described(crate):
-    """Give the entities of a crate by their names."""
+def entities(crate):
+    """Return the entities of a crate by their names."""
     with ZipFile(crate) as archive:
         graph = json.loads(archive.read("ro-crate-metadata.json"))["@graph"]
     return {each["@id"]: each for each in graph}
 
 
 def test_every_file_of_a_folder_is_packed_unchanged_and_described(folder, crate):
-    graph = described(crate)
+    graph = entities(crate)
     with ZipFile(crate) as archive:
         for name in ("known.h5", "report/table.csv", "broken.h5"):
             assert archive.read(name) == (folder / name).read_bytes()
@@ -51,7 +51,7 @@ def test_every_file_of_a_folder_is_packed_unchanged_and_described(folder, crate)
 
 
 def test_links_out_of_the_folder_are_not_published(folder, tmp_path):
-    """In a folder that was received, it may be a private key of whoever packs it."""
+    """A link in a received folder may point to a private key of the person who packs it."""
     (tmp_path / "private").write_text("a key")
     (folder / "notes.txt").symlink_to(tmp_path / "private")
     with pytest.raises(InvalidRequest, match="outside of the folder"):
@@ -94,12 +94,12 @@ def test_an_invalid_deposit_is_refused(folder, tmp_path):
 )
 def test_licences_may_be_given_by_common_names(folder, tmp_path, address, name):
     pack_folder(folder, tmp_path / "crate.zip", CrateFacts(address), {})
-    assert described(tmp_path / "crate.zip")[address]["name"] == name
+    assert entities(tmp_path / "crate.zip")[address]["name"] == name
 
 
 def test_a_crate_names_the_organisation_as_publisher_and_affiliation(folder, tmp_path):
     pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE, ("A", "B"), organisation="Institute"), {})
-    graph = described(tmp_path / "crate.zip")
+    graph = entities(tmp_path / "crate.zip")
     assert graph["./"]["publisher"] == {"@id": "#organisation"}
     assert graph["#organisation"] == {"@id": "#organisation", "@type": "Organization", "name": "Institute"}
     assert [graph[f"#author-{number}"]["affiliation"]["@id"] for number in (1, 2)] == ["#organisation"] * 2

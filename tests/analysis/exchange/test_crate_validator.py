@@ -1,8 +1,7 @@
-"""A packed folder passes the validator of the RO-Crate community, run in an environment of its own.
+"""A packed folder passes the validator of the RO-Crate community, which runs in a separate environment.
 
-The validator (roc-validator) wants older versions of libraries that we have too. It reads the meaning of
-terms from an address on the web; here from the file that another library of the same people brings, which
-is put in the validator's cache of pages.
+roc-validator needs older versions of some of our libraries. It looks up the meaning of terms on the web;
+here its page cache is filled from a file of another library of the same authors.
 """
 
 import os
@@ -47,7 +46,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def validate(tmp_path_factory):
-    """Run the validator on a crate, offline; gives its exit code and what it printed."""
+    """Return a function that runs the validator offline and returns its exit code and output."""
     folder = tmp_path_factory.mktemp("validator")
     venv.create(folder, with_pip=False)
     programs = Path(sysconfig.get_path("scripts", "venv", {"base": str(folder), "platbase": str(folder)}))
@@ -70,7 +69,7 @@ def validate(tmp_path_factory):
 
 @pytest.fixture
 def folder(known_file, tmp_path):
-    """Make a folder like a campaign's: a recording, a report, one that cannot be read, one with a space."""
+    """Make a campaign folder: a recording, a report, an unreadable file and a name with spaces."""
     made = tmp_path / "a campaign"
     (made / "report").mkdir(parents=True)
     (made / "known.h5").write_bytes(Path(known_file).read_bytes())
@@ -101,7 +100,7 @@ def test_a_crate_without_authors_meets_the_requirements_of_the_standard(validate
 
 
 def test_the_validator_refuses_a_crate_without_a_licence(validate, folder, tmp_path):
-    """So that it is known to look."""
+    """This shows that the validator checks the contents."""
     pack_folder(folder, tmp_path / "crate.zip", CrateFacts("https://example.org/our-licence"), {})
     with ZipFile(tmp_path / "crate.zip") as whole, ZipFile(tmp_path / "worse.zip", "w") as worse:
         for name in whole.namelist():

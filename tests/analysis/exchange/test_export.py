@@ -1,4 +1,4 @@
-"""What other programs read from an exported recording is what was recorded."""
+"""Other programs read the recorded values from an exported recording."""
 
 import csv
 import json
@@ -201,7 +201,7 @@ def test_a_growing_recording_is_exported_up_to_its_committed_samples(tmp_path):
     with create_recording(tmp_path / "grows.h5", header) as writer:
         writer.append(Block(0, np.linspace(-1.0, 1.0, 2000)[np.newaxis]))
         while writer.committed_samples < 2000:
-            pass  # half a second at most
+            pass  # takes half a second at most
         with open_recording(tmp_path / "grows.h5.part") as recording:
             path, _ = export_samples(excerpt(recording), Format.CSV, tmp_path / "a.csv")
     table = np.loadtxt(path, delimiter=",", skiprows=1)

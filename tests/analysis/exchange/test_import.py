@@ -1,4 +1,4 @@
-"""Other people's files become recordings that say and give what the files did."""
+"""Files of other programs become recordings with the same values and metadata."""
 
 import hashlib
 import io
@@ -54,7 +54,7 @@ def signals():
     return noise * np.array([[0.3], [2e-3]])
 
 
-def imported(path, meaning, out=None):
+def read_import(path, meaning, out=None):
     with open_recording(import_recording(path, meaning, out or path.parent / "made.h5")) as recording:
         values = [recording.read(role) for role in recording.roles]
         return recording, np.stack(values)
@@ -69,7 +69,7 @@ def test_columns_of_a_table_in_hdf5_become_channels(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["run/data"] = signals().T
     meaning = mapping(tmp_path, ("/run/data#1", "drive_voltage", ""), ("/run/data#2", "m0_velocity", ""))
-    recording, values = imported(tmp_path / "a.h5", meaning)
+    recording, values = read_import(tmp_path / "a.h5", meaning)
     assert_same(values, signals())
     assert recording.state is RecordingState.COMPLETE
     assert recording.sample_rate_hz == RATE_HZ
@@ -80,7 +80,7 @@ def test_columns_of_a_table_in_hdf5_become_channels(tmp_path):
 def test_rows_of_a_matlab_matrix_become_channels(tmp_path):
     with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         file["v"] = signals()[:1]
-    _, values = imported(tmp_path / "a.mat", mapping(tmp_path, ("v", "m0_velocity", "")))
+    _, values = read_import(tmp_path / "a.mat", mapping(tmp_path, ("v", "m0_velocity", "")))
     assert_same(values, signals()[:1])
 
 
@@ -90,7 +90,7 @@ def test_scales_of_file_and_mapping_multiply_and_integers_stay_exact(tmp_path):
         file["acc"] = counts
         file["acc"].attrs["scale_factor"] = 1e-6
     meaning = mapping(tmp_path, ("acc", "base_acceleration", "scale = 9.80665"))
-    recording, values = imported(tmp_path / "a.h5", meaning)
+    recording, values = read_import(tmp_path / "a.h5", meaning)
     np.testing.assert_allclose(values[0], counts * 1e-6 * 9.80665, rtol=1e-12)
     with open_recording(recording.path) as again:
         np.testing.assert_array_equal(again.read_counts("base_acceleration"), counts)
@@ -108,7 +108,7 @@ def test_a_file_in_volts_is_scaled_by_the_sensitivity_of_the_sensor(tmp_path):
         ("vib", "m0_velocity", 'scale = "250 mm/s/V"'),
         ("acc", "force", 'quantity = "force"\nunit = "N"\nscale = "50 mV/N"'),
     ]
-    _, values = imported(tmp_path / "a.h5", mapping(tmp_path, *channels))
+    _, values = read_import(tmp_path / "a.h5", mapping(tmp_path, *channels))
     assert_same(values, [98.0665 * volts[0], 0.25 * volts[1], 20.0 * volts[0]])
     scaled = mapping(tmp_path, ("other", "base_acceleration", 'scale = "100 mV/g"'))
     with pytest.raises(InvalidRequest, match=r"acceleration is in 'm s-2'.* for a file in volts"):
@@ -122,7 +122,7 @@ def test_non_finite_values_are_imported_as_lost_samples(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["a"], file["b"] = wanted
     meaning = mapping(tmp_path, ("a", "drive_voltage", ""), ("b", "m0_velocity", ""))
-    recording, values = imported(tmp_path / "a.h5", meaning)
+    recording, values = read_import(tmp_path / "a.h5", meaning)
     assert [(each.first_sample, each.last_sample) for each in recording.gaps] == [(10, 10), (55_000, 55_002)]
     expected = np.where(np.isfinite(wanted).all(axis=0), wanted, np.nan)
     assert_same(values, expected)
@@ -155,9 +155,9 @@ def test_a_unit_in_the_file_sets_the_scale_or_is_refused_if_unsuitable(tmp_path,
     meaning = mapping(tmp_path, ("u", "drive_voltage", ""), ("v", "m0_velocity", more))
     if isinstance(factor, str):
         with pytest.raises(InvalidRequest, match=factor):
-            imported(tmp_path / "a.h5", meaning)
+            read_import(tmp_path / "a.h5", meaning)
         return
-    _, values = imported(tmp_path / "a.h5", meaning)
+    _, values = read_import(tmp_path / "a.h5", meaning)
     assert_same(values, [signals()[0], factor * signals()[1]])
 
 
@@ -181,7 +181,7 @@ def test_a_tdms_file_is_imported_with_rate_and_values(tmp_path):
     meaning = mapping(
         tmp_path, ("Base", "drive_voltage", ""), ("Measured/Laser", "m0_velocity", "scale = 1.0"), head=head
     )
-    recording, values = imported(tmp_path / "a.tdms", meaning)
+    recording, values = read_import(tmp_path / "a.tdms", meaning)
     assert recording.sample_rate_hz == pytest.approx(RATE_HZ, rel=1e-12)
     assert_same(values, signals())
 
@@ -192,7 +192,7 @@ def test_wav_samples_are_fractions_of_full_scale(tmp_path, dtype, full):
     stored = (fractions * full).astype(dtype)
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), np.stack((stored, -stored), axis=1))
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 10.0"), ("2", "m0_velocity", "scale = 1.0"))
-    _, values = imported(tmp_path / "a.wav", meaning)
+    _, values = read_import(tmp_path / "a.wav", meaning)
     exact = stored.astype(float) / full
     np.testing.assert_allclose(values, np.stack((10 * exact, -exact)), rtol=0, atol=1e-8)
 
@@ -202,7 +202,7 @@ def test_wav_of_24_bits_keeps_every_bit(tmp_path):
     with wave.open(str(tmp_path / "a.wav"), "wb") as file:
         file.setparams((1, 3, int(RATE_HZ), 0, "NONE", ""))
         file.writeframes(counts.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3].tobytes())
-    _, values = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0")))
+    _, values = read_import(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0")))
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
 
 
@@ -215,10 +215,10 @@ def test_more_bits_than_a_wav_file_states_are_refused(tmp_path):
         body = b"WAVEfmt " + struct.pack("<I", len(form)) + form
         body += b"data" + struct.pack("<I", 4 * SAMPLES) + stored.astype("<i4").tobytes()
         (tmp_path / f"{name}.wav").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
-    _, values = imported(tmp_path / "left.wav", meaning)
+    _, values = read_import(tmp_path / "left.wav", meaning)
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
     with pytest.raises(UnusableData, match="states 24 bits per sample, but its samples have more"):
-        imported(tmp_path / "right.wav", meaning)
+        read_import(tmp_path / "right.wav", meaning)
 
 
 @pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 2), (2, SAMPLES)])
@@ -232,7 +232,7 @@ def test_hdf5_chunks_that_were_never_written_are_lost_samples(tmp_path, shape):
             where = tuple(part if each == axis else slice(None) for each in range(len(shape)))
             dataset[where] = signal[part, None] if len(shape) == 2 and axis == 0 else signal[part]
     name = "a" if len(shape) == 1 else "a#2"
-    recording, _ = imported(tmp_path / "a.h5", mapping(tmp_path, (name, "m0_velocity", "")))
+    recording, _ = read_import(tmp_path / "a.h5", mapping(tmp_path, (name, "m0_velocity", "")))
     assert [(each.first_sample, each.last_sample) for each in recording.gaps] == [(20_000, 24_999)]
 
 
@@ -242,7 +242,7 @@ def test_samples_near_a_stated_full_scale_are_overloads(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["a"] = wanted[0]
     meaning = mapping(tmp_path, ("a", "m0_velocity", "full_scale = 1.0"))
-    recording, _ = imported(tmp_path / "a.h5", meaning)
+    recording, _ = read_import(tmp_path / "a.h5", meaning)
     assert [(each.first_sample, each.last_sample) for each in recording.overloads] == [(100, 102)]
 
 
@@ -274,7 +274,7 @@ def test_universal_files_written_by_pyuff_are_read(tmp_path, binary, single):
         file.write_sets([each], "add", force_double=not single)
     head = DWELL.replace("settle_s = 1,", "settle_s = 0,")
     meaning = mapping(tmp_path, ("point 1", "drive_voltage", ""), ("2", "m0_velocity", ""), head=head)
-    _, values = imported(tmp_path / "a.uff", meaning)
+    _, values = read_import(tmp_path / "a.uff", meaning)
     digits = 1e-5 if single else 1e-10
     np.testing.assert_allclose(values, wanted, rtol=digits, atol=2 * np.abs(wanted).max() * ROUNDING)
 
@@ -302,7 +302,7 @@ def test_trailing_bytes_after_binary_samples_are_ignored(known, known_values, tm
     path.write_bytes(head + b"".join(b"    -1\n    58b" + each + ending.encode() for each in kept))
     head = DWELL.replace("8000.0", "51200.0").replace("settle_s = 1,", "settle_s = 0,")
     meaning = mapping(tmp_path, ("m0_velocity", "m0_velocity", ""), head=head)
-    _, values = imported(path, meaning)
+    _, values = read_import(path, meaning)
     assert_same(values, [known_values["m0_velocity"][:51_200]])
 
 
@@ -397,7 +397,7 @@ def test_export_and_import_use_bounded_memory(tmp_path):
 
 def test_an_imported_recording_names_its_source(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
-    recording, _ = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", 'serial = "V-7"')))
+    recording, _ = read_import(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", 'serial = "V-7"')))
     said = recording.bench["imported"]
     digest = hashlib.sha256((tmp_path / "a.wav").read_bytes()).hexdigest()
     assert (said["file"], said["sha256"]) == ("a.wav", digest)
@@ -467,10 +467,10 @@ def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading,
     (tmp_path / "a.csv").write_text(f"{heading};v\n" + "".join(rows), encoding="utf-8")
     meaning = mapping(tmp_path, ("v", "m0_velocity", ""))
     if rate_hz == RATE_HZ:
-        assert imported(tmp_path / "a.csv", meaning)[0].sample_rate_hz == RATE_HZ
+        assert read_import(tmp_path / "a.csv", meaning)[0].sample_rate_hz == RATE_HZ
         return
     with pytest.raises(InvalidRequest, match=r"a\.csv states .* samples/s, but the mapping 8000; correct"):
-        imported(tmp_path / "a.csv", meaning)
+        read_import(tmp_path / "a.csv", meaning)
     assert not (tmp_path / "made.h5").exists()
 
 
@@ -500,10 +500,10 @@ def test_a_rate_that_contradicts_a_universal_file_is_refused(known, tmp_path, in
         tmp_path, ("1", "m0_velocity", ""), head=DWELL.replace("settle_s = 1,", "settle_s = 0,")
     )
     if said is None:
-        assert imported(path, meaning)[0].sample_rate_hz == RATE_HZ
+        assert read_import(path, meaning)[0].sample_rate_hz == RATE_HZ
         return
     with pytest.raises(InvalidRequest, match=said):
-        imported(path, meaning)
+        read_import(path, meaning)
 
 
 @pytest.mark.parametrize("to", [Format.UFF, Format.MAT, Format.CSV])
@@ -513,7 +513,7 @@ def test_a_rate_that_contradicts_a_vibench_export_is_refused(known, tmp_path, to
     for each in (path, known.path):
         meaning = mapping(tmp_path, (source if each is path else "/m0_velocity", "m0_velocity", ""))
         with pytest.raises(InvalidRequest, match=r"states .* samples/s, but the mapping 8000"):
-            imported(each, meaning, tmp_path / "made.h5")
+            read_import(each, meaning, tmp_path / "made.h5")
 
 
 def wav_bytes(width, kept=None, samples=100):
@@ -525,7 +525,7 @@ def wav_bytes(width, kept=None, samples=100):
 
 
 def uff_bytes(known, old=b"", new=b"", kept=None):
-    """One channel as a universal file, spoiled in one place or cut off."""
+    """Return one channel as a universal file, with one text replaced or truncated."""
     with tempfile.TemporaryDirectory() as folder:
         path, _ = export_samples(
             excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, Path(folder, "a.uff")
@@ -599,7 +599,7 @@ def test_an_unknown_unit_in_a_heading_is_not_taken_as_si(tmp_path, heading):
     with pytest.raises(
         InvalidRequest, match=r"m0_velocity is in '.*' in the file, but the recording needs 'm s-1'"
     ):
-        imported(tmp_path / "a.csv", mapping(tmp_path, ("2", "m0_velocity", "")))
+        read_import(tmp_path / "a.csv", mapping(tmp_path, ("2", "m0_velocity", "")))
 
 
 @pytest.mark.parametrize("encoding", ["cp037", "utf-16-le"])
@@ -624,7 +624,7 @@ def test_a_csv_heading_may_be_in_any_common_encoding(tmp_path, encoding):
         assert (column.label, column.unit, column.sample_rate_hz) == ("Fu\u00dfpunkt", "\u00b5m", 2.0)
         assert source.read(column, 0, 3).tolist() == [1.5, -2.0, 3.0]
     with pytest.raises(InvalidRequest, match=r"no channel 'x'; it has '1' \(Zeit\), '2' \(Fu\u00dfpunkt\)"):
-        imported(tmp_path / "a.csv", mapping(tmp_path, ("x", "m0_velocity", "")))
+        read_import(tmp_path / "a.csv", mapping(tmp_path, ("x", "m0_velocity", "")))
 
 
 @pytest.mark.parametrize(
@@ -713,7 +713,7 @@ def test_sensors_on_m0_need_no_unit_in_the_mapping(tmp_path, role, unit):
 def test_one_channel_of_a_file_can_be_imported_as_two_channels(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))
-    _, values = imported(tmp_path / "a.wav", meaning)
+    _, values = read_import(tmp_path / "a.wav", meaning)
     np.testing.assert_array_equal(values[0], 2.0 * values[1])
 
 
@@ -726,7 +726,7 @@ def test_matlab_and_text_exports_can_be_imported(known, known_values, tmp_path, 
         if to is Format.CSV
         else [(f"{role}.values", role, "") for role in known.roles]
     )
-    _, values = imported(path, mapping(tmp_path, *channels, head=head))
+    _, values = read_import(path, mapping(tmp_path, *channels, head=head))
     wanted = np.stack([known_values[role][:51_200] for role in known.roles])
     np.testing.assert_allclose(values, wanted, rtol=1e-9, atol=1e-8)
 
@@ -741,7 +741,7 @@ def test_matrices_and_fields_of_matlab_5_become_channels(tmp_path):
             "table#2": "",
         }
     meaning = mapping(tmp_path, ("data", "drive_voltage", ""), ("table#2", "m0_velocity", ""))
-    _, values = imported(tmp_path / "a.mat", meaning)
+    _, values = read_import(tmp_path / "a.mat", meaning)
     assert_same(values, signals())
 
 
@@ -764,8 +764,8 @@ def test_common_formats_of_text_columns_are_read(tmp_path, text, label, rate_hz)
     assert column.sample_rate_hz == (None if rate_hz is None else pytest.approx(rate_hz))
 
 
-def spoiled(raw, dice):
-    """Change a few bytes, mostly of the head, and sometimes lose the end."""
+def corrupt(raw, dice):
+    """Change a few bytes, mostly of the header, and sometimes truncate the file."""
     found = bytearray(raw[: dice.randrange(len(raw))] if dice.random() < 0.3 else raw)
     for _ in range(dice.randrange(1, 6)):
         if found:
@@ -798,7 +798,7 @@ def test_a_corrupted_file_never_crashes_the_import(known, tmp_path, suffix):
     raw, dice = path.read_bytes(), random.Random(7)
     refused = 0
     for _ in range(80):
-        path.write_bytes(spoiled(raw, dice))
+        path.write_bytes(corrupt(raw, dice))
         try:
             with opened_source(path) as source:
                 for channel in source.channels:
@@ -812,7 +812,7 @@ def test_a_corrupted_file_never_crashes_the_import(known, tmp_path, suffix):
 def test_a_universal_file_keeps_the_mark_of_simulated_samples(known, tmp_path, said, found):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head = said + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("settle_s = 1,", "settle_s = 0,")
-    recording, _ = imported(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head))
+    recording, _ = read_import(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head))
     assert recording.origin.value == found
 
 

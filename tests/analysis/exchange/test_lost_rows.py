@@ -36,7 +36,7 @@ def kept_rows(kind, share, rng, samples=SAMPLES):
 
 
 def csv_file(path, times, places, rate_hz, unit="ms", frequency_hz=150.0):
-    """Write a dwell with base acceleration in g and velocity in mm/s, as other programs do."""
+    """Write a dwell as a table with base acceleration in g and m0 velocity in mm/s."""
     phase = 2 * np.pi * frequency_hz * places / rate_hz
     columns = (np.cos(phase), 0.3 * np.cos(phase + 0.4), 20.0 * np.cos(phase + 1.0))
     rows = zip(times, *columns, strict=True)
@@ -58,8 +58,8 @@ def meaning(rate_hz=None, **more):
     return validated(content, ImportMapping, "test")
 
 
-def shown(places, rate_hz, form):
-    """Return times as text, and their unit."""
+def formatted_times(places, rate_hz, form):
+    """Return the times in one format, and their unit."""
     match form:
         case "0.1 ms":
             return [f"{1e3 * each / rate_hz:.1f}" for each in places], "ms"
@@ -82,7 +82,7 @@ def test_every_missing_row_is_counted_as_lost(tmp_path, kind, share, seed):
     rng = np.random.default_rng([seed, round(100 * share), len(kind)])
     rate_hz, form = FORMS[rng.integers(len(FORMS))]
     places = kept_rows(kind, min(share, 0.3) if kind == "every third" else share, rng)
-    times, unit = shown(places, rate_hz, form)
+    times, unit = formatted_times(places, rate_hz, form)
     path = csv_file(tmp_path / "mine.csv", times, places, rate_hz, unit)
     with opened_source(path) as source:
         rates_hz = {sum(each.rates_hz) / 2 for each in source.channels if each.label == "base"}
@@ -111,9 +111,9 @@ def test_missing_rows_of_an_hdf5_file_with_float32_times_are_counted(tmp_path, s
 
 
 def test_a_rate_inferred_from_many_missing_rows_must_be_confirmed(tmp_path):
-    """Rounded times of another rate, with missing rows, have the same intervals."""
+    """Rounded times at another sampling rate with missing rows have the same intervals."""
     places = kept_rows("single", 0.2, np.random.default_rng(4))
-    path = csv_file(tmp_path / "mine.csv", *shown(places, 10_000.0, "0.1 ms")[:1], places, 10_000.0)
+    path = csv_file(tmp_path / "mine.csv", *formatted_times(places, 10_000.0, "0.1 ms")[:1], places, 10_000.0)
     with pytest.raises(InvalidRequest, match=r"its times give about 10000\); give sample_rate_hz"):
         import_recording(path, meaning(), tmp_path / "a.h5")
     with pytest.raises(InvalidRequest, match="about 10000 samples/s, but the mapping 8000") as refused:
@@ -121,7 +121,7 @@ def test_a_rate_inferred_from_many_missing_rows_must_be_confirmed(tmp_path):
     assert "even" not in str(refused.value)
 
 
-def uneven(fault, rng):
+def uneven_times(fault, rng):
     places = kept_rows("single", 0.1, rng)
     match fault:
         case "jitter":
@@ -140,7 +140,7 @@ def uneven(fault, rng):
     "fault", ["jitter", "drift", "steps of any length", "1.2 digits", "1.96 digits", "2.5 digits"]
 )
 def test_uneven_and_coarse_times_with_missing_rows_are_refused(tmp_path, fault, seed):
-    places = uneven(fault, np.random.default_rng(seed))
+    places = uneven_times(fault, np.random.default_rng(seed))
     digits = float(fault.split()[0]) if "digits" in fault else 1.0
     times = [f"{0.1 * each:.7g}" for each in places]
     path = csv_file(tmp_path / "mine.csv", times, places, 10_000.0)
@@ -152,7 +152,7 @@ def test_uneven_and_coarse_times_with_missing_rows_are_refused(tmp_path, fault, 
 
 
 def test_a_refusal_names_the_channel_by_its_heading(tmp_path):
-    places = uneven("jitter", np.random.default_rng(7))
+    places = uneven_times("jitter", np.random.default_rng(7))
     path = csv_file(tmp_path / "mine.csv", 0.1 * places, places, 10_000.0)
     with pytest.raises(InvalidRequest, match=re.escape("(channel '2' (drive))")):
         import_recording(path, meaning(10_000.0), tmp_path / "a.h5")
@@ -161,7 +161,7 @@ def test_a_refusal_names_the_channel_by_its_heading(tmp_path):
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.1])
 def test_replaced_times_that_show_lost_samples_are_reported(tmp_path, share):
     places = kept_rows("single", share, np.random.default_rng(8), DWELL_SAMPLES)
-    path = csv_file(tmp_path / "mine.csv", shown(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
+    path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     made = import_recording(path, meaning(10_000.0, time="even"), tmp_path / "a.h5")
     with open_recording(made) as recording:
         (check,) = (each for each in analyse(recording).checks if each.what == "Time of the imported file")
@@ -169,9 +169,9 @@ def test_replaced_times_that_show_lost_samples_are_reported(tmp_path, share):
     assert ("frequencies and amplitudes are wrong" in check.text) == (share > 0)
 
 
-def test_a_dwell_with_missing_rows_names_the_way_out_and_a_part_without_them_is_analysed(tmp_path):
+def test_a_dwell_with_missing_rows_is_refused_and_a_complete_part_is_analysed(tmp_path):
     places = np.delete(np.arange(DWELL_SAMPLES), 16_500)
-    path = csv_file(tmp_path / "mine.csv", shown(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
+    path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     with (
         open_recording(import_recording(path, meaning(10_000.0), tmp_path / "a.h5")) as recording,
         pytest.raises(UnusableData, match="import a part of the file without lost samples"),
@@ -184,7 +184,7 @@ def test_a_dwell_with_missing_rows_names_the_way_out_and_a_part_without_them_is_
 
 def test_more_gaps_than_a_recording_stores_are_refused_without_leftovers(tmp_path):
     places = np.flatnonzero(np.arange(200_000) % 23 != np.arange(200_000) // 23 % 20)
-    path = csv_file(tmp_path / "mine.csv", shown(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
+    path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     with pytest.raises(InvalidRequest, match="missing in more than 4096 places of the file"):
         import_recording(path, meaning(10_000.0), tmp_path / "a.h5")
     assert [each.name for each in tmp_path.iterdir()] == ["mine.csv"]

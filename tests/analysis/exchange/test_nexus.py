@@ -1,4 +1,4 @@
-"""NeXus files: laid out as the standard says, and plotted with labels by a program of others."""
+"""NeXus files follow the standard and are plotted with labels by silx."""
 
 import h5py
 import numpy as np
@@ -17,7 +17,7 @@ def nexus(known, tmp_path):
 
 
 def data_faults(group, path):
-    """Hold an NXdata group against its definition, and against what its readers need."""
+    """Yield the deviations of an NXdata group from its definition and from the needs of its readers."""
     signal, axes = group.attrs["signal"], list(group.attrs["axes"])
     if signal not in group or len(axes) != group[signal].ndim:
         yield f"{path}: signal and axes do not belong together"
@@ -34,7 +34,7 @@ def data_faults(group, path):
 
 
 def faults(group, path="/"):
-    """Hold a file against what the definitions of NXroot, NXentry and NXdata require."""
+    """Yield the deviations of a file from the definitions of NXroot, NXentry and NXdata."""
     kind = group.attrs.get("NX_class")
     if kind not in NEXUS_TYPES:
         yield f"{path}: class {kind}"

@@ -1,4 +1,4 @@
-"""What programs that know nothing of vibench find in a recording."""
+"""Programs without vibench read a recording with names, units and axes."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Where a plan's parts lie in a file."""
+"""Positions of the parts of a plan in an imported file."""
 
 import pytest
 
@@ -27,7 +27,7 @@ SWEEP = {
 }
 
 
-def mapped(excitation, **more):
+def mapping_of(excitation, **more):
     content = {
         "started_utc": "2026-03-01T12:00:00Z",
         "measurement": {"name": "m", "excitation": excitation},
@@ -42,27 +42,27 @@ def ranges(parts):
 
 
 def test_placed_realisations_alternate_with_settling_times():
-    parts = place_parts(mapped(NOISE, begins_s=0.5), 1000.0, 10_000)
+    parts = place_parts(mapping_of(NOISE, begins_s=0.5), 1000.0, 10_000)
     assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]
 
 
 def test_the_steps_of_a_sweep_form_one_part():
-    (part,) = place_parts(mapped(SWEEP), 1000.0, 30_000)
+    (part,) = place_parts(mapping_of(SWEEP), 1000.0, 30_000)
     assert (part.start, part.stop) == (2000, 22_000)
     assert part.segment.label == "sweep"
 
 
 def test_parts_given_in_the_mapping_take_the_labels_of_the_plan():
     told = [{"start_s": 1.0, "stop_s": 1.5}, {"start_s": 4.0, "stop_s": 4.5}]
-    parts = place_parts(mapped(NOISE, parts=told), 1000.0, 10_000)
+    parts = place_parts(mapping_of(NOISE, parts=told), 1000.0, 10_000)
     assert ranges(parts) == [(1000, 1500), (4000, 4500)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1]
 
 
 def test_parts_after_the_end_of_the_file_are_left_out():
-    assert len(place_parts(mapped(NOISE), 1000.0, 3000)) == 2
-    (cut,) = place_parts(mapped(NOISE, parts=[{"start_s": 1, "stop_s": 1e308}]), 1000.0, 3000)
+    assert len(place_parts(mapping_of(NOISE), 1000.0, 3000)) == 2
+    (cut,) = place_parts(mapping_of(NOISE, parts=[{"start_s": 1, "stop_s": 1e308}]), 1000.0, 3000)
     assert cut.start == 1000 < 3000 < cut.stop
 
 
@@ -78,4 +78,4 @@ def test_parts_after_the_end_of_the_file_are_left_out():
 def test_impossible_parts_are_refused(told, said):
     parts = [{"start_s": start_s, "stop_s": stop_s} for start_s, stop_s in told]
     with pytest.raises(InvalidRequest, match=said):
-        place_parts(mapped(NOISE, parts=parts), 1000.0, 10_000)
+        place_parts(mapping_of(NOISE, parts=parts), 1000.0, 10_000)

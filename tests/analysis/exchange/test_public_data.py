@@ -1,4 +1,4 @@
-"""Public recordings of others, imported with the shipped mappings: their published values next to ours.
+"""Results from public recordings, imported with the shipped mappings, match the published values.
 
 The files are not shipped. docs/exchange.md ("Public recordings") shows how to fetch them.
 """
@@ -29,7 +29,7 @@ REQUESTS = {"tool_hammer": FrequencyResponseRequest(segment_s=0.25, window=Windo
 
 
 @pytest.fixture(scope="session")
-def imported(tmp_path_factory):
+def imported_path(tmp_path_factory):
     @cache
     def path(name):
         file = Path(os.environ.get("VIBENCH_PUBLIC_DATA", "")) / FILES[name]
@@ -42,10 +42,10 @@ def imported(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def analysed(imported):
+def analysis_of(imported_path):
     @cache
     def analysis(name):
-        return analyse(imported(name), REQUESTS.get(name, FrequencyResponseRequest()))
+        return analyse(imported_path(name), REQUESTS.get(name, FrequencyResponseRequest()))
 
     return analysis
 
@@ -61,8 +61,8 @@ MODES = [
 
 
 @pytest.mark.parametrize(("name", "frequency_hz", "damping_ratio", "by", "damping_by"), MODES)
-def test_a_published_mode_is_found(analysed, name, frequency_hz, damping_ratio, by, damping_by):
-    found = min(analysed(name).response.resonances, key=lambda each: abs(each.frequency_hz - frequency_hz))
+def test_a_published_mode_is_found(analysis_of, name, frequency_hz, damping_ratio, by, damping_by):
+    found = min(analysis_of(name).response.resonances, key=lambda each: abs(each.frequency_hz - frequency_hz))
     assert found.frequency_hz == pytest.approx(frequency_hz, rel=by)
     if damping_ratio is not None:
         assert found.damping_ratio == pytest.approx(damping_ratio, rel=damping_by)
@@ -78,11 +78,11 @@ def test_a_published_mode_is_found(analysed, name, frequency_hz, damping_ratio, 
     ],
 )
 def test_the_response_to_a_hammer_hit_has_the_published_peaks(
-    analysed, low_hz, high_hz, line_hz, height, damping_ratio
+    analysis_of, low_hz, high_hz, line_hz, height, damping_ratio
 ):
-    """Its authors read the extremes of real and imaginary part; so does this test, from our estimate."""
-    band = analysed("tool_hammer").response.frequency_response.between(low_hz, high_hz)
-    # The transmission of displacements is i w times acceleration over force, as the mapping names them.
+    """The authors read the extremes of real and imaginary part; this test does so in our estimate."""
+    band = analysis_of("tool_hammer").response.frequency_response.between(low_hz, high_hz)
+    # The mapping treats force as velocity: divide by -i w^3 to get displacement over force.
     receptance = 1j * band.value / (2 * np.pi * band.frequency_hz) ** 3
     places = (receptance.imag.argmin(), receptance.real.argmax(), receptance.real.argmin())
     line, rise, fall = (band.frequency_hz[place] for place in places)
@@ -93,15 +93,15 @@ def test_the_response_to_a_hammer_hit_has_the_published_peaks(
 
 # Sum of all samples in g by the test of the package; rms of each channel [m/s2] by pyuff 2.5 from the copy
 # that its authors repaired.
-def test_the_samples_of_a_real_tdms_file_have_the_published_sum(imported):
-    with open_recording(imported("tower_tdms")) as recording:
+def test_the_samples_of_a_real_tdms_file_have_the_published_sum(imported_path):
+    with open_recording(imported_path("tower_tdms")) as recording:
         assert (recording.sample_rate_hz, recording.samples) == (30.0, 18_000)
         total = sum(np.sum(recording.read(role, 0, recording.samples)) for role in recording.roles)
     assert total / 9.80665 == pytest.approx(-15.59784792, abs=2e-8)
 
 
-def test_the_samples_of_a_real_universal_file_have_the_levels_that_pyuff_reads(imported):
-    with open_recording(imported("four_points_uff")) as recording:
+def test_the_samples_of_a_real_universal_file_have_the_levels_that_pyuff_reads(imported_path):
+    with open_recording(imported_path("four_points_uff")) as recording:
         samples = [recording.read(role, 0, recording.samples) for role in recording.roles]
         assert (recording.sample_rate_hz, recording.samples) == (3200.0, 222_400)
     found = [np.sqrt(np.mean(each**2)) for each in samples]

@@ -1,4 +1,4 @@
-"""Limit cycles that others held by control-based continuation, read by a mapping: what is stated of them."""
+"""Published limit cycles from control-based continuation, read by a mapping, have their stated values."""
 
 import runpy
 from pathlib import Path
@@ -43,7 +43,7 @@ def test_published_unstable_amplitudes_are_lower_and_fall_with_wind_speed(cycles
 
 
 def test_published_unstable_motions_exceed_the_stated_invasiveness_limit(cycles):
-    """Their search ended by amplitudes before the samples were kept: a target that was changed once more."""
+    """The published search ended before the samples were taken; its target was changed once more."""
     for speed in UNSTABLE:
         found = cycles[f"unstable_v{speed}"]
         assert found.criterion > found.stated_criterion

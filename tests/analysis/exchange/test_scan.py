@@ -1,4 +1,4 @@
-"""A scan of the virtual rig: mode shapes through sdypy-EMA, one figure over the points, and bad folders."""
+"""A scan of the virtual rig: mode shapes by sdypy-EMA, one figure over all points, invalid folders."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ from vibench.sim import gong2025
 
 pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
 ema = pytest.importorskip("sdypy.EMA", reason="pip install vibench[test] brings sdypy-EMA")
-pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]  # a scan takes seconds, on a busy computer more
+pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]  # a scan takes seconds or longer
 BODIES = (0, 0, 1, 2)
 """Mass of each point of the shipped scan, by node."""
 PLACES = ([-0.02, 0.02, 0.0, 0.0], [0.0] * 4, [0.0, 0.0, 0.02, 0.04])
@@ -92,7 +92,7 @@ def test_a_scan_report_has_one_figure_over_all_points(results, tmp_path):
     _, shapes = mode_shapes()
     for at, shape in zip(("946hz", "2662hz", "4996hz"), shapes.T, strict=True):
         seen = read[f"magnitude_{at}"] * np.exp(1j * np.deg2rad(read[f"phase_deg_{at}"]))
-        assert mac(seen, shape[list(BODIES)]) > 0.98  # one line, with parts of the other modes
+        assert mac(seen, shape[list(BODIES)]) > 0.98  # one line with parts of other modes
         assert np.all(read[f"relative_half_width_{at}"] < 0.2)
 
 

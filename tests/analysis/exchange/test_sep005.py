@@ -1,4 +1,4 @@
-"""Channels as SDyPy takes them, held against its own model."""
+"""Channels in the SDyPy format (SEP 005) are accepted by SDyPy's own model."""
 
 import numpy as np
 import pytest

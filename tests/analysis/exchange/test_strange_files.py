@@ -1,4 +1,4 @@
-"""Ordinary files of other programs with unusual times, units and scales are read right, or refused."""
+"""Files of other programs with unusual times, units and scales are read correctly or refused."""
 
 from datetime import datetime, timedelta
 
@@ -19,13 +19,13 @@ TIMES = np.arange(4000) / RATE_HZ
 
 
 def signal(times):
-    """Return volts, acceleration and velocity in SI units."""
+    """Return drive voltage, acceleration and velocity in SI units."""
     phase = 2 * np.pi * 37.0 * times
     return np.stack((np.cos(phase), 30.0 * np.sin(phase), 0.5 * np.cos(phase + 1.0)))
 
 
-def imported(path, names=("u", "a", "v"), **more):
-    """Return the samples of a file, lost ones as NaN; ``more`` are keys of its channels."""
+def read_import(path, names=("u", "a", "v"), **more):
+    """Return the samples of an imported file, NaN if lost; ``more`` are mapping keys of each channel."""
     plan = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 37, "settle_s": 0, "duration_s": 0.5}
     roles = ("drive_voltage", "base_acceleration", "m0_velocity")
     content = {
@@ -40,7 +40,7 @@ def imported(path, names=("u", "a", "v"), **more):
 
 
 def is_right(samples, lost=0):
-    """Check samples at their moments."""
+    """Assert that the samples match the signal at their times."""
     missing = np.isnan(samples[0])
     expected = np.where(missing, np.nan, signal(np.arange(samples.shape[1]) / RATE_HZ))
     np.testing.assert_allclose(samples, expected, atol=2e-4, equal_nan=True)
@@ -48,7 +48,7 @@ def is_right(samples, lost=0):
 
 
 def text(path, head, columns, between=","):
-    """Write a table below a heading; columns are texts or numbers."""
+    """Write a text table with a heading; columns are texts or numbers."""
     cells = [[each if isinstance(each, str) else f"{each:.10g}" for each in column] for column in columns]
     path.write_text(head + "\n" + "".join(between.join(row) + "\n" for row in zip(*cells, strict=True)))
     return path
@@ -74,13 +74,13 @@ def test_dates_and_times_in_any_format_determine_sample_positions(tmp_path, form
     kept = np.delete(np.arange(TIMES.size), slice(1500, 1537))
     clock = [(datetime.fromisoformat(start) + timedelta(seconds=TIMES[k])).strftime(form) for k in kept]
     head = "Date;Time;u;a;v" if ";" in form else "Time;u;a;v"
-    is_right(imported(text(tmp_path / "a.csv", head, (clock, *signal(TIMES[kept])), ";")), lost=37)
+    is_right(read_import(text(tmp_path / "a.csv", head, (clock, *signal(TIMES[kept])), ";")), lost=37)
 
 
 def test_a_record_continued_on_the_next_day_is_refused(tmp_path):
     clock = [f"0{1 + k // 2000}.03.2026 12:00:{TIMES[k]:09.6f}" for k in range(TIMES.size)]
     with pytest.raises(InvalidRequest, match="sample intervals, but only"):
-        imported(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";"))
+        read_import(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";"))
 
 
 @pytest.mark.parametrize("sign", ".,")
@@ -88,7 +88,7 @@ def test_thousands_separators_in_numbers_are_refused(tmp_path, sign):
     volts, base, velocity = signal(TIMES)
     grouped = [f"{round(1e3 * each):,d}".replace(",", sign) for each in base]
     with pytest.raises(UnusableData, match="seems to group thousands"):
-        imported(text(tmp_path / "a.csv", "t;u;a;v", (TIMES, volts, grouped, velocity), ";"))
+        read_import(text(tmp_path / "a.csv", "t;u;a;v", (TIMES, volts, grouped, velocity), ";"))
 
 
 UNITS = (
@@ -104,13 +104,13 @@ UNITS = (
 def test_units_in_channel_names_or_heading_rows_set_the_scales(tmp_path, head):
     volts, base, velocity = signal(TIMES)
     columns = (TIMES, 1e3 * volts, base / G, 1e3 * velocity)
-    is_right(imported(text(tmp_path / "a.csv", head, columns), "234"))
+    is_right(read_import(text(tmp_path / "a.csv", head, columns), "234"))
 
 
 @pytest.mark.parametrize(("head", "between"), [("t u a v\n  mV g mm/s", " "), ("t,u,a,v\nmV,g,mm/s", ",")])
 def test_a_row_of_units_with_empty_cells_is_refused(tmp_path, head, between):
     with pytest.raises(UnusableData, match="has 3 units for 4 columns"):
-        imported(text(tmp_path / "a.csv", head, (TIMES, *signal(TIMES)), between))
+        read_import(text(tmp_path / "a.csv", head, (TIMES, *signal(TIMES)), between))
 
 
 def test_different_start_times_of_labview_columns_align_the_channels(tmp_path):
@@ -118,15 +118,15 @@ def test_different_start_times_of_labview_columns_align_the_channels(tmp_path):
     velocity = signal(TIMES + LATE / RATE_HZ)[2]
     head = f"X0;0;0;{LATE / RATE_HZ:.9f}\nDelta_X;{1 / RATE_HZ};{1 / RATE_HZ};{1 / RATE_HZ}\nu;a;v"
     columns = (volts, base, velocity)
-    is_right(imported(text(tmp_path / "a.txt", head.replace(";", "\t"), columns, "\t")), lost=LATE)
+    is_right(read_import(text(tmp_path / "a.txt", head.replace(";", "\t"), columns, "\t")), lost=LATE)
 
 
 def test_comments_and_fortran_numbers_are_read_and_a_stated_rate_is_compared(tmp_path):
     cells = [[f"{each:.9E}".replace("E", "D") for each in row] for row in (TIMES, *signal(TIMES))]
     cells[0][2000] = f"# marker\n{cells[0][2000]}"
-    is_right(imported(text(tmp_path / "a.txt", "t u a v", cells, " ")))
+    is_right(read_import(text(tmp_path / "a.txt", "t u a v", cells, " ")))
     with pytest.raises(InvalidRequest, match="states 4096 samples/s"):
-        imported(text(tmp_path / "b.txt", "Data recorded at 4096 Hz\nu a v", cells[1:], " "))
+        read_import(text(tmp_path / "b.txt", "Data recorded at 4096 Hz\nu a v", cells[1:], " "))
 
 
 def test_time_stamps_of_a_tdms_file_show_lost_samples(tmp_path):
@@ -141,7 +141,7 @@ def test_time_stamps_of_a_tdms_file_show_lost_samples(tmp_path):
         writer.write_segment(
             [nptdms.ChannelObject("g", name, row, units.get(name, {})) for name, row in columns.items()]
         )
-    is_right(imported(tmp_path / "a.tdms"), lost=37)
+    is_right(read_import(tmp_path / "a.tdms"), lost=37)
 
 
 def test_units_and_rates_stored_beside_matlab_matrices_are_used(tmp_path):
@@ -150,14 +150,14 @@ def test_units_and_rates_stored_beside_matlab_matrices_are_used(tmp_path):
     units = np.array(["mV", "g", "mm/s"], dtype=object)
     savemat(tmp_path / "a.mat", {**content, "units": units})
     names = ("data#1", "data#2", "data#3")
-    is_right(imported(tmp_path / "a.mat", names))
+    is_right(read_import(tmp_path / "a.mat", names))
     savemat(tmp_path / "b.mat", {**content, "Ts": 1 / 4096})
     with pytest.raises(InvalidRequest, match="states 4096 samples/s"):
-        imported(tmp_path / "b.mat", names)
+        read_import(tmp_path / "b.mat", names)
 
 
 def hdf5(path, columns, **facts):
-    """Write datasets with the same attributes."""
+    """Write HDF5 datasets with common attributes."""
     with h5py.File(path, "w") as file:
         for name, values in columns.items():
             file.create_dataset(name, data=values).attrs.update(facts)
@@ -168,13 +168,13 @@ def test_ambiguous_scales_and_times_in_hdf5_are_refused(tmp_path):
     columns = dict(zip("uav", signal(TIMES), strict=True))
     names = ("/u", "/a", "/v")
     with pytest.raises(InvalidRequest, match=r"states gain = 0\.01 for /u"):
-        imported(hdf5(tmp_path / "a.h5", columns, gain=0.01), names)
+        read_import(hdf5(tmp_path / "a.h5", columns, gain=0.01), names)
     times = {f"x{k}": TIMES + k * LATE / RATE_HZ for k in range(2)}
     with pytest.raises(InvalidRequest, match="has different times in /x0, /x1"):
-        imported(hdf5(tmp_path / "b.h5", {**columns, **times}), names)
+        read_import(hdf5(tmp_path / "b.h5", {**columns, **times}), names)
     for each in columns.values():
         each[700:710] = -999.0
-    is_right(imported(hdf5(tmp_path / "c.h5", columns, missing_value=-999.0), names), lost=10)
+    is_right(read_import(hdf5(tmp_path / "c.h5", columns, missing_value=-999.0), names), lost=10)
 
 
 def test_unlabelled_motion_in_a_universal_file_uses_its_length_unit(tmp_path):
@@ -188,7 +188,7 @@ def test_unlabelled_motion_in_a_universal_file_uses_its_length_unit(tmp_path):
         about = {"ordinate_spec_data_type": kind, "ordinate_axis_units_lab": "NONE", "ord_data_type": 4}
         made = pyuff.prepare_58(binary=0, data=scale * row, x=TIMES, id1=name, **kinds, **axes, **about)
         pyuff.UFF(str(path)).write_sets([made], "add")
-    is_right(imported(path))
+    is_right(read_import(path))
 
 
 def to_tdms(path, channels):
@@ -214,7 +214,7 @@ def to_mat(path, channels):
 
 
 def to_mat73(path, channels):
-    """Write structs as MATLAB does in HDF5: texts are codes of letters."""
+    """Write structs as MATLAB 7.3 does in HDF5: texts are arrays of character codes."""
     with h5py.File(path, "w") as file:
         for name, (values, facts) in channels.items():
             group = file.create_group(name)
@@ -230,11 +230,11 @@ WRITERS = {".tdms": to_tdms, ".h5": to_hdf5, ".mat": to_mat, "73.mat": to_mat73}
 
 
 def with_facts(tmp_path, suffix, values, facts):
-    """Write volts, acceleration and velocity with the facts of each; return the import as a function."""
+    """Write three channels with their attributes; return a function that imports the file."""
     path = tmp_path / f"facts{suffix}"
     channels = dict(zip("uav", zip(values, facts, strict=True), strict=True))
     names = WRITERS[suffix](path, channels)
-    return lambda **more: imported(path, names, **more)
+    return lambda **more: read_import(path, names, **more)
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
@@ -248,7 +248,7 @@ def test_a_unit_attribute_of_any_common_name_is_applied(tmp_path, suffix, word):
 def test_the_unit_of_one_variable_is_not_applied_to_another(tmp_path):
     values = dict(zip("uav", signal(TIMES), strict=True)) | {"a": signal(TIMES)[1] / G, "a_unit": "g"}
     savemat(tmp_path / "a.mat", values)
-    is_right(imported(tmp_path / "a.mat"))
+    is_right(read_import(tmp_path / "a.mat"))
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
@@ -307,7 +307,7 @@ def test_units_at_the_end_of_a_universal_file_apply_to_its_functions(tmp_path):
         file.write_sets({"type": 58, "func_type": 1, **axis, **kinds, **nodes, **own}, "add")
     units = {"units_code": 5, "length": 1000.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
     file.write_sets({"type": 164, "units_description": "mm", "temp_mode": 1, **units}, "add")
-    is_right(imported(tmp_path / "a.uff", ("1", "2", "3")))
+    is_right(read_import(tmp_path / "a.uff", ("1", "2", "3")))
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".mat"])
@@ -325,4 +325,4 @@ def test_several_starts_or_gains_of_one_table_are_refused(tmp_path, suffix, fact
         savemat(tmp_path / "a.mat", {"y": signal(TIMES), **facts})
     names = [f"{'/' * (suffix == '.h5')}y#{number}" for number in (1, 2, 3)]
     with pytest.raises(InvalidRequest, match=said):
-        imported(tmp_path / f"a{suffix}", names)
+        read_import(tmp_path / f"a{suffix}", names)

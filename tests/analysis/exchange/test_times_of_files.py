@@ -1,4 +1,4 @@
-"""Times in imported files: every generated file is aligned, counted as lost, or refused."""
+"""Times in imported files: each generated file is aligned, has its lost samples counted, or is refused."""
 
 from itertools import product
 
@@ -24,12 +24,12 @@ SAYS_STARTS = ("tdms", "uff a", "uff b")
 
 
 def motion(times):
-    """A signal that tells when a sample was taken."""
+    """A signal whose value identifies the time of a sample."""
     return np.sin(2 * np.pi * 20.0 * times) + 0.3 * np.sin(2 * np.pi * 137.0 * times)
 
 
 def faulty_times(fault, rng):
-    """Times of the rows of a file with one fault."""
+    """Return row times [s] with one fault."""
     times = np.arange(SAMPLES) / RATE_HZ
     at, count = int(rng.integers(500, SAMPLES - 500)), int(rng.integers(2, 60))
     match fault:
@@ -52,7 +52,7 @@ def faulty_times(fault, rng):
 
 
 def write(kind, folder, fault, rng):
-    """Write two channels; the second has the fault where a format keeps times of its own for each."""
+    """Write two channels; only the second is faulty if the format stores times per channel."""
     times = faulty_times(fault, rng)
     values = np.stack((motion(times), 2 * motion(times)))
     path = folder / f"a.{kind.split()[0]}"
@@ -116,7 +116,7 @@ def write(kind, folder, fault, rng):
     return path
 
 
-def mapped(kind, rate_hz):
+def mapping(kind, rate_hz):
     names = {"csv": ("a", "b"), "mat": ("run.a", "run.b"), "h5": ("/run/a", "/run/b"), "wav": ("1", "2")}
     first, second = names.get(kind.split()[0], ("a", "b"))
     plan = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 20, "settle_s": 0, "duration_s": 2}
@@ -129,8 +129,8 @@ def mapped(kind, rate_hz):
     return validated(content, ImportMapping, "test")
 
 
-def allowed(kind, fault):
-    """What may become of a file."""
+def expected_outcome(kind, fault):
+    """Return the expected outcome of an import: "whole", "lost" samples or "refused"."""
     if fault == "rate":
         return "refused"
     if kind in SAYS_TIMES:
@@ -143,7 +143,7 @@ def allowed(kind, fault):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
 @pytest.mark.parametrize("kind", [*SAYS_TIMES, *SAYS_STARTS, "wav"])
 @pytest.mark.parametrize("seed", [43])
-def test_times_of_a_file_are_kept_in_the_recording(tmp_path, kind, seed):
+def test_times_of_a_file_are_stored_in_the_recording(tmp_path, kind, seed):
     rng = np.random.default_rng(seed)
     third = SAYS_TIMES.index(kind) % 3 if kind in SAYS_TIMES else 0
     faults = (
@@ -157,8 +157,8 @@ def test_times_of_a_file_are_kept_in_the_recording(tmp_path, kind, seed):
         folder = tmp_path / f"{number}"
         folder.mkdir()
         path = write(kind, folder, fault, rng)
-        wanted = allowed(kind, fault)
-        meaning = mapped(kind, RATE_HZ * 1.05 if fault == "rate" else RATE_HZ)
+        wanted = expected_outcome(kind, fault)
+        meaning = mapping(kind, RATE_HZ * 1.05 if fault == "rate" else RATE_HZ)
         if wanted == "refused":
             with pytest.raises(InvalidRequest):
                 import_recording(path, meaning, folder / "made.h5")
@@ -169,8 +169,8 @@ def test_times_of_a_file_are_kept_in_the_recording(tmp_path, kind, seed):
         assert (lost > 0) == (wanted == "lost"), (kind, fault, lost)
         np.testing.assert_allclose(response, 2 * drive, atol=2e-5, equal_nan=True)
         if kind in SAYS_TIMES and fault == "late":
-            continue  # a shared axis begins with its first sample
-        # A place is a moment of an even axis.
+            continue  # a shared time axis begins with its first sample
+        # Samples are evenly spaced, so the index gives the time.
         expected = motion(np.arange(drive.size) / RATE_HZ)
         np.testing.assert_allclose(drive, np.where(np.isnan(drive), np.nan, expected), atol=2e-5)
 
@@ -193,16 +193,16 @@ COLUMN_FAULTS = ("sound", "gap", "drop", "repeat", "swap", "restart", "drift", "
 def test_any_evenly_increasing_column_can_be_the_time_axis(tmp_path, fault, seed):
     rng = np.random.default_rng(seed)
     scales = {**dict.fromkeys(HEADINGS, 1.0), **UNITS_OF_TIME, **dict.fromkeys(COUNTS, RATE_HZ), None: 1.0}
-    # Each fault under a third of the headings, each heading with a third of the faults.
+    # Each fault is tested under a third of the headings, each heading with a third of the faults.
     for number, (heading, scale) in list(enumerate(scales.items()))[COLUMN_FAULTS.index(fault) % 3 :: 3]:
         if heading in COUNTS and fault in {"drift", "rate"}:
-            continue  # a count shows neither
+            continue  # a sample count shows neither drift nor a wrong rate
         times = faulty_times(fault, rng)
         path = tmp_path / f"{number}.csv"
         rows = np.stack((scale * times, motion(times), 2 * motion(times))).T
         first = {} if heading is None else {"header": f"{heading},a,b", "comments": ""}
         np.savetxt(path, rows, "%.12g", ",", **first)
-        content = mapped("csv", RATE_HZ * 1.05 if fault == "rate" else RATE_HZ).model_dump()
+        content = mapping("csv", RATE_HZ * 1.05 if fault == "rate" else RATE_HZ).model_dump()
         if heading is None:
             content["channels"][0]["source"], content["channels"][1]["source"] = "2", "3"
         meaning = validated(content, ImportMapping, "test")
@@ -246,9 +246,9 @@ def test_start_times_and_rates_stored_beside_channels_are_read(tmp_path, suffix,
     times = np.arange(SAMPLES) / RATE_HZ
     path = tmp_path / f"a{suffix}"
     write_late = late_hdf5 if suffix == ".h5" else late_mat
-    late_s = 13 / RATE_HZ  # 2.5 ms are 12.8 samples
+    late_s = 13 / RATE_HZ  # 2.5 ms are 12.8 samples, rounded to 13
     write_late(path, motion(times), 2 * motion(times + 0.0025), fact)
-    content = mapped("h5", RATE_HZ).model_dump()
+    content = mapping("h5", RATE_HZ).model_dump()
     names = ("/run/a", "/run/b") if suffix == ".h5" else ("run.a.y", "run.b.y")
     content["channels"][0]["source"], content["channels"][1]["source"] = names
     made = import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "made.h5")
@@ -266,7 +266,7 @@ def test_start_times_and_rates_stored_beside_channels_are_read(tmp_path, suffix,
 
 def test_a_mapping_may_override_file_times_and_the_recording_notes_it(tmp_path):
     path = write("csv", tmp_path, "drift", np.random.default_rng(0))
-    content = {**mapped("csv", RATE_HZ).model_dump(), "time": "even"}
+    content = {**mapping("csv", RATE_HZ).model_dump(), "time": "even"}
     with open_recording(
         import_recording(path, validated(content, ImportMapping, "t"), tmp_path / "a.h5")
     ) as made:
@@ -324,7 +324,7 @@ def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, 
 @pytest.mark.parametrize("cycles", [4, 8, 10, 16, 20, 25, 40])
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
 def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, noise):
-    """It takes few values, the same ones in each period, and may spend most samples at the highest."""
+    """Such a sine repeats few values in each period, many of them at the maximum."""
     phase = 2 * np.pi * np.arange(20_000) / cycles
     rng = np.random.default_rng(cycles)
     wave = [np.cos(phase + at) + noise * rng.standard_normal(phase.size) for at in (0.3, np.pi / cycles, 0.8)]
@@ -347,7 +347,7 @@ def test_times_that_do_not_increase_are_refused(tmp_path, order, heading):
     rows = (f"{t:.7f};{x:.9g};{2 * x:.9g}\n" for t, x in zip(shown, motion(times), strict=True))
     (tmp_path / "a.csv").write_text(f"{heading};a;b\n" + "".join(rows))
     with pytest.raises(InvalidRequest, match="times that do not rise; sort its rows by time"):
-        import_recording(tmp_path / "a.csv", mapped("csv", RATE_HZ), tmp_path / "made.h5")
+        import_recording(tmp_path / "a.csv", mapping("csv", RATE_HZ), tmp_path / "made.h5")
 
 
 @pytest.mark.parametrize("heading", ["t", "T", "Temps"])
@@ -358,7 +358,7 @@ def test_a_column_named_t_with_another_quantity_is_not_read_as_time(tmp_path, he
     signal = motion(np.arange(SAMPLES) / RATE_HZ)
     rows = (f"{t:.7g};{x:.9g};{2 * x:.9g}\n" for t, x in zip(other, signal, strict=True))
     (tmp_path / "a.csv").write_text(f"{heading};a;b\n" + "".join(rows))
-    made = import_recording(tmp_path / "a.csv", mapped("csv", RATE_HZ), tmp_path / "made.h5")
+    made = import_recording(tmp_path / "a.csv", mapping("csv", RATE_HZ), tmp_path / "made.h5")
     with open_recording(made) as recording:
         assert not recording.gaps
 
@@ -376,16 +376,16 @@ def test_rounded_times_are_not_counted_as_lost_samples(tmp_path, rate_hz, digits
     )
     (tmp_path / "a.csv").write_text("time [s];a;b\n" + "".join(rows))
     with pytest.raises(InvalidRequest, match="does not state its sample rate exactly"):
-        import_recording(tmp_path / "a.csv", mapped("csv", None), tmp_path / "made.h5")
+        import_recording(tmp_path / "a.csv", mapping("csv", None), tmp_path / "made.h5")
     with open_recording(
-        import_recording(tmp_path / "a.csv", mapped("csv", rate_hz), tmp_path / "made.h5")
+        import_recording(tmp_path / "a.csv", mapping("csv", rate_hz), tmp_path / "made.h5")
     ) as made:
         assert made.sample_rate_hz == rate_hz
         assert not made.gaps
 
 
-def restarted_tdms(path, more, at):
-    """Write two channels in segments; the last one states other properties."""
+def write_restarted_tdms(path, more, at):
+    """Write two channels in two segments; the last segment has changed properties."""
     values = motion(np.arange(SAMPLES) / RATE_HZ)
     start = np.datetime64("2026-03-01T12:00:00", "us")
     about = {"wf_increment": 1 / RATE_HZ, "wf_start_time": start, "wf_start_offset": 0.0}
@@ -406,8 +406,8 @@ def test_samples_between_segments_of_a_tdms_file_count_as_lost(tmp_path, fact, a
     def more(start):
         return {fact: start + np.timedelta64(round(later_s * 1e6), "us") if "time" in fact else later_s}
 
-    values = restarted_tdms(path, more, at)
-    with open_recording(import_recording(path, mapped("tdms", RATE_HZ), tmp_path / "made.h5")) as recording:
+    values = write_restarted_tdms(path, more, at)
+    with open_recording(import_recording(path, mapping("tdms", RATE_HZ), tmp_path / "made.h5")) as recording:
         drive = recording.read("drive_voltage")
     assert np.isnan(drive).sum() == paused
     np.testing.assert_allclose(drive[at + paused :], values[at:], atol=2e-5)
@@ -424,9 +424,9 @@ def test_samples_between_segments_of_a_tdms_file_count_as_lost(tmp_path, fact, a
     ids=["another rate", "between samples", "backward", "another day"],
 )
 def test_tdms_segments_without_a_consistent_time_axis_are_refused(tmp_path, more):
-    restarted_tdms(tmp_path / "a.tdms", more, 7001)
+    write_restarted_tdms(tmp_path / "a.tdms", more, 7001)
     with pytest.raises(InvalidRequest, match=r"samples/s|has a new start|go back|intervals, but only"):
-        import_recording(tmp_path / "a.tdms", mapped("tdms", RATE_HZ), tmp_path / "made.h5")
+        import_recording(tmp_path / "a.tdms", mapping("tdms", RATE_HZ), tmp_path / "made.h5")
 
 
 def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
@@ -434,13 +434,13 @@ def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
     content = path.read_bytes()
     path.write_bytes(content + b"data" + (64).to_bytes(4, "little") + bytes(64))
     with pytest.raises(UnusableData, match="samples in several chunks"):
-        import_recording(path, mapped("wav", RATE_HZ), tmp_path / "made.h5")
+        import_recording(path, mapping("wav", RATE_HZ), tmp_path / "made.h5")
     for form in ("4", "5"):
         path = tmp_path / f"{form}.mat"
         with path.open("wb") as file:
             for times in (np.arange(SAMPLES), np.arange(SAMPLES) + SAMPLES):
                 savemat(file, {"t": times / RATE_HZ, "a": motion(times), "b": motion(times)}, format=form)
-        meaning = mapped("h5", RATE_HZ).model_dump()
+        meaning = mapping("h5", RATE_HZ).model_dump()
         meaning["channels"][0]["source"], meaning["channels"][1]["source"] = "a", "b"
         with pytest.raises(UnusableData, match="several variables of the same name"):
             import_recording(path, validated(meaning, ImportMapping, "test"), tmp_path / "made.h5")
@@ -451,7 +451,7 @@ def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
     ("at_s", "length_s", "share"),
     [(8.0, 0.1, 0.47), (3.0, 0.02, 0.2), (4.5, 0.1, 0.0)],
 )
-def test_a_dwell_with_a_burst_is_not_called_periodic(tmp_path, at_s, length_s, share):
+def test_an_imported_dwell_with_a_burst_is_not_periodic(tmp_path, at_s, length_s, share):
     rng = np.random.default_rng(4343)
     times = np.arange(64_000) / 5120.0
     phase = 2 * np.pi * 260.0 * times

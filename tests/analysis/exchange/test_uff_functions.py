@@ -1,4 +1,4 @@
-"""Universal files of spectra: read back by pyuff, and record by record as dataset 58 is defined."""
+"""Spectra in universal files are read back by pyuff and follow the definition of dataset 58."""
 
 import numpy as np
 import pytest
@@ -98,8 +98,8 @@ def test_exported_densities_match_the_chosen_channels_and_time_range(known, know
     np.testing.assert_allclose(read["data"], wanted.density, rtol=1e-10)
 
 
-def recorded(path, parts):
-    """Write a recording of parts: label, seconds, volts of a sine of 100 Hz."""
+def write_parts(path, parts):
+    """Write a recording of parts (label, duration [s], amplitude [V] of a 100 Hz sine)."""
     channel = ChannelHeader("drive_voltage", "dev/ai0", "voltage", "V", 1.0, range_v=5.0)
     header = RecordingHeader((channel,), RATE_HZ, None, Origin.SIMULATED)
     with create_recording(path, header) as writer:
@@ -135,18 +135,18 @@ def recorded(path, parts):
 )
 def test_exported_densities_cover_and_name_the_played_segments(tmp_path, parts, lines_hz, told):
     run = CliRunner().invoke(
-        app, ["export", str(recorded(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
+        app, ["export", str(write_parts(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
     )
     assert run.exit_code == 0, run.output
     read = pyuff.UFF(str(tmp_path / "a.uff")).read_sets(1)
     assert read["x"][1] == pytest.approx(lines_hz)
-    # Parseval: what stands at all lines together is the mean square of what was played.
+    # Parseval: the sum over all spectral lines is the mean square of the played signal.
     assert read["data"].sum() * lines_hz == pytest.approx(VOLTS**2 / 2, rel=1e-3)
     assert read["id4"].endswith(told), read["id4"]
 
 
 def test_a_recording_without_drive_has_no_densities(tmp_path):
-    with open_recording(recorded(tmp_path / "a.h5", RUN)) as recording:
+    with open_recording(write_parts(tmp_path / "a.h5", RUN)) as recording:
         for stretch in ((0.0, 1.5), (0.0, 2.4)):
             with pytest.raises(
                 NotEnoughData, match=r"need 1 s of uninterrupted excitation.*; choose a longer excerpt"
@@ -170,7 +170,7 @@ def test_an_import_ignores_spectra(known, tmp_path):
 
 
 def velocity_of_m0(hz):
-    """Velocity of m0 over that of the base, of the paper's specimen without contact."""
+    """Velocity ratio of m0 to the base, for the paper's specimen without contact."""
     specimen = gong2025(contact="linear")
     found = []
     for s in 2j * np.pi * hz:

@@ -1,4 +1,4 @@
-"""Figures show the data they claim, name it with units, and their captions carry the results' numbers."""
+"""Figures show the data with labels and units, and captions state the results."""
 
 import csv
 import xml.etree.ElementTree as ET
@@ -65,7 +65,7 @@ def test_a_transmission_figure_shows_measurement_and_simulation(noise_file):
     assert strip.get_ylabel() == "coherence"
     level = [each.get_ydata()[0] for each in strip.get_lines() if each.get_linestyle() == "-."]
     assert level == [found.analysis.response.frequency_response.coherence_significance]
-    assert top.get_legend() is None  # it stands outside, where it covers no data
+    assert top.get_legend() is None  # the legend is outside the axes and covers no data
     assert len(drawn.figure.legends) == 1
 
 
@@ -114,7 +114,7 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     measured = line(drawn.figure.axes[1], "measured response")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_i)
     assert drawn.figure.axes[0].get_xlabel() == "time of the sweep [s]"
-    # The interval that was found, which need not lie evenly about the first interval that collides.
+    # The stated range is the interval found, which need not be symmetric about its first point.
     lopsided = replace(
         region, start=replace(region.start, frequency_hz=257.0, lower_hz=254.0, upper_hz=278.0)
     )
@@ -123,7 +123,7 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     )
     (region,) = found.analysis.collisions.regions
     ended = replace(found.analysis.collisions, regions=(replace(region, reaches_stop=False),))
-    # How long collisions live on is chance: their end has no bounds.
+    # The end of the collisions varies by chance, so it has no bounds.
     assert regions_text(ended).endswith(f" to {region.stop.frequency_hz:.1f} Hz in this run")
     assert f"{found.overlay.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
@@ -167,7 +167,7 @@ def test_dwells_are_drawn_in_rows_by_level_with_responses_in_the_caption(dwell_f
 def test_the_largest_column_of_a_dwell_spectrum_is_response_ii(dwell_file):
     found = result(dwell_file("weak"), Simulation.LEFT_OUT).analysis.response
     frequency_hz, size = spectrum_columns(found)
-    # A Hann line between two lines reads up to 15 % low.
+    # A sine between two lines reads up to 15 % low with a Hann window.
     assert np.max(size) == pytest.approx(found.response_ii, rel=0.16)
     assert frequency_hz[np.argmax(size)] == pytest.approx(260.0, abs=1.0)
 

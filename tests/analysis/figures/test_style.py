@@ -1,4 +1,4 @@
-"""Marks on the axes of figures: enough to read a value by, and few enough not to touch."""
+"""Tick labels on the axes of figures are sufficient to read values and do not overlap."""
 
 from itertools import pairwise
 
@@ -9,7 +9,7 @@ from vibench.analysis.figures.style import magnitude_axis, new_figure, styled
 
 
 def _numbers(low, high):
-    """Give each number beside a magnitude axis, and where it begins and ends [pixels]."""
+    """Return each tick label of a magnitude axis with its lower and upper end [pixels]."""
     with styled():
         figure = new_figure(3.0)
         axes = figure.subplots()

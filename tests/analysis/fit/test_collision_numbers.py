@@ -1,4 +1,4 @@
-"""What a colliding motion tells of a specimen is a part of the fit's answer, or is refused."""
+"""Parameters identified from a colliding motion are part of the fit, or are refused."""
 
 from dataclasses import replace
 
@@ -15,8 +15,8 @@ TRUE = gong2025(gap_m=(35e-6, 55e-6))
 
 
 @pytest.fixture(scope="module")
-def collided(tmp_path_factory):
-    """Analyse a dwell of a specimen with unequal gaps; the bench says 45 um on both sides."""
+def collision_analysis(tmp_path_factory):
+    """Analyse a dwell of a specimen with unequal gaps; the bench file states 45 um on both sides."""
     recorded = world.shaken(
         tmp_path_factory.mktemp("unequal"), 258.0, 1.9, duration_s=2.6, seed=41, specimen=TRUE
     )
@@ -24,8 +24,8 @@ def collided(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_unequal_gaps_are_found_although_described_as_equal(collided):
-    updated = update_model(collided)
+def test_unequal_gaps_are_found_although_described_as_equal(collision_analysis):
+    updated = update_model(collision_analysis)
     lower, upper = updated.collisions.gaps
     assert lower.low <= 35e-6 <= lower.high
     assert upper.low <= 55e-6 <= upper.high
@@ -43,10 +43,10 @@ def test_unequal_gaps_are_found_although_described_as_equal(collided):
 
 
 @pytest.mark.thorough
-def test_a_motion_that_contradicts_the_masses_gives_no_gap(collided):
-    """Motion tells m1 and the springs by their ratio to m0 and m2, which must be right."""
+def test_a_motion_that_contradicts_the_masses_gives_no_gap(collision_analysis):
+    """The motion determines m1 and the springs only relative to m0 and m2, which must be correct."""
     m0, m1, m2 = TRUE.masses
-    found, why = tracked_numbers(collided, replace(TRUE, masses=(1.04 * m0, m1, m2)))
+    found, why = tracked_numbers(collision_analysis, replace(TRUE, masses=(1.04 * m0, m1, m2)))
     assert found is None
     assert "run:" not in why
     assert why.startswith("shaken: ")

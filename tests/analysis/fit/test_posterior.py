@@ -1,4 +1,4 @@
-"""Parameters from statistics of runs: against a model whose posterior is known in closed form."""
+"""Parameters estimated from statistics of runs, for a model whose posterior is known in closed form."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ CASES = 60
 
 
 class Linear:
-    """Statistics that are linear in the first two parameters, and noise; the third has no part in them."""
+    """Noisy statistics that depend linearly on the first two parameters and not on the third."""
 
     def __init__(self, seed):
         self.rng = np.random.default_rng(seed)
@@ -26,7 +26,7 @@ class Linear:
 
 @pytest.fixture(scope="module")
 def cases():
-    """Draw parameters, observe, and look for them."""
+    """Return pairs of true parameters and the posterior found from their statistics."""
     found = []
     for seed in range(CASES):
         runs, true = Linear(seed), np.random.default_rng(1000 + seed).uniform(-0.9, 0.9, 3)
@@ -53,13 +53,13 @@ def test_uninformative_statistics_keep_the_prior_width(cases):
 def test_statistics_from_a_wrong_model_do_not_fit(cases):
     assert sum(not each.fits for _, each in cases) <= 3
     runs = Linear(5)
-    off = np.linalg.svd(runs.gain[:2])[2][-1]  # what no parameter does
+    off = np.linalg.svd(runs.gain[:2])[2][-1]  # a direction that no parameter produces
     strange = runs(np.array([[0.3, -0.2, 0.0]]))[0] + 12 * SCATTER * off
     assert not posterior(runs, strange, BOX, 5, ROUNDS).fits
 
 
 def test_a_run_of_the_true_model_is_rarely_rejected_with_few_references():
-    """Runs that had a part in what they were held against seemed near: of 80, two in five others were not."""
+    """Too few reference runs once let two in five of the runs of the true model be rejected."""
     refused, runs, statistics = 0, 80, 60
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -71,7 +71,7 @@ def test_a_run_of_the_true_model_is_rarely_rejected_with_few_references():
 
 
 def test_an_unchanged_parameter_box_is_not_sampled_again():
-    """Runs of noise that knows no parameter: all of the first box stay within the second."""
+    """Noise without parameters leaves the parameter box unchanged, so two sets of 60 runs suffice."""
     rng, made = np.random.default_rng(7), []
 
     def runs(parameters):

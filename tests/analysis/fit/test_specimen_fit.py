@@ -1,4 +1,4 @@
-"""A fit finds the specimen that was measured, and its intervals hold it as often as they say."""
+"""A fit recovers the measured specimen, and its intervals have their stated coverage."""
 
 import math
 from dataclasses import replace
@@ -27,7 +27,7 @@ SD = 0.02
 
 
 def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
-    """A transmission whose lines scatter by ``sd`` in ln(magnitude) and in phase, as it says."""
+    """Return a transmission with line scatter ``sd`` in ln(magnitude) and in phase, stated as such."""
     scatter = sd * (rng.standard_normal(lines_hz.size) + 1j * rng.standard_normal(lines_hz.size))
     value = gain * base_transmissibility(specimen, lines_hz)[:, 0] * np.exp(scatter)
     spread = np.full(lines_hz.size, sd)
@@ -47,8 +47,8 @@ def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
     )
 
 
-def repeated(specimen, rng, sd, realisations):
-    """A transmission whose lines' scatter comes from so few; ``sd`` where m0 moves as the base does."""
+def realisation_average(specimen, rng, sd, realisations):
+    """Return a transmission whose scatter is estimated from few realisations; ``sd`` where |X/U| = 1."""
     exact = base_transmissibility(specimen, LINES_HZ)[:, 0]
     shape = (realisations, LINES_HZ.size)
     noise = sd * np.hypot(1.0, np.abs(exact)) * np.sqrt(realisations)
@@ -75,7 +75,7 @@ def test_specimen_parameters_round_trip(true):
 
 
 def test_scaled_gaps_and_dampings_keep_their_ratios():
-    """Two gaps keep their ratio, and dampings theirs, be one of them zero."""
+    """Scaling keeps the ratio of the two gaps and of the dampings, even if one damping is zero."""
     own = replace(gong2025(gap_m=(60e-6, 30e-6)), dampings=(0.3, 0.0, 0.02))
     read = {name: parameter_value(own, name) for name in (*LINEAR, Parameter.GAP)}
     assert with_values(own, {}) == with_values(own, read)
@@ -106,7 +106,7 @@ def test_fit_intervals_have_their_stated_coverage_and_width(true):
     rng = np.random.default_rng(20250101)
     draws = 120
     fits = [fit_specimen(measured(true, rng), NOMINAL) for _ in range(draws)]
-    # 95 % of 120 is 114; three standard deviations of that binomial are 7.2.
+    # Three standard deviations of the binomial number of covered values: 114 +- 7.2 of 120.
     slack = 3 * math.sqrt(draws * 0.95 * 0.05)
     for name, value in TRUE.items():
         found = [fit.value(name) for fit in fits]
@@ -114,7 +114,7 @@ def test_fit_intervals_have_their_stated_coverage_and_width(true):
         assert abs(held - 0.95 * draws) <= slack, name
         scatter = np.std([each.value for each in found], ddof=1)
         assert np.mean([each.sd for each in found]) == pytest.approx(scatter, rel=0.3)
-        # The mean of the fits is the truth, within its own standard error: no bias.
+        # No bias: the mean of the fits is the true value within four standard errors.
         assert np.mean([each.value for each in found]) == pytest.approx(
             value, abs=4 * scatter / math.sqrt(draws)
         )
@@ -123,10 +123,10 @@ def test_fit_intervals_have_their_stated_coverage_and_width(true):
 
 @pytest.mark.thorough
 def test_fit_intervals_hold_with_scatter_from_three_realisations(true):
-    """Few lines tell damping and the first frequency, and each line's own scatter is known to half."""
+    """Few spectral lines determine the damping, and the scatter of each line is known to 50 % only."""
     rng, held, draws = np.random.default_rng(2), [], 120
     for _ in range(draws):
-        fit = fit_specimen(repeated(true, rng, 2e-3, 3), NOMINAL)
+        fit = fit_specimen(realisation_average(true, rng, 2e-3, 3), NOMINAL)
         assert fit.fits
         told = (fit.value(each) for each in (Parameter.DAMPING_TIME, Parameter.F1))
         held += [each.low <= TRUE[each.parameter] <= each.high for each in told]
@@ -137,7 +137,7 @@ def test_noisy_lines_neither_reject_a_true_model_nor_diverge(true):
     rng, said = np.random.default_rng(3), []
     for sd in np.geomspace(0.03, 0.5, 30):
         try:
-            fit = fit_specimen(repeated(true, rng, sd, 4), NOMINAL)
+            fit = fit_specimen(realisation_average(true, rng, sd, 4), NOMINAL)
         except NotEnoughData as error:
             said.append(str(error))
         else:
@@ -157,7 +157,7 @@ def test_channel_high_pass_and_delay_do_not_bias_the_fit(true):
 
 
 def test_frequency_intervals_include_the_converter_clock(true):
-    """A clock that runs 40 ppm fast shows all frequencies low by that, and no scatter tells it."""
+    """A clock that runs 40 ppm fast lowers all frequencies by 40 ppm, without any scatter."""
     slow = measured(true, np.random.default_rng(7), sd=1e-6)
     fit = fit_specimen(replace(slow, frequency_hz=LINES_HZ * (1 - 40e-6)), NOMINAL)
     for name, value in TRUE.items():
@@ -201,14 +201,14 @@ def test_one_wrong_assumption_is_rejected_and_named_as_suspect(true, assumption)
     assert fit.suspects[0].mends
     assert not any(each.may_be_it for each in fit.suspects[1:])
     if factors:
-        # Freed, it is found with an interval that holds.
+        # A fit with the suspected parameter free finds its true value.
         (free,) = factors
         mended = fit_specimen(found, NOMINAL, (*LINEAR, free)).value(free)
         assert abs(mended.value - parameter_value(other, free)) < 4 * mended.sd
 
 
 def test_indistinguishable_causes_are_named_together(true):
-    """One level of linear motion shows a damper and friction alike."""
+    """At one level of linear motion a damper and friction have the same effect."""
     other = with_values(true, {Parameter.C0: 3.0 * parameter_value(true, Parameter.C0)})
     fit = fit_specimen(measured(other, np.random.default_rng(2), sd=2e-3), NOMINAL)
     assert {each.assumption for each in fit.suspects if each.may_be_it} == {
@@ -218,7 +218,7 @@ def test_indistinguishable_causes_are_named_together(true):
 
 
 def test_sensor_uncertainty_widens_dependent_intervals(true):
-    """One per cent of sensitivity is not a contradiction where the calibrations are no better than that."""
+    """A sensitivity error of 1 % is no contradiction if the calibration uncertainty is 1 %."""
     off = measured(true, np.random.default_rng(8), sd=2e-3, gain=1.01)
     allowed = fit_specimen(off, NOMINAL, scale_sd=0.01)
     assert allowed.fits

@@ -1,4 +1,4 @@
-"""Where a motion cannot be tracked, statistics of its chaos tell gap and mass, with bounds that hold."""
+"""Statistics of an untrackable chaotic motion determine gap and m1, with correct bounds."""
 
 import json
 import math
@@ -30,22 +30,22 @@ STRETCH_S = (0.5, 1.5)
 
 
 @pytest.fixture(scope="module")
-def buried(tmp_path_factory):
-    """Record a chaotic dwell under sixty times the noise; the bench says 45 um."""
+def noisy_dwell(tmp_path_factory):
+    """Record a chaotic dwell with sixty times the noise; the bench file states 45 um gaps."""
     return world.shaken(
         tmp_path_factory.mktemp("buried"), 260.0, 1.8, duration_s=1.6, seed=8, noise=60.0, specimen=TRUE
     )
 
 
 def holds(number, true):
-    """Whether twice the bounds hold: those of 95 % miss one draw of chaos in twenty, as is counted below."""
+    """Return whether twice the 95 % bounds contain the true value."""
     beyond = 0.5 * (number.high - number.low)
     return number.low - beyond < true < number.high + beyond
 
 
 @pytest.mark.thorough
-def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(buried):
-    with open_recording(buried.path) as recording:
+def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(noisy_dwell):
+    with open_recording(noisy_dwell.path) as recording:
         found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)
     told = {each.what: each for each in found}
     gap = told[Hidden.MEAN_GAP]
@@ -57,10 +57,10 @@ def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(buried):
     assert "exponent" in told[Hidden.EXPONENT].not_determined
 
 
-def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(buried):
-    """The noise of the recorded voltage once shook the simulated table: up to thirty deviations off."""
+def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(noisy_dwell):
+    """Converter noise in the recorded voltage once drove the simulated table: 30 standard deviations off."""
     rng, runs = np.random.default_rng(3), 14
-    with open_recording(buried.path) as recording:
+    with open_recording(noisy_dwell.path) as recording:
         rate_hz = recording.sample_rate_hz
         draws = stretch_draws(recording, TRUE, *(round(each * rate_hz) for each in STRETCH_S))
         seen = chaos_statistics(draws.measured, rate_hz, 260.0)
@@ -71,8 +71,8 @@ def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(buried):
     assert np.abs(z).max() < student.isf(0.005 / z.size, runs - 1)
 
 
-def test_a_rig_with_a_wrong_base_response_is_refused_early(buried, tmp_path):
-    other = shutil.copy(buried.path, tmp_path / "other.h5")
+def test_a_rig_with_a_wrong_base_response_is_refused_early(noisy_dwell, tmp_path):
+    other = shutil.copy(noisy_dwell.path, tmp_path / "other.h5")
     with h5py.File(other, "r+") as file:
         bench = json.loads(file["configuration/bench_json"][()])
         bench["shaker"]["force_constant_n_per_a"] = 30.0
@@ -93,8 +93,8 @@ def test_a_rig_with_a_wrong_base_response_is_refused_early(buried, tmp_path):
         (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),
     ],
 )
-def test_a_fit_without_usable_statistics_gives_a_reason(buried, specimen, stretch_s, why):
-    with open_recording(buried.path) as recording, pytest.raises(AnalysisError, match=why):
+def test_a_fit_without_usable_statistics_gives_a_reason(noisy_dwell, specimen, stretch_s, why):
+    with open_recording(noisy_dwell.path) as recording, pytest.raises(AnalysisError, match=why):
         statistical_numbers(recording, specimen, stretch_s, 260.0, rounds=FEW)
 
 
@@ -111,14 +111,14 @@ def test_mirrored_motion_flips_the_even_harmonics_of_its_statistics():
     )
     even = one - turned
     assert np.abs(even[-10:]).max() > 0.1
-    assert np.count_nonzero(np.abs(even[-10:]) > 1e-3) == 2  # real and imaginary part of the second
-    assert np.allclose(even[:18], 0.0)  # of the base
+    assert np.count_nonzero(np.abs(even[-10:]) > 1e-3) == 2  # real and imaginary part of the second harmonic
+    assert np.allclose(even[:18], 0.0)  # statistics of the base
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_statistics_determine_the_gap_of_an_untrackable_motion(buried):
-    updated = update_model(analyse_files([buried.path], "buried", Simulation.LEFT_OUT))
+def test_statistics_determine_the_gap_of_an_untrackable_motion(noisy_dwell):
+    updated = update_model(analyse_files([noisy_dwell.path], "buried", Simulation.LEFT_OUT))
     gap = {each.what: each for each in updated.collisions.determined}[Hidden.MEAN_GAP]
     assert holds(gap, 51e-6)
     assert updated.specimen.gaps_m == pytest.approx((gap.value, gap.value))
@@ -130,7 +130,7 @@ def test_statistics_determine_the_gap_of_an_untrackable_motion(buried):
 @pytest.mark.slow
 @pytest.mark.timeout(1700)
 def test_bounds_from_statistics_hold_on_random_specimens():
-    """Thirty draws; `--seed` and `--shard` ask for others."""
+    """Check thirty random specimens; `--seed` and `--shard` of the benchmark select others."""
     place = Path(__file__).parents[3] / "benchmarks" / "posterior_coverage.py"
     told = subprocess.run(
         [sys.executable, place, "--draws", "30", "--seed", "77"], capture_output=True, text=True, check=True
@@ -138,5 +138,5 @@ def test_bounds_from_statistics_hold_on_random_specimens():
     (line,) = (each for each in told.splitlines() if each.startswith("all: "))
     held, asked = int(line.split("held in ")[1].split(" ")[0]), int(line.split("told in ")[1].split(" ")[0])
     assert asked >= 30
-    # Numbers of one draw stand or fall together: the scatter is that of the draws.
+    # Values of one specimen are correlated: the scatter follows from 30 independent specimens.
     assert held / asked > 0.9 - 3 * math.sqrt(0.9 * 0.1 / 30)

@@ -1,4 +1,4 @@
-"""The table's mass is told by how the specimen's resonances pull at the base."""
+"""The table mass is identified from the notches that the specimen's resonances cause in the base motion."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg
 
 @pytest.fixture(scope="module")
 def updated(tmp_path_factory):
-    """Fit what the virtual rig, whose configuration is right, shows of weak noise."""
+    """Fit a weak-noise recording of the virtual rig, whose configuration is correct."""
     plan = WhiteNoise(
         amplitude_vpp=0.05,
         band_start_hz=50,

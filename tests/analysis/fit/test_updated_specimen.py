@@ -1,4 +1,4 @@
-"""Another specimen than the bench says is found again from its recordings, and then lies on them."""
+"""A specimen that differs from the bench description is identified from its recordings."""
 
 import math
 from dataclasses import replace
@@ -65,7 +65,7 @@ def sweep_file(folder, rng):
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """A folder with weak noise and a colliding sweep of the true specimen; the bench says the paper's."""
+    """Record weak noise and a colliding sweep of the true specimen; the bench states the paper's values."""
     folder, rng = tmp_path_factory.mktemp("shaken"), np.random.default_rng(11)
     sweep, first_hz = sweep_file(folder, rng)
     return noise_file(folder, rng), sweep, first_hz
@@ -85,7 +85,7 @@ def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(upda
     assert [each.parameter for each in updated.values] == [*LINEAR, Parameter.GAP]
     for each in updated.values:
         truth = parameter_value(TRUE, each.parameter)
-        # 95 % of one value; of five at once some lie a little outside of that.
+        # Each interval covers 95 %: one of five values may lie slightly outside.
         slack = 0.7 * (each.high - each.low) / 2
         assert each.low - slack <= truth <= each.high + slack, each
         assert not each.low <= each.nominal <= each.high, each
@@ -145,7 +145,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
 
 
 def test_the_lag_of_a_swept_response_is_predicted_by_its_rate():
-    """Against the motion itself, for which the steady answer comes too early."""
+    """The predicted lag matches the simulated sweep; the steady response has a larger error."""
     rate, free, at_hz = 10.0, gong2025(contact="linear"), np.array([252.0, 257.0, 262.0, 272.0, 280.0])
     motion = synthetic.chirp(8.0, 225.0, 305.0, 1e-6)
     drive = Sampled(np.append(motion.displacement_m, motion.displacement_m[-1]), synthetic.RATE)
@@ -160,7 +160,7 @@ def test_the_lag_of_a_swept_response_is_predicted_by_its_rate():
     assert np.max(np.abs(lagging / seen - 1)) < 0.5 * np.max(np.abs(steady / seen - 1))
 
 
-def test_without_a_sweep_the_gap_is_not_fitted_and_a_reason_is_given(measured):
+def test_the_gap_is_not_fitted_without_a_sweep_and_a_reason_is_given(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m

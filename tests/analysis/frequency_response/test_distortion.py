@@ -1,4 +1,4 @@
-"""An odd multisine in a recording tells even from odd distortion, and both from noise."""
+"""A recorded odd multisine separates even distortion, odd distortion and noise."""
 
 from dataclasses import replace
 
@@ -18,9 +18,9 @@ NOISE_M_PER_S = 2e-5
 
 @pytest.fixture(scope="module")
 def analysed(tmp_path_factory):
-    """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity.
+    """Return a function that analyses a mass with twice the base motion and a distorted velocity.
 
-    `through` gives another transmission, `base_gain` the base sensor's gain; both may differ by realisation.
+    `through` is the transmission, `base_gain` the base sensor's gain; both may vary by realisation.
     """
 
     def played(
@@ -80,14 +80,14 @@ def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analysed):
     noise = square.detection_noise_m_per_s
     assert square.even_m_per_s > 20 * noise > 20 * square.odd_m_per_s / 3
     assert cube.odd_m_per_s > 20 * noise > 20 * cube.even_m_per_s / 3
-    # A cube scatters realisations; noise is what it was.
+    # A cubic term scatters the realisations; the noise is unchanged.
     assert cube.distortion_share > 10 * cube.noise_share
     assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
 
 
-def test_without_distortion_the_remainder_is_the_added_noise(analysed):
+def test_the_remainder_of_an_undistorted_response_is_the_added_noise(analysed):
     found = distortion(analysed(np.zeros_like).response.periodic)
-    # White noise of variance s^2 puts 4 s^2 over the averaged samples on the square of an amplitude.
+    # White noise of variance s^2 adds 4 s^2 / (averaged samples) to a squared amplitude.
     expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))
     assert found.detection_noise_m_per_s == pytest.approx(expected, rel=0.1)
     assert found.odd_m_per_s < expected > found.even_m_per_s
@@ -126,7 +126,7 @@ def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drif
         np.zeros_like,
         lambda v: 0.02 * v**3,
         lambda v: 0.05 * v**2,
-        lambda v: 0.2 * v**3,  # few lines scatter by less than 3 %
+        lambda v: 0.2 * v**3,  # few spectral lines scatter by less than 3 %
         lambda v: v * (np.abs(v) > 2.0),
     ],
 )
@@ -165,7 +165,7 @@ def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analyse
 
 
 def test_a_shifting_narrow_mode_is_reported_as_drift(analysed):
-    """1.2 % of distortion was reported of a linear specimen whose mode at 264 Hz moved by 0.3 %."""
+    """A linear specimen whose mode at 264 Hz shifted by 0.3 % was once reported with 1.2 % distortion."""
 
     def through(hz, number):
         ratio = hz / (260 * (1 + 0.0015 * number))

@@ -1,4 +1,4 @@
-"""Hits of a hammer in an imported recording: bounds hold, and an exponential window leaves no damping."""
+"""Hammer hits in an imported recording: bounds are correct, also with an exponential window."""
 
 import numpy as np
 import pytest
@@ -33,8 +33,8 @@ def mobility(frequency_hz):
     return sum(s / m / (s**2 + 2 * d * w * s + w**2) for hz, d, m in MODES for w in [2 * np.pi * hz])
 
 
-def hammered(count, seed, apart_s=1.5, noise=0.002):
-    """Force of half sines of 2 ms at slightly irregular times, and the velocity, exact at the samples."""
+def hammering(count, seed, apart_s=1.5, noise=0.002):
+    """Return force (2 ms half sines at irregular times) and exact velocity with noise."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(round((count * apart_s + 0.2) * RATE)) / RATE
     force = np.zeros(time_s.size)
@@ -42,13 +42,13 @@ def hammered(count, seed, apart_s=1.5, noise=0.002):
         at = time_s - 0.1 - apart_s * number - rng.uniform(0, 0.1)
         force += rng.uniform(100, 300) * np.where((at > 0) & (at < 2e-3), np.sin(np.pi * at / 2e-3), 0)
     velocity = np.zeros(time_s.size)
-    # The circular convolution of a record that ends at rest, padded by its own length.
+    # Circular convolution, zero-padded to eight times the record length.
     lines_hz = np.fft.rfftfreq(8 * time_s.size, 1 / RATE)
     velocity = np.fft.irfft(np.fft.rfft(force, 8 * time_s.size) * mobility(lines_hz))[: time_s.size]
     return force, velocity + noise * np.max(np.abs(velocity)) * rng.standard_normal(time_s.size)
 
 
-def imported(folder, force, velocity):
+def import_hits(folder, force, velocity):
     savemat(folder / "hits.mat", {"force": force, "velocity": velocity})
     mapping = ImportMapping.model_validate(MAPPING)
     plan = mapping.measurement.excitation.model_copy(update={"duration_s": force.size / RATE})
@@ -61,8 +61,8 @@ MAPPING["measurement"]["excitation"]["duration_s"] = 1.0
 
 
 def test_a_single_hammer_hit_gives_resonances_without_bounds(tmp_path):
-    """It had bounds from the segments without a hit, which did not hold."""
-    (result,) = analyse_files([imported(tmp_path, *hammered(1, 1))], "hits", Simulation.LEFT_OUT).results
+    """Segments without a hit once gave bounds, which were wrong."""
+    (result,) = analyse_files([import_hits(tmp_path, *hammering(1, 1))], "hits", Simulation.LEFT_OUT).results
     found = result.analysis.response
     assert np.all(np.isinf(found.frequency_response.half_width))
     assert not found.frequency_response.is_significant.any()
@@ -79,9 +79,9 @@ def test_a_single_hammer_hit_gives_resonances_without_bounds(tmp_path):
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_the_damping_of_an_exponential_window_is_subtracted(tmp_path, seed):
-    """Segments end before the response does: an exponential window adds twice the damping of mode 1."""
+    """Segments are shorter than the response; the exponential window adds twice the damping of mode 1."""
     request = FrequencyResponseRequest(segment_s=0.3)
-    found = analyse(imported(tmp_path, *hammered(6, seed)), request).response
+    found = analyse(import_hits(tmp_path, *hammering(6, seed)), request).response
     assert found.hits == 6
     how = found.frequency_response.settings
     assert how.decay_per_s / (2 * np.pi * 80.0) > 2 * 0.01

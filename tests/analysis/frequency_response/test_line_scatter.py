@@ -1,4 +1,4 @@
-"""The scatter that a fit weighs lines by: what the three noises make, whatever few averages say of a line."""
+"""The line scatter used as fit weight follows a model of three noises, not the few averages of one line."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ POWER = 1 - 0.7 / (1 + ((FREQUENCY_HZ - 95) / 3) ** 2)
 SHAPES = np.array([np.ones(RESPONSE.size), np.abs(RESPONSE) ** 2, np.abs(np.gradient(RESPONSE)) ** 2])
 
 
-def told(rng, sizes, freedom):
-    """Give the true relative standard deviation, and one that so few degrees of freedom tell."""
+def estimated_sd(rng, sizes, freedom):
+    """Return the true relative standard deviation and its estimate from few degrees of freedom."""
     true = np.sqrt(sizes @ SHAPES / (np.abs(RESPONSE) ** 2 * POWER))
     return true, true * np.sqrt(rng.chisquare(freedom, true.size) / freedom)
 
@@ -23,18 +23,18 @@ def told(rng, sizes, freedom):
 def test_the_estimated_scatter_of_each_line_matches_its_noise(sizes, freedom):
     rng, ratios = np.random.default_rng(3), []
     for _ in range(40):
-        true, own = told(rng, 1e-6 * np.array(sizes), freedom)
+        true, own = estimated_sd(rng, 1e-6 * np.array(sizes), freedom)
         ratios.append(steady_relative_sd(own, RESPONSE, POWER, freedom) / true)
     typical = np.sqrt(np.mean(np.square(ratios), axis=0))
     near_the_mode = np.abs(FREQUENCY_HZ - 94.6) < 8
     assert np.all(typical[near_the_mode] > 0.8)
     assert np.median(typical) == pytest.approx(1.0, abs=0.06)
-    # Of 2 degrees of freedom each, single lines scatter by more than half.
+    # With 2 degrees of freedom the estimates of single lines scatter by more than 50 %.
     assert np.median(np.std(ratios, axis=0)) < 0.25
 
 
 def test_lines_without_a_value_do_not_affect_other_lines():
-    true, own = told(np.random.default_rng(4), np.array([1e-6, 0.0, 0.0]), 4)
+    true, own = estimated_sd(np.random.default_rng(4), np.array([1e-6, 0.0, 0.0]), 4)
     value = RESPONSE.copy()
     value[40], own[90] = np.nan, np.inf
     found = steady_relative_sd(own, value, POWER, 4)
@@ -52,6 +52,6 @@ def test_scatter_is_zero_without_noise_and_unchanged_with_many_averages():
 @pytest.mark.parametrize("freedom", [1e-3, 0.06, 1.9])
 @pytest.mark.parametrize("lines", [2, 5, RESPONSE.size])
 def test_less_than_one_effective_average_gives_a_finite_scatter(freedom, lines):
-    _, own = told(np.random.default_rng(6), np.array([1e-6, 0.0, 0.0]), 2)
+    _, own = estimated_sd(np.random.default_rng(6), np.array([1e-6, 0.0, 0.0]), 2)
     found = steady_relative_sd(own[:lines], RESPONSE[:lines], POWER[:lines], freedom)
     assert np.all(np.isfinite(found) & (found > 0))

@@ -1,4 +1,4 @@
-"""What an analyst asks of noise: the lines, averages, estimator and quantity that come out of it."""
+"""Noise analysis requests: resolution, averages, estimator and quantity of the result."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_an_estimator_biased_by_noise_gives_a_remark(streamed_noise, tmp_path, e
     else:
         velocity = velocity + 0.3 * np.std(velocity) * rng.standard_normal(velocity.size)
     path = synthetic.write_recording(tmp_path, plan, base, velocity, parts)
-    # The ratio tells of noise on the other channel.
+    # A wrong noise ratio makes the HV estimate biased by noise on the other channel.
     ratio = {"noise_ratio": 1e6 if noisy == "base" else 0.0} if estimator is Estimator.HV else {}
     with open_recording(path) as recording:
         checks = analyse(recording, FrequencyResponseRequest(estimator=estimator, **ratio)).checks
@@ -75,7 +75,7 @@ def test_the_longest_segment_still_gives_the_requested_averages(samples, average
         return
     hop = hop_samples(segment, overlap)
     used = np.ones((samples - segment) // hop + 1, dtype=bool)
-    # A hop is a whole number of samples, so that a segment may be missing at the end.
+    # The hop is rounded to whole samples, so one segment may be missing at the end.
     assert effective_averages(taper(window, segment), hop, used) > 0.93 * averages * (1 - 1 / used.size)
 
 

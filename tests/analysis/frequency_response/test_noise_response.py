@@ -1,4 +1,4 @@
-"""Streamed noise from the output to the resonances: the virtual rig's own recordings against closed forms."""
+"""Resonances and transmission from streamed noise on the virtual rig match the closed forms."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from vibench.sim import base_transmissibility, gong2025
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
 WEAK_VPP, STRONG_VPP = 0.067, 7.0
-# The weak one long enough for its lines to be finer than the narrowest resonance, of 1.1 Hz.
+# Weak noise lasts long enough to resolve the narrowest resonance, 1.1 Hz wide.
 DURATION_S = {WEAK_VPP: 18.0, STRONG_VPP: 30.0}
 
 pytestmark = pytest.mark.thorough
@@ -50,7 +50,7 @@ def responses(tmp_path_factory):
 
 
 def exact(frequency_hz):
-    """X / U without contact, in closed form: what the sensors do is taken out of the estimate."""
+    """X / U without contact in closed form; the estimate is corrected for the sensors."""
     return base_transmissibility(gong2025(), frequency_hz)[:, 0]
 
 
@@ -70,7 +70,7 @@ def test_bounds_of_weak_noise_contain_the_exact_curve_at_95_percent_of_lines(res
     found = getattr(responses[WEAK_VPP], estimator)
     truth = exact(found.frequency_hz)
     size = np.abs(truth)
-    # Some 1100 lines, of which a Hann window makes every third one independent: 1.2 % of scatter.
+    # With a Hann window every third of some 1100 lines is independent: 1.2 % of scatter.
     held = (found.magnitude_lower <= size) & (size <= found.magnitude_upper)
     assert np.mean(held) == pytest.approx(0.95, abs=0.035)
     turned = np.abs(np.angle(truth / found.value)) <= phase_half_width(found.half_width)
@@ -91,7 +91,7 @@ def test_weak_noise_shows_the_three_true_resonances(responses):
 
 def test_strong_noise_shows_the_two_terminal_resonances(responses):
     found = responses[STRONG_VPP].resonances
-    # Bound for most of the time, and not for all of it: a little below 201.5 and 436.0 Hz.
+    # m1 and m2 are joined most of the time: slightly below the terminal 201.5 and 436.0 Hz.
     assert [each.frequency_hz for each in found] == [
         pytest.approx(198, abs=3),
         pytest.approx(423, abs=12),
@@ -99,7 +99,7 @@ def test_strong_noise_shows_the_two_terminal_resonances(responses):
     assert np.median(responses[STRONG_VPP].frequency_response.coherence) < 0.9
 
 
-def test_the_base_level_of_noise_is_proportional_to_its_setting(responses):
+def test_the_base_level_of_noise_is_proportional_to_the_generator_voltage(responses):
     weak, strong = (responses[each].base_level.rms_acceleration for each in (WEAK_VPP, STRONG_VPP))
     assert strong / weak == pytest.approx(STRONG_VPP / WEAK_VPP, rel=0.05)
 
@@ -109,7 +109,7 @@ def test_streamed_noise_has_no_periodic_response(responses):
 
 
 class Short:
-    """Less than a second of nothing."""
+    """Channels of a silent record of 80 ms."""
 
     sample_rate_hz = 1000.0
     samples = 80

@@ -1,4 +1,4 @@
-"""Periodic noise: no leakage between two clocks, noise and distortion apart, bounds that hold."""
+"""Periodic noise: no leakage between two clocks, separate noise and distortion, correct bounds."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ RATE = 5120.0
 
 
 def periodic_frequency_response(realisations, rate_hz, *, repetition_hz, delay_s=0.0, orders=None):
-    """Add every (drive, base, response) of a multisine, and estimate."""
+    """Estimate the transmission from realisations (drive, base, response) of a multisine."""
     sums = PeriodicSums(rate_hz, repetition_hz)
     for rows in realisations:
         sums.add(*rows)
@@ -20,7 +20,7 @@ def periodic_frequency_response(realisations, rate_hz, *, repetition_hz, delay_s
 
 
 def multisine(orders, phases, period_samples, samples):
-    """Unit sines at multiples of the repetition, sampled by a clock on which a period is not whole."""
+    """Return the sum of unit sines; the period need not be a whole number of samples."""
     turns = np.arange(samples) / period_samples
     return np.sum(
         [np.cos(2 * np.pi * ((k * turns) % 1) + p) for k, p in zip(orders, phases, strict=True)], axis=0
@@ -76,7 +76,7 @@ def test_the_measured_repetition_period_scatters_as_stated():
 
 
 def test_zero_order_hold_images_do_not_affect_clock_or_band():
-    """8192 points held over a period put an image of the band 8192 lines higher, 22 dB down."""
+    """A zero-order hold of 8192 points per period adds an image of the band at 8192 - k, 22 dB lower."""
     rng = np.random.default_rng(9)
     period = 51200 * (1 + 60e-6)
     band, image = np.arange(20, 600, 19), 8192 - np.arange(20, 600, 19)
@@ -104,7 +104,7 @@ def test_the_delay_of_the_response_channel_is_removed():
 
 @pytest.mark.parametrize("count", [2, 3, 8])
 def test_transmission_bounds_have_their_stated_coverage(count):
-    """Noise and distortion both: a static cube makes the realisations differ beyond the noise."""
+    """A static cubic nonlinearity makes the realisations differ by more than the noise."""
     rng = np.random.default_rng(count)
     period, orders, cube = 128, np.arange(1, 31), 0.02
     power = orders.size / 2
@@ -129,7 +129,7 @@ def test_transmission_bounds_have_their_stated_coverage(count):
 
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
 def test_the_linear_gain_of_a_cubic_nonlinearity_matches_the_closed_form(sigma):
-    """u + 0.1 u^3 driven by noise of variance s^2 looks like the gain 1 + 0.3 s^2."""
+    """The linear gain of u + 0.1 u^3 for noise of variance s^2 is 1 + 0.3 s^2."""
     rng = np.random.default_rng(4)
     orders = np.arange(1, 201)
     sums = PeriodicSums(RATE, RATE / 1024)

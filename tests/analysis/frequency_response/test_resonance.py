@@ -1,4 +1,4 @@
-"""Resonances: exact on exact curves, as scattered as stated on noisy ones, silent where there is none."""
+"""Resonance fits: exact without noise, correct uncertainties with noise, none in pure noise."""
 
 import dataclasses
 import runpy
@@ -58,7 +58,7 @@ def specimen(frequency_hz):
 
 
 def modes():
-    """Natural frequencies and damping ratios of the specimen from its eigenvalue problem."""
+    """Natural frequencies [Hz] and damping ratios of the specimen from its eigenvalue problem."""
     masses = np.array([5.8e-3, 2.1e-3, 2e-3])
     k0, k1, k2 = masses * (2 * np.pi * np.array([322.0, 100.0, 390.6])) ** 2
     matrix = np.array([[k0 + k2, 0, -k2], [0, k1, -k1], [-k2, -k1, k1 + k2]])
@@ -133,7 +133,7 @@ def test_a_resonance_in_noise_is_found_and_checked_for_resolution():
 
 
 def _streamed(rng, modes, noise, window="hann", seconds=60):
-    """Lines of streamed noise through modes (natural frequency, damping ratio, share), 0.25 Hz apart."""
+    """Transmission at 0.25 Hz spacing for noise through modes (natural frequency, damping, share)."""
     rate, samples = 1024.0, int(1024 * seconds)
     drive = rng.standard_normal(samples)
     frequency_hz = np.fft.rfftfreq(samples, 1 / rate)
@@ -204,7 +204,7 @@ def test_bounds_of_close_modes_hold(shares, seed, draw):
 @pytest.mark.thorough
 def test_a_resonance_fit_that_misses_the_lines_reports_its_chi_square():
     lines = _streamed(np.random.default_rng(5), [(200.0, 0.01)], 0.01)
-    # A seventh of the magnitude on alternate pairs of lines: no sum of three modes does that.
+    # An alternating error of 15 % on pairs of lines cannot be fitted by three modes.
     pairs = 1 + 0.15 * (-1.0) ** (np.arange(lines.value.size) // 2)
     (each,) = resonances(dataclasses.replace(lines, value=lines.value * pairs), low_hz=190, high_hz=210)
     assert each.reduced_chi_square > 10 * each.chi_square_limit
@@ -228,7 +228,7 @@ def test_a_band_with_too_few_lines_is_refused():
 def test_frequency_and_damping_of_every_mode_are_within_bounds():
     frequency_hz = np.arange(50.0, 601.0)
     exact = specimen(frequency_hz)
-    # The same absolute noise on every line: the mode at 500 Hz stands on the skirts of the other two.
+    # The absolute noise is equal on all lines; the mode at 500 Hz lies on the flanks of the others.
     noise = 0.01 * np.median(np.abs(exact))
     natural_hz, damping = modes()
     rng, draws, held = np.random.default_rng(9), 60, np.zeros((3, 2))
@@ -239,14 +239,14 @@ def test_frequency_and_damping_of_every_mode_are_within_bounds():
         for number, each in enumerate(found):
             held[number, 0] += abs(each.frequency_hz - natural_hz[number]) < 1.96 * each.sd_frequency_hz
             held[number, 1] += abs(each.damping_ratio - damping[number]) < 1.96 * each.sd_damping_ratio
-    # 0.95 less three standard deviations of 60 draws; single fits held the frequency at 500 Hz in 0.3.
+    # 0.95 minus three standard deviations; single-mode fits had a coverage of 0.3 at 500 Hz.
     assert np.all(held / draws > 0.865)
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("accelerometer", [0.3, 0.003])
 def test_bounds_of_every_mode_hold_with_two_realisations_of_noise(accelerometer):
-    """The base moves a third of what it does elsewhere where the first mode pulls at it, one line wide."""
+    """The base motion has a notch to 30 % at the first mode, narrow compared with the line spacing."""
     rate, points, realisations = 4096.0, 2048, 2
     driven = np.arange(25, 301)
     frequency_hz = 2.0 * driven
@@ -277,18 +277,18 @@ def test_bounds_of_every_mode_hold_with_two_realisations_of_noise(accelerometer)
                 abs(each.damping_ratio - damping[number]) < 2 * each.sd_damping_ratio,
                 abs(each.peak_magnitude - peaks[number]) < 2 * each.sd_peak_magnitude,
             )
-    # 0.95 less three standard deviations of 36 draws; with the relative scatter of neighbours averaged in
-    # 0.68 to 0.78 at 95 Hz, with each line's own variance 0.78 to 0.88 at 500 Hz.
+    # 0.95 minus three standard deviations; coverage with the scatter averaged over neighbours was
+    # 0.68 to 0.78 at 95 Hz, and with the variance of each line alone 0.78 to 0.88 at 500 Hz.
     assert np.all(held / draws > 0.84)
 
 
 @pytest.mark.thorough
 def test_correlated_lines_widen_resonance_bounds():
-    """As collisions do: fits that take lines as independent hold fewer than six of ten frequencies."""
+    """Collisions correlate lines; fits that assume independent lines cover less than 60 %."""
     frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 30
     rng, independent, together = np.random.default_rng(13), 0, 0
 
-    def told(values):
+    def curve_of(values):
         value = values.mean(axis=0)
         variance = np.sum(np.abs(values - value) ** 2, axis=0) / (len(values) - 1) / len(values)
         spread = np.sqrt(variance / 2) / np.abs(value)
@@ -306,9 +306,9 @@ def test_correlated_lines_widen_resonance_bounds():
                 for _ in range(realisations)
             ]
         )
-        (found,) = resonances(told(values), low_hz=100, high_hz=300)
+        (found,) = resonances(curve_of(values), low_hz=100, high_hz=300)
         without = [
-            resonances(told(np.delete(values, place, axis=0)), low_hz=100, high_hz=300)
+            resonances(curve_of(np.delete(values, place, axis=0)), low_hz=100, high_hz=300)
             for place in range(realisations)
         ]
         (widened,) = scattered_resonances([found], without)
@@ -326,14 +326,14 @@ def test_a_resonance_in_one_realisation_only_is_rejected():
 
 
 def test_different_fit_bands_do_not_count_as_scatter_of_realisations():
-    """Seven of twelve leave-outs fit all modes together, as the whole does, and five this one alone."""
+    """Seven of twelve leave-one-out fits use all modes, as the full fit does; five use this mode alone."""
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 183.2, 0.06)), low_hz=100, high_hz=300)
     found = replace(found, lines_used=360)
     together = [replace(found, frequency_hz=183.2 + 0.01 * step) for step in range(-3, 4)]
     alone = [replace(found, frequency_hz=186.0, lines_used=105)] * 5
     (widened,) = scattered_resonances([found], [[each] for each in together + alone])
-    # Between the two fits lie 2.8 Hz; eleven times that would be said of realisations.
+    # The two fits differ by 2.8 Hz; a jackknife would count this eleven times as scatter.
     assert 1.0 < widened.sd_frequency_hz < 2.0
 
 

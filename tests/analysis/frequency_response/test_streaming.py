@@ -1,4 +1,4 @@
-"""Long records are analysed block by block: memory does not grow with them, and a watcher sees them pass."""
+"""Long records are analysed in blocks: memory is bounded, and progress is reported."""
 
 import tracemalloc
 
@@ -15,7 +15,7 @@ RATE = 51_200.0
 
 
 class Endless:
-    """Noise made when it is read; nothing of it is kept."""
+    """Channels of noise that is generated on reading and not stored."""
 
     sample_rate_hz = RATE
     response_delay_s = 0.0

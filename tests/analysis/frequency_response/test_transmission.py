@@ -1,4 +1,4 @@
-"""Transmission from noise: agreement with scipy, closed forms, and bounds that cover what they promise."""
+"""Transmission from noise agrees with scipy and closed forms, and its bounds have their coverage."""
 
 from itertools import pairwise
 
@@ -55,7 +55,7 @@ def test_the_block_size_does_not_change_the_transmission(cuts, overlap):
     ("overlap", "n_eff", "spread"), [(0.0, 64, 0.0884), (0.5, 120.4, 0.0645), (0.75, 131.7, 0.0616)]
 )
 def test_the_stated_uncertainty_is_the_scatter_of_repeated_estimates(overlap, n_eff, spread):
-    """H = 1 and a signal-to-noise ratio of 1: coherence 1/2, relative spread 1/sqrt(2 n_eff)."""
+    """For H = 1 and a signal-to-noise ratio of 1: coherence 1/2, relative spread 1/sqrt(2 n_eff)."""
     segment, repeats = 64, 600
     rng = np.random.default_rng(4)
     values, coherences = [], []
@@ -148,7 +148,7 @@ def test_gaps_reduce_the_number_of_segments_but_not_the_coherence():
 
 
 def test_gaps_reduce_the_effective_averages():
-    """Every second of the half-overlapped segments missing: the rest are independent."""
+    """Without every second segment the half-overlapped segments are independent."""
     x = noise(15, 10_000)
     valid = np.ones(x.size, dtype=bool)
     valid[1500::1000] = True

@@ -1,4 +1,4 @@
-"""Bounds of overlapping, tapered segments hold the truth as often as they say, whatever the estimator."""
+"""Bounds from overlapping, tapered segments have their stated coverage for every estimator."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SECOND_ORDER = 0.004
 
 
 def coverage(estimator, overlap, averages, repeats, seed):
-    """Shares of (magnitude, phase) bounds that hold the truth H = 1, and the shares' own standard error."""
+    """Coverage of magnitude and phase bounds for the true H = 1, and its standard error."""
     rng = np.random.default_rng(seed)
     held_magnitude = held_phase = trials = 0
     for _ in range(repeats):

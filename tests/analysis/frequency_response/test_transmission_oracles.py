@@ -1,4 +1,4 @@
-"""Transmission against pyFRF, if installed, on the same samples."""
+"""Transmission and coherence agree with pyFRF, if installed, on the same samples."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ SEGMENT = 512
 
 @pytest.fixture(scope="module")
 def noisy_pair():
-    """A resonance at 260 Hz under noise, with noise on the drive and on the response."""
+    """Drive and response of a resonance at 260 Hz, both with added noise."""
     rng = np.random.default_rng(31)
     omega, damping = 2 * np.pi * 260, 0.02
     section = signal.bilinear([2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2], fs=RATE)
@@ -26,8 +26,8 @@ WITHOUT_MEAN = slice(1, None)
 
 
 @pytest.fixture(scope="module", params=["boxcar", "hann"])
-def pyfrf_answer(noisy_pair, request):
-    """What pyFRF averages over half-overlapping segments; its Hann is the symmetric one, so it gets ours."""
+def pyfrf_estimate(noisy_pair, request):
+    """Window name and pyFRF's average over half-overlapping segments, tapered by our periodic window."""
     pyfrf = pytest.importorskip("pyFRF")
     taper = signal.get_window(request.param, SEGMENT)
     drive, response = (
@@ -44,12 +44,12 @@ def pyfrf_answer(noisy_pair, request):
     [
         (Estimator.H1, "get_H1", {}),
         (Estimator.H2, "get_H2", {}),
-        # pyFRF takes both noises for equally strong, whatever the channels' units are.
+        # pyFRF assumes equal noise on both channels, independent of their units.
         (Estimator.HV, "get_Hv", {"noise_ratio": 1.0}),
     ],
 )
-def test_h1_h2_and_hv_match_pyfrf(noisy_pair, pyfrf_answer, estimator, method, how):
-    window, theirs = pyfrf_answer
+def test_h1_h2_and_hv_match_pyfrf(noisy_pair, pyfrf_estimate, estimator, method, how):
+    window, theirs = pyfrf_estimate
     ours = transmissibility(
         *noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how
     )
@@ -59,8 +59,8 @@ def test_h1_h2_and_hv_match_pyfrf(noisy_pair, pyfrf_answer, estimator, method, h
     )
 
 
-def test_coherence_matches_pyfrf(noisy_pair, pyfrf_answer):
-    window, theirs = pyfrf_answer
+def test_coherence_matches_pyfrf(noisy_pair, pyfrf_estimate):
+    window, theirs = pyfrf_estimate
     ours = transmissibility(*noisy_pair, RATE, segment_samples=SEGMENT, window=window)
     np.testing.assert_allclose(
         ours.coherence[WITHOUT_MEAN], theirs.get_coherence()[0][WITHOUT_MEAN], rtol=1e-10

@@ -1,4 +1,4 @@
-"""Recordings of the virtual rig's world, each made once, and specimens described otherwise than they are."""
+"""Recordings of the virtual rig, each made once, and specimens with a wrong description."""
 
 from dataclasses import replace
 
@@ -9,25 +9,25 @@ from tests.analysis.hidden_motion import live_world as live, shaken_world as wor
 
 @pytest.fixture(scope="session")
 def live_world():
-    """Shake the rig's specimen, and follow it with a live twin."""
+    """Return a function that shakes the rig's specimen and tracks it with a live twin."""
     return live.live_world
 
 
 @pytest.fixture
 def at_once():
-    """Where numbers are found before anything goes on."""
+    """Return an executor that computes each job at once in the calling thread."""
     return live.AtOnce()
 
 
 @pytest.fixture
 def virtual_rig():
-    """The shipped virtual rig's configuration."""
+    """Configuration of the shipped virtual rig."""
     return world.RIG
 
 
 @pytest.fixture(scope="session")
 def world_recording(tmp_path_factory):
-    """Shake a specimen in the world and record it; the same shaking is done once."""
+    """Return a function that records a simulated specimen; equal requests are recorded once."""
     made = {}
 
     def make(kind, level_vpp, **how):
@@ -40,7 +40,7 @@ def world_recording(tmp_path_factory):
 
 
 def other(specimen, *, m1=1.0, gaps=(1.0, 1.0), dampings=(1.0, 1.0, 1.0)):
-    """Describe a specimen with other numbers, each a factor."""
+    """Return a specimen whose m1, gaps and dampings are multiplied by the given factors."""
     lower, upper = specimen.gaps_m
     m0, mass, m2 = specimen.masses
     return replace(
@@ -54,5 +54,5 @@ def other(specimen, *, m1=1.0, gaps=(1.0, 1.0), dampings=(1.0, 1.0, 1.0)):
 
 @pytest.fixture
 def described_otherwise():
-    """Give a specimen other numbers than it has."""
+    """Return the function that describes a specimen with wrong values."""
     return other

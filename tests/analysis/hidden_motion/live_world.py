@@ -1,4 +1,4 @@
-"""A world whose samples are fed to a live twin as they come."""
+"""A simulated rig whose samples are fed to a live twin block by block."""
 
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ ROLES = ("base_acceleration", "m0_velocity")
 
 
 class AtOnce(Executor):
-    """Does what it is given before it goes on: a test whose outcome no clock decides."""
+    """Executor that runs each job at once, so that the result of a test does not depend on timing."""
 
     def submit(self, fn, /, *args, **kwargs):
         future = Future()
@@ -26,7 +26,7 @@ class AtOnce(Executor):
 
 @dataclass
 class LiveWorld:
-    """A world that plays, and the twin that follows it."""
+    """The simulated rig in motion, and the live twin that tracks it."""
 
     rig: object
     world: World
@@ -37,14 +37,14 @@ class LiveWorld:
     samples: int = 0
 
     def go_on(self, samples: int) -> tuple[str, ...]:
-        """Let the next samples come."""
+        """Feed the next samples to the twin and return its sentences."""
         volts = self.conversion.read(samples)
         base, velocity = (volts[row] * gain for row, gain in self.gains)
         first, self.samples = self.samples, self.samples + samples
         return self.twin.take(first, base, velocity, self.frequency_hz)
 
     def p(self):
-        """Give the world's p at every sample so far; its truth is then handed over."""
+        """Return the true p [m] at every sample so far; clears the stored truth."""
         truth = self.world.truth()
         shaken = shaken_world
         rows = ((np.arange(self.samples) - shaken.GROUP_DELAY) * (shaken.GRID_HZ / RATE_HZ) - 1).astype(int)
@@ -52,7 +52,7 @@ class LiveWorld:
 
 
 def live_world(kind, level_vpp, duration_s, seed, known=None, dropouts_per_s=0.0):
-    """Begin to shake the rig's specimen."""
+    """Start to shake the rig's specimen."""
     rig = shaken_world.noisy(1.0, seed, dropouts_per_s)
     world = World(rig, shaken_world.Played(shaken_world.drive(kind, level_vpp, duration_s, seed)))
     world.keep_truth()

@@ -1,4 +1,4 @@
-"""Recordings of the virtual rig's world, noise included, with the motion that no instrument showed."""
+"""Recordings of the virtual rig with noise, and the true motion that no sensor measured."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,7 @@ SCORED_FROM_S = 0.4
 
 
 class Played:
-    """A terminal that plays samples on the world's grid, and is silent behind them."""
+    """A generator output that plays samples on the simulation's time grid and is zero afterwards."""
 
     def __init__(self, volts):
         self.volts = volts
@@ -42,7 +42,7 @@ class Played:
 
 
 def drive(kind, level_vpp, duration_s, seed):
-    """Give volts of a sine at a frequency, a sweep or random noise in 50 to 600 Hz, raised from nothing."""
+    """Return the drive [V] of a sine, a sweep or random noise in 50 to 600 Hz, ramped up from zero."""
     time_s = (np.arange(int(duration_s * GRID_HZ)) + 0.5) / GRID_HZ
     match kind:
         case float():
@@ -61,20 +61,20 @@ def drive(kind, level_vpp, duration_s, seed):
 
 @dataclass(frozen=True)
 class Shaken:
-    """A recording, and what really happened."""
+    """A recording and the true motion."""
 
     path: Path
     specimen: Specimen
     p: np.ndarray
-    """At the recording's samples [m]."""
+    """True p at the recording's samples [m]."""
     touches: np.ndarray
-    """Samples at which contacts began, fractions included."""
+    """Begin of each contact, as a fractional sample number."""
     middles: np.ndarray
-    """... and in their middle."""
+    """Middle of each contact, as a fractional sample number."""
 
 
 def noisy(times, seed, dropouts_per_s=0.0):
-    """Give the rig with all noise so many times larger, and a vibrometer that loses its light."""
+    """Return the rig with all noise multiplied by ``times`` and a rate of vibrometer drop-outs."""
     virtual = RIG.virtual.model_copy(
         update={
             "seed": seed,
@@ -88,7 +88,7 @@ def noisy(times, seed, dropouts_per_s=0.0):
 
 
 def with_sensor(rig, role):
-    """Give the rig a further sensor in place of the amplifier's wire."""
+    """Return the rig with a further sensor in place of the amplifier voltage channel."""
     said = rig.model_dump(mode="json")
     (wire,) = [each for each in said["daq"]["channels"] if each["role"] == "amplifier_voltage"]
     wire.update(role=role, attenuation=1.0, range_v=5.0)
@@ -102,7 +102,7 @@ def with_sensor(rig, role):
 
 
 def contacts(p, gaps_m):
-    """Find when |p| passed a gap, in grid steps: beginnings and ends in the order of time."""
+    """Return begin and end of each contact in grid steps, in the order of time."""
     found = []
     for side, gap in zip((-1, 1), gaps_m, strict=True):
         depth = side * p - gap
@@ -158,7 +158,7 @@ def shaken(
     specimen=None,
     further=None,
 ):
-    """Let the world move a specimen, and write what the converter saw as a recording."""
+    """Simulate a specimen on the virtual rig and write the converter's samples as a recording."""
     rig = noisy(noise, seed, dropouts_per_s)
     if further is not None:
         rig = with_sensor(rig, further)

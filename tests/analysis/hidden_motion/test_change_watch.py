@@ -1,4 +1,4 @@
-"""The sequential test for a change of the specimen, and the baseline that it is held against."""
+"""The sequential test for a change of the specimen, and its baseline."""
 
 import math
 from datetime import UTC, datetime
@@ -42,12 +42,12 @@ def test_the_change_alarm_is_given_once():
 
 
 def test_the_false_alarm_rate_is_within_its_bound():
-    """At a share so large that alarms can be counted, Lorden's bound of their rate holds; and as stated."""
+    """Lorden's bound on the false alarm rate is met; with 30 % of blocks out, alarms are frequent."""
     rng = np.random.default_rng(8)
     day = np.where(rng.random(10 * 36_000) < 0.01, OUT, WITHIN)
     assert alarms_after(day) is None
     blocks_between = FALSE_ALARM_S / BLOCK_S
-    # In a row of n blocks, at a share q, alarms of five in a row alone come n q^5 times.
+    # If a share q of n blocks is out by chance, five in a row occur about n q^5 times.
     assert 0.01**5 * blocks_between < 0.01
     often = [alarms_after(np.where(rng.random(4000) < 0.3, OUT, WITHIN)) for _ in range(20)]
     assert all(often)

@@ -1,4 +1,4 @@
-"""Gaps and loss without a contact model: told by impacts that differ, and by none that are all alike."""
+"""Gaps and loss without a contact model: determined by differing impacts, not by identical ones."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ GAP_M, DEPTH_M = 45e-6, 1.4e-6
 
 
 def impacts(spread, error_m=0.0, loss_s_per_m=0.0, count=400):
-    """Impacts on both sides whose depths scatter by a share; p is off by a cycle of four errors."""
+    """Return impacts on both sides with scattered depths; the error of p has a cycle of four impacts."""
     rng = np.random.default_rng(3)
     depth = 1.0 + spread * rng.uniform(-1.0, 1.0, count)
     sides = np.where(np.arange(count) % 2, 1.0, -1.0)
@@ -34,7 +34,7 @@ def test_differing_impacts_determine_gaps():
 
 @pytest.mark.parametrize("error_m", [0.0, 1e-7, 4e-7])
 def test_identical_impacts_determine_no_gap(error_m):
-    """A motion that had settled told (48.0 +- 1.1) um of 45: a line through one point leads anywhere."""
+    """A settled motion once gave a gap of (48.0 +- 1.1) um for 45: one point determines no line."""
     alike = impacts(0.03, error_m)
     assert free_gaps(alike) == (None, None)
     assert np.all(np.isnan(measured_gaps(alike)))

@@ -1,4 +1,4 @@
-"""The hidden motion against the virtual world's: what is followed is right, and what is not is said."""
+"""The estimated hidden motion matches the simulated one, or the result states that it cannot be tracked."""
 
 from dataclasses import replace
 
@@ -20,21 +20,21 @@ PAIRED_S = 1e-4
 """Told and true impacts nearer than this are one."""
 
 
-def told(recorded, **how):
+def estimate(recorded, **how):
     with open_recording(recorded.path) as recording:
         return hidden_motion(recording, **how)
 
 
 def errors_of(motion, recorded, p):
-    """Give the error of p where it is told and scored, and which samples those are."""
+    """Return the error of p [m], and a mask of the samples with an estimate in the scored range."""
     first = motion.first_sample
     difference = p - recorded.p[first : first + p.size]
     scored = np.arange(p.size) >= SCORED_FROM_S * motion.sample_rate_hz
     return difference, scored & ~np.isnan(p)
 
 
-def paired(found, true, reach):
-    """Pair one to one: how many of the true ones were found, how many found are none, and their errors."""
+def matches(found, true, reach):
+    """Match found to true impacts one to one; return hits, false detections and timing errors."""
     free = list(found)
     near = []
     for each in true:
@@ -47,9 +47,9 @@ def paired(found, true, reach):
 def impacts_scored(motion, recorded, found, true):
     rate = motion.sample_rate_hz
     low, high = SCORED_FROM_S * rate, motion.first_sample + motion.tracked.p.size - 0.02 * rate
-    told_at = found + motion.first_sample
+    found_at = found + motion.first_sample
     inner = np.sort(true[(true > low) & (true < high)])
-    return paired(told_at[(told_at > low - 5) & (told_at < high + 5)], inner, PAIRED_S * rate), inner.size
+    return matches(found_at[(found_at > low - 5) & (found_at < high + 5)], inner, PAIRED_S * rate), inner.size
 
 
 @pytest.mark.thorough
@@ -57,9 +57,9 @@ def impacts_scored(motion, recorded, found, true):
     ("kind", "level_vpp", "seed"), [(260.0, 1.5, 43), ("sweep", 1.5, 44), ("noise", 10.0, 45)]
 )
 def test_a_track_continues_through_vibrometer_drop_outs(world_recording, kind, level_vpp, seed):
-    """Ten times a second; bridges that were taken for motion lost a third of the track and all numbers."""
+    """With 10 drop-outs per second, a third of the track and all parameters were once lost."""
     recorded = world_recording(kind, level_vpp, seed=seed, duration_s=3.0, dropouts_per_s=10.0)
-    motion = told(recorded)
+    motion = estimate(recorded)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) > 0.95
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
@@ -77,9 +77,9 @@ def test_a_track_continues_through_vibrometer_drop_outs(world_recording, kind, l
     ("kind", "level_vpp", "largest_rms_m"),
     [(260.0, 1.5, 0.1e-6), ("sweep", 1.5, 0.1e-6), ("noise", 10.0, 0.2e-6)],
 )
-def test_tracked_p_and_impacts_match_the_simulation(world_recording, kind, level_vpp, largest_rms_m):
+def test_relative_motion_and_impacts_match_the_simulation(world_recording, kind, level_vpp, largest_rms_m):
     recorded = world_recording(kind, level_vpp, seed=41)
-    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    motion = estimate(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) == 1.0
     assert np.sqrt(np.mean(error[scored] ** 2)) < largest_rms_m
@@ -95,11 +95,11 @@ def test_tracked_p_and_impacts_match_the_simulation(world_recording, kind, level
 
 
 @pytest.mark.thorough
-def test_a_one_sided_stop_is_tracked_and_identified(world_recording):
-    """No number is told of the side on which there is none, and what is not told stands together."""
+def test_a_motion_against_a_one_sided_stop_is_tracked_and_its_gap_identified(world_recording):
+    """No parameter is reported for the missing stop; undetermined parameters share one sentence."""
     one_sided = gong2025(gap_m=(30e-6, np.inf))
     recorded = world_recording(180.0, 0.5, seed=11, specimen=one_sided)
-    motion = told(recorded, specimen=one_sided)
+    motion = estimate(recorded, specimen=one_sided)
     assert motion.tracked.share_followed > 0.95
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
@@ -120,10 +120,10 @@ def test_a_one_sided_stop_is_tracked_and_identified(world_recording):
 def test_chattering_is_tracked_without_a_contact_model(
     world_recording,
 ):
-    """Five impacts a period, most of them with hardly any flight between."""
+    """The motion has five impacts per period, most of them with hardly any flight between them."""
     one_sided = gong2025(gap_m=(30e-6, np.inf))
     recorded = world_recording(260.0, 1.5, seed=11, duration_s=2.6, specimen=one_sided)
-    motion = told(recorded, specimen=one_sided)
+    motion = estimate(recorded, specimen=one_sided)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
     (found, false, _), true = impacts_scored(
@@ -140,7 +140,7 @@ def test_chattering_is_tracked_without_a_contact_model(
 @pytest.mark.thorough
 def test_motion_is_tracked_at_ten_times_the_sensor_noise(world_recording):
     recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
-    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    motion = estimate(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) > 0.98
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.3e-6
@@ -150,11 +150,11 @@ def test_motion_is_tracked_at_ten_times_the_sensor_noise(world_recording):
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "largest_rms_m"), [(260.0, 1.5, 1e-6), ("noise", 10.0, 1.5e-6)]
 )
-def test_without_a_contact_model_motion_impacts_and_gaps_are_reported(
+def test_motion_impacts_and_gaps_are_reported_without_a_contact_model(
     world_recording, kind, level_vpp, largest_rms_m
 ):
     recorded = world_recording(kind, level_vpp, seed=41)
-    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    motion = estimate(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.free.p)
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) > 0.95
     assert np.sqrt(np.mean(error[scored] ** 2)) < largest_rms_m
@@ -173,7 +173,7 @@ def test_without_a_contact_model_motion_impacts_and_gaps_are_reported(
 def test_wrong_gaps_and_m1_are_corrected_from_the_motion(world_recording, described_otherwise):
     recorded = world_recording(260.0, 1.5, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.03, gaps=(0.98, 1.04))
-    motion = told(recorded, specimen=wrong)
+    motion = estimate(recorded, specimen=wrong)
     found = {each.what: each for each in motion.parameters}
     assert motion.found.searched
     truth = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), recorded.specimen.gaps_m, strict=True))
@@ -197,7 +197,7 @@ def test_wrong_springs_and_dampers_are_corrected_from_the_motion(world_recording
         stiffnesses=(0.996 * k0, k1, 1.005 * k2),
         dampings=tuple(1.3 * each for each in dampings),
     )
-    motion = told(recorded, specimen=wrong)
+    motion = estimate(recorded, specimen=wrong)
     found = {each.what: each for each in motion.parameters}
     assert found[Hidden.K0].value == pytest.approx(k0, rel=1e-3)
     assert found[Hidden.K2].value == pytest.approx(k2, rel=1e-3)
@@ -210,26 +210,26 @@ def test_wrong_springs_and_dampers_are_corrected_from_the_motion(world_recording
 @pytest.mark.thorough
 @pytest.mark.parametrize("loss_s_per_m", [0.05, 0.3])
 def test_contact_loss_is_identified_and_not_attributed_to_a_damper(world_recording, loss_s_per_m):
-    """Described as Hertz's, its loss of 0.05 s/m was found as a c1 five times its bounds off."""
+    """With stops described as lossless, a loss of 0.05 s/m once biased c1 by five times its bounds."""
     hertz = gong2025()
     stops = HuntCrossley(hertz.contact.stops.contact_stiffness, loss_s_per_m)
     recorded = world_recording(260.0, 1.5, duration_s=2.6, seed=44, specimen=replace(hertz, contact=stops))
-    motion = told(recorded, specimen=hertz)
+    motion = estimate(recorded, specimen=hertz)
     found = {each.what: each for each in motion.parameters}
     truth = {Hidden.LOSS: loss_s_per_m, Hidden.C1: hertz.dampings[1], Hidden.M1: hertz.masses[1]}
     truth |= dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), hertz.gaps_m, strict=True))
     for what, true in truth.items():
-        # Twice the bounds: five numbers, each of which may miss its 95 %.
+        # Twice the bounds, since each of the five 95 % intervals may miss.
         assert found[what].value == pytest.approx(true, abs=2 * found[what].half_width), what
     assert found[Hidden.LOSS].half_width < 0.01
 
 
 @pytest.mark.thorough
 def test_parameters_are_identified_from_a_motion_that_settles_half_way(world_recording):
-    """Its later impacts are all alike, and a search that looked at its middle began 1.3 um off."""
+    """The later impacts are identical; a search from the middle of the record started 1.3 um off."""
     recorded = world_recording(257.0, 1.7, duration_s=2.2, seed=31)
     m0, m1, m2 = recorded.specimen.masses
-    motion = told(recorded, specimen=replace(recorded.specimen, masses=(m0, 1.03 * m1, m2)))
+    motion = estimate(recorded, specimen=replace(recorded.specimen, masses=(m0, 1.03 * m1, m2)))
     found = {each.what: each for each in motion.parameters}
     assert found[Hidden.M1].value == pytest.approx(m1, rel=1e-3)
     assert found[Hidden.LOWER_GAP].value == pytest.approx(45e-6, abs=0.05e-6)
@@ -237,31 +237,31 @@ def test_parameters_are_identified_from_a_motion_that_settles_half_way(world_rec
 
 @pytest.mark.thorough
 def test_parameters_of_an_unstable_track_are_not_reported(world_recording):
-    """Of rigid stops, described as Hertz's, gaps were told as (42.3 +- 0.9) um, where 45 is true."""
+    """Rigid stops described as Hertzian once gave gaps of (42.3 +- 0.9) um; 45 um is true."""
     usual = gong2025()
     recorded = world_recording(
         257.0, 1.7, duration_s=2.2, seed=31, specimen=replace(usual, contact=RigidStops(0.8))
     )
-    motion = told(recorded, specimen=usual)
+    motion = estimate(recorded, specimen=usual)
     assert not any(each.is_determined for each in motion.parameters)
 
 
 @pytest.mark.thorough
 def test_unconfirmed_parameters_have_no_bounds(world_recording):
-    """Of an m0 that is 3 % heavier than described both gaps were told as (44.0 +- 0.2) um; 45 is true."""
+    """An m0 3 % heavier than described once gave gaps of (44.0 +- 0.2) um; 45 um is true."""
     usual = gong2025()
     m0, m1, m2 = usual.masses
     recorded = world_recording(
         257.0, 1.7, duration_s=2.2, seed=31, specimen=replace(usual, masses=(1.03 * m0, m1, m2))
     )
-    motion = told(recorded, specimen=usual)
+    motion = estimate(recorded, specimen=usual)
     assert not motion.is_confirmed
     assert not any(each.is_determined for each in motion.parameters)
     assert np.all(np.isnan(motion.free.p_sd))
     (said,) = (each for each in motion.sentences if each.startswith("Without a contact model"))
     assert "±" not in said
     assert motion.to_dict()["without_contact_model"]["gaps_sd_m"] in ([None, None], (None, None))
-    # It was said to be too short, of two seconds.
+    # The reason is the description and not the length of the record (2 s).
     assert "may be described wrongly" in motion.sentences[-1]
     assert len(motion.sentences) < 10
 
@@ -272,7 +272,7 @@ def test_unequal_gaps_and_a_linear_contact_law_are_identified(world_recording):
         gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)
     )
     recorded = world_recording(255.0, 2.0, seed=43, specimen=specimen)
-    motion = told(recorded, specimen=specimen)
+    motion = estimate(recorded, specimen=specimen)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) == 1.0
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
@@ -284,7 +284,7 @@ def test_unequal_gaps_and_a_linear_contact_law_are_identified(world_recording):
 def test_an_invalid_track_is_left_out_with_a_reason(world_recording, described_otherwise):
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
-    motion = told(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
+    motion = estimate(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
     assert motion.tracked.share_followed < 0.3
     assert any("residual" in each.reason or "acquired" in each.reason for each in motion.tracked.not_followed)
     missing = sum(each.stop - each.first for each in motion.tracked.not_followed)
@@ -295,7 +295,7 @@ def test_an_invalid_track_is_left_out_with_a_reason(world_recording, described_o
 @pytest.mark.thorough
 def test_a_motion_without_contact_determines_no_gap(world_recording):
     recorded = world_recording(260.0, 0.05, seed=44, duration_s=1.2)
-    motion = told(recorded)
+    motion = estimate(recorded)
     gaps = [each for each in motion.parameters if each.what in {Hidden.LOWER_GAP, Hidden.UPPER_GAP}]
     assert not any(each.is_determined for each in gaps)
     assert all(each.not_determined for each in gaps)
@@ -307,19 +307,19 @@ def test_requests_without_a_result_are_refused_in_a_sentence(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     rigid = replace(recorded.specimen, contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match=r"'rigid' cannot be tracked.*hertz"):
-        told(recorded, specimen=rigid)
+        estimate(recorded, specimen=rigid)
     with pytest.raises(InvalidRequest, match=r"from 1 s to 0\.5 s"):
-        told(recorded, start_s=1.0, stop_s=0.5)
+        estimate(recorded, start_s=1.0, stop_s=0.5)
     with pytest.raises(NotEnoughData, match="too short"):
-        told(recorded, start_s=0.5, stop_s=0.501)
+        estimate(recorded, start_s=0.5, stop_s=0.501)
     slow = world_recording(260.0, 1.5, seed=41, rate_hz=5120.0, duration_s=0.6)
     with pytest.raises(UnusableData, match=r"5120 Hz.*higher rate"):
-        told(slow)
+        estimate(slow)
 
 
 def test_the_hidden_motion_figures_show_the_motion_and_its_impacts(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
-    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    motion = estimate(recorded, numbers=Numbers.AS_DESCRIBED)
     zoom = hidden_motion_figure(motion).tables[0]
     assert max(np.abs(zoom.column("p_m"))) == pytest.approx(46e-6, abs=3e-6)
     tables = {each.name: each for each in hidden_impacts_figure(motion).tables}
@@ -333,8 +333,8 @@ def test_the_hidden_motion_figures_show_the_motion_and_its_impacts(world_recordi
     ("further", "confirms"), [("m2_velocity", True), ("m1_velocity", True), ("m2_acceleration", None)]
 )
 def test_a_second_sensor_does_not_contradict_a_correct_track(world_recording, further, confirms):
-    """Collisions on m2 were taken for drop-outs of its vibrometer, and bridging them took minutes."""
-    motion = told(world_recording(260.0, 1.5, further=further), numbers=Numbers.AS_DESCRIBED)
+    """Collisions in the m2 signal were once mistaken for drop-outs, and bridging took minutes."""
+    motion = estimate(world_recording(260.0, 1.5, further=further), numbers=Numbers.AS_DESCRIBED)
     (check,) = motion.mass_checks
     assert (check.channel, check.confirms) == (further, confirms)
     assert motion.is_confirmed
@@ -349,7 +349,7 @@ def test_a_second_sensor_does_not_contradict_a_correct_track(world_recording, fu
 
 @pytest.mark.parametrize(("scale", "late"), [(0.8, 0), (1.0, 40)])
 def test_a_second_sensor_with_wrong_amplitude_or_phase_refutes_the_track(world_recording, scale, late):
-    """Nothing then has bounds, since either the track or the sensor is wrong."""
+    """No bounds are given, since either the track or the sensor is wrong."""
     recorded = world_recording(260.0, 1.5, further="m2_velocity")
     with open_recording(recorded.path) as recording:
         motion = prepared_motion(recording, 0, recording.samples)

@@ -1,4 +1,4 @@
-"""The live twin: p as the world has it while samples come, and changes of the specimen noticed in time."""
+"""The live twin estimates p during the run and detects changes of the specimen in time."""
 
 import os
 from dataclasses import replace
@@ -16,7 +16,7 @@ HOURS, SEED = float(os.environ.get("LIVE_HOURS", "0.2")), int(os.environ.get("LI
 
 @pytest.fixture(scope="module")
 def dwell(live_world):
-    """5.5 s of a chaotic dwell, in pieces of any length: sentences, pictures by their time, and the truth."""
+    """Run 5.5 s of a chaotic dwell in random blocks; return world, states by sample, sentences, true p."""
     running = live_world(261.0, 1.7, 6.0, seed=71)
     rng, seen, said = np.random.default_rng(3), [], []
     while running.samples < 5.5 * 51_200:
@@ -25,7 +25,7 @@ def dwell(live_world):
     return running, seen, said, running.p()
 
 
-def test_p_of_the_live_twin_matches_the_simulation(dwell):
+def test_the_relative_displacement_of_the_live_twin_matches_the_simulation(dwell):
     _, seen, said, truth = dwell
     assert said == []
     late = [(end, each) for end, each in seen if end > 0.6 * 51_200]
@@ -34,7 +34,7 @@ def test_p_of_the_live_twin_matches_the_simulation(dwell):
         newest = slice(-4000, None)
         error = (each.p - truth[each.first : each.first + each.p.size])[newest]
         assert np.sqrt(np.mean(error**2)) < 0.1e-6
-        # Behind what was recorded last: half of the sensors' filters, and 6 ms that tell of lost light.
+        # Delay after the last sample: the sensors' filters (16 samples) and 6 ms to detect drop-outs.
         assert end - (each.first + each.p.size) == 16 + 307
 
 
@@ -42,7 +42,7 @@ def test_gaps_and_mass_are_identified_during_the_run(dwell):
     running, *_ = dwell
     found = {each.what: each for each in running.twin.found}
     for side in (Hidden.LOWER_GAP, Hidden.UPPER_GAP):
-        # Four standard deviations: of one draw, the bound itself misses one in twenty.
+        # Four standard deviations, since the 95 % bound misses one case in twenty.
         assert abs(found[side].value - 45e-6) < 2.0 * found[side].half_width
         assert found[side].half_width < 0.05e-6
     assert found[Hidden.M1].value == pytest.approx(2.1e-3, rel=1e-3)
@@ -60,10 +60,10 @@ def test_forecast_errors_match_their_stated_size(dwell):
         said.append(forecast.error[::51][:20])
     assert len(errors) > 20
     assert 0.55 < np.mean(np.array(errors) < np.array(said)) < 0.9
-    # Under a chaos of some 280 per second: micrometres after ten milliseconds, much of the gap after twenty.
+    # The exponent is some 280 per second: micrometres after 10 ms, much of the gap after 20 ms.
     typical = np.median(errors, axis=0)
     assert typical[2] < 0.3e-6
-    assert typical[-1] > 2e-6  # of this draw; another library's last digits make another draw
+    assert typical[-1] > 2e-6  # for this motion; rounding of another library changes the motion
 
 
 @pytest.mark.thorough
@@ -82,11 +82,11 @@ def test_a_gap_change_of_1_um_is_detected_within_a_second(live_world, dwell, kin
     while not said:
         said += running.go_on(BLOCK)
     assert "The specimen's upper gap is (4" in " ".join(said)
-    running.go_on(5 * BLOCK)  # a track that does not hold at first is found within 0.4 s
+    running.go_on(5 * BLOCK)  # a track that is lost at first is found within 0.4 s
     newest = running.twin.newest
     assert newest.state is LiveState.TRACKED
     assert newest.gaps_m == pytest.approx((46e-6, 46e-6), abs=0.05e-6)
-    # Where it was not followed no motion is shown.
+    # No motion is shown where the specimen was not tracked.
     assert np.isnan(newest.p).any()
     shown = ~np.isnan(newest.p)
     error = (newest.p - running.p()[newest.first : newest.first + newest.p.size])[shown]
@@ -125,7 +125,7 @@ def test_untrackable_benches_and_specimens_are_refused(live_world, at_once):
 )
 def test_vibrometer_drop_outs_trigger_no_change_alarm(live_world, kind, level_vpp):
     lost = []
-    for seed in (74, 75, 76):  # one draw of a colliding motion may lose its track once, for 33 ms
+    for seed in (74, 75, 76):  # one colliding motion may lose its track once, for 33 ms
         running = live_world(kind, level_vpp, 4.2, seed=seed, dropouts_per_s=8.0)
         rng, tracked = np.random.default_rng(4), 0
         while running.samples < 4 * 51_200:
@@ -145,7 +145,7 @@ def test_vibrometer_drop_outs_trigger_no_change_alarm(live_world, kind, level_vp
 @pytest.mark.slow
 @pytest.mark.timeout(1700)
 def test_hours_without_a_change_of_the_specimen_trigger_no_alarm(live_world):
-    """LIVE_HOURS=H and LIVE_SEED=S in the environment ask for so much rig time, and for other rigs."""
+    """Environment variables: LIVE_HOURS is the simulated rig time [h], LIVE_SEED selects other rigs."""
     rng, out, blocks, seed = np.random.default_rng(SEED), 0, 0, SEED
     while blocks < 36_000 * HOURS:
         kinds = ((float(rng.uniform(250, 272)), float(rng.uniform(1.2, 3))), ("sweep", 2.0), ("noise", 8.0))
@@ -160,5 +160,5 @@ def test_hours_without_a_change_of_the_specimen_trigger_no_alarm(live_world):
                 blocks += 1
                 out += running.twin.newest.level > usual.limit
         seed += 1
-    # The threshold of the test rests on this: no more than one block in a hundred is out by chance.
+    # The alarm threshold assumes that at most 1 % of the blocks are out by chance.
     assert out < 0.01 * blocks

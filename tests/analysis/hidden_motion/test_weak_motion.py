@@ -1,4 +1,4 @@
-"""What a motion without impacts tells of a specimen that is described wrong: as much as it knows, no more."""
+"""Parameters of a wrongly described specimen that a motion without impacts determines."""
 
 from dataclasses import replace
 
@@ -17,12 +17,12 @@ SPECIMEN = gong2025()
 
 
 def coupled(of0, of1, of2):
-    """The matrix of springs or dampers of the three masses."""
+    """Return the stiffness or damping matrix of the three masses."""
     return np.array([[of0 + of2, 0, -of2], [0, of1, -of1], [-of2, -of1, of1 + of2]])
 
 
-def recorded(rng, acceleration):
-    """The channels under a spectrum of the base's acceleration, by the linear equations; with noise."""
+def noisy_channels(rng, acceleration):
+    """Return noisy base acceleration and m0 velocity of the linear specimen for a base spectrum."""
     (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = SPECIMEN.masses, SPECIMEN.stiffnesses, SPECIMEN.dampings
     omega = 2 * np.pi * np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
     some = np.flatnonzero(acceleration)
@@ -42,47 +42,47 @@ def recorded(rng, acceleration):
 
 
 def sine(frequency_hz, level):
-    """A base acceleration of one line, the nearest that repeats."""
+    """Return the base acceleration spectrum of a sine on the nearest spectral line."""
     spectrum = np.zeros(SAMPLES // 2 + 1, dtype=complex)
     spectrum[round(frequency_hz * SAMPLES / RATE_HZ)] = 0.5 * level * SAMPLES
     return spectrum
 
 
 def white(rng, rms):
-    """A base acceleration from 20 Hz to 1 kHz."""
+    """Return the spectrum of a random base acceleration from 20 Hz to 1 kHz."""
     frequency_hz = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
     spectrum = rng.standard_normal((2, len(frequency_hz))).T @ np.array([1.0, 1j])
     spectrum *= (frequency_hz > 20) & (frequency_hz < 1000)
     return spectrum * rms / np.std(np.fft.irfft(spectrum, SAMPLES))
 
 
-def told(rng, acceleration, factors):
-    """What is determined of dampers described wrong by these factors."""
+def estimate(rng, acceleration, factors):
+    """Return the determined parameters if the dampers are described wrongly by these factors."""
     dampings = tuple(float(each) for each in np.array(SPECIMEN.dampings) * factors)
     motion = hidden_motion_in_samples(
-        *recorded(rng, acceleration), RATE_HZ, replace(SPECIMEN, dampings=dampings)
+        *noisy_channels(rng, acceleration), RATE_HZ, replace(SPECIMEN, dampings=dampings)
     )
     return {each.what: each for each in motion.parameters if each.is_determined}
 
 
-def covered(found):
+def coverage(found):
     true = tracked_specimen(SPECIMEN)
     return [each.low <= value_of(true, what) <= each.high for what, each in found.items()]
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.5, 0.7])
 def test_noise_alone_determines_no_parameter(factor):
-    assert not told(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
+    assert not estimate(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
 
 
 @pytest.mark.thorough
 def test_one_weak_sine_does_not_determine_the_dampers():
-    """Bounds as narrow as the search, about the description, missed the truth in each of ten."""
+    """Bounds around the described value once missed the true value in ten of ten cases."""
     rng = np.random.default_rng(3)
     inside = []
     for frequency_hz, level in ((95.0, 0.005), (150.0, 0.2), (260.0, 0.2), (400.0, 1.0)):
         for factor in (1.5, 0.7):
-            inside += covered(told(rng, sine(frequency_hz, level), (1, factor, 1)))
+            inside += coverage(estimate(rng, sine(frequency_hz, level), (1, factor, 1)))
     assert inside.count(False) <= 1
 
 
@@ -91,8 +91,8 @@ def test_weak_noise_corrects_wrong_dampers():
     rng = np.random.default_rng(4)
     inside, dampers = [], []
     for factors in ((1, 1.5, 1), (1, 0.7, 1), (1, 1, 0.8), (1.05, 1.3, 0.9)):
-        found = told(rng, white(rng, 0.1), factors)
-        inside += covered(found)
+        found = estimate(rng, white(rng, 0.1), factors)
+        inside += coverage(found)
         dampers.append(Hidden.C1 in found)
     assert all(dampers)
     assert inside.count(False) <= 1

@@ -1,4 +1,4 @@
-"""Every kind of excitation can be analysed, laid over and reported; a row for anything else is refused."""
+"""Every kind of excitation can be analysed, overlaid and reported; other entries are refused."""
 
 import pytest
 

@@ -6,8 +6,8 @@ from vibench.analysis.live._view import ImpactCounter
 RATE = 51_200.0
 
 
-def kinked(times_s, duration_s, noise=3e-6, seed=1):
-    """A 260 Hz motion whose acceleration steps and changes slope at given times, as if by a spring."""
+def motion_with_impacts(times_s, duration_s, noise=3e-6, seed=1):
+    """Return the velocity of a 260 Hz motion with spring-like impacts at given times."""
     time_s = np.arange(int(duration_s * RATE)) / RATE
     velocity = 0.02 * np.sin(2 * np.pi * 260 * time_s)
     for number, at in enumerate(times_s):
@@ -19,7 +19,7 @@ def kinked(times_s, duration_s, noise=3e-6, seed=1):
 @pytest.mark.parametrize("block", [100, 2560, 51_200])
 def test_every_impact_is_counted_once_for_any_block_size(block):
     times_s = 0.1 + 0.0123 * np.arange(60)
-    velocity = kinked(times_s, 1.0)
+    velocity = motion_with_impacts(times_s, 1.0)
     counter = ImpactCounter(RATE)
     found = sum(counter.add(velocity[first : first + block]) for first in range(0, velocity.size, block))
     assert counter.count == found == 60
@@ -40,7 +40,7 @@ def test_noise_alone_has_no_impacts():
 
 
 def test_lost_samples_are_not_counted_as_impacts():
-    velocity = kinked((), 1.0)
+    velocity = motion_with_impacts((), 1.0)
     velocity[20_000:20_500] = np.nan
     counter = ImpactCounter(RATE)
     counter.add(velocity)

@@ -28,7 +28,7 @@ def test_each_envelope_column_shows_the_extremes_of_its_own_samples():
         assert high[column] == samples[begin:end].max()
 
 
-def test_lost_samples_empty_only_their_own_columns():
+def test_lost_samples_leave_only_their_own_envelope_columns_empty():
     samples = np.arange(40.0)
     samples[5] = np.nan
     samples[10:20] = np.nan

@@ -76,7 +76,7 @@ def test_any_sensor_on_m0_gives_the_same_live_responses(role, power):
     assert np.allclose(found.section.displacement_m, 3 * A0, rtol=5e-3)
     answer = found.frequency_response()
     line = int(np.argmin(np.abs(answer.frequency_hz - 260.0)))
-    # The sine lies between lines: a line is converted at its own frequency, 0.9 % off, squared at most.
+    # The sine lies between lines; conversion at the line frequency (0.9 % off) errs by up to 2 %.
     assert answer.magnitude[line] == pytest.approx(3.0, rel=0.025)
     assert found.impacts == 0
 
@@ -104,8 +104,8 @@ def test_a_run_without_base_channel_can_be_viewed():
 LEAD_IN_S = 3.2
 
 
-def swept(first, count):
-    """Play a sine that comes up in 1 s, lets m0 ring down, and then moves up by 2 Hz/s."""
+def swept_volts(first, count):
+    """Samples of a sine that is ramped up in 1 s, held while m0 rings down, and swept up at 2 Hz/s."""
     time_s = (first + np.arange(count)) / RATE
     moving_s = np.maximum(time_s - LEAD_IN_S, 0.0)
     omega = 2 * np.pi * (200.0 + 2.0 * moving_s)
@@ -118,26 +118,26 @@ def swept(first, count):
     return (units / np.array([[each.units_per_volt] for each in CHANNELS])).astype(np.float32)
 
 
-def watched_sweep(lead_in_s):
+def view_of_sweep(lead_in_s):
     view = LiveView(CHANNELS, RATE, band_hz=(200.0, 206.0), lead_in_s=lead_in_s)
     for first in range(0, round(6 * RATE), 2560):
-        view.add(first, swept(first, 2560))
+        view.add(first, swept_volts(first, 2560))
         view.portrait()
     return view
 
 
 def test_ramp_and_ringing_before_a_sweep_give_no_points():
-    history = watched_sweep(LEAD_IN_S).history()
+    history = view_of_sweep(LEAD_IN_S).history()
     assert history.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
     assert history.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)
     assert history.time_s.size >= 20
     assert np.all(history.time_s > LEAD_IN_S)
     assert np.allclose(history.response_i, 1.3, rtol=0.02)
-    everything = watched_sweep(0.0).history()
+    everything = view_of_sweep(0.0).history()
     assert everything.response_i.max() > 2.5
 
 
 def test_a_poincare_section_excludes_the_lead_in():
-    settled = watched_sweep(LEAD_IN_S).section.displacement_m
-    assert 0 < settled.size < watched_sweep(0.0).section.displacement_m.size
+    settled = view_of_sweep(LEAD_IN_S).section.displacement_m
+    assert 0 < settled.size < view_of_sweep(0.0).section.displacement_m.size
     assert np.ptp(settled) < 0.1 * A0

@@ -1,4 +1,4 @@
-"""A steady sine has straight edges at any width of a column; a wave that can be seen is left a wave."""
+"""The outline of a steady sine has straight edges; waves that are wide enough to see are not smoothed."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,7 @@ def test_lost_samples_stay_empty_and_silence_stays_zero_in_an_outline():
 @pytest.mark.parametrize(("start_hz", "stop_hz", "span_s"), [(150, 350, 8.2), (20, 600, 8.2), (350, 60, 4.0)])
 @pytest.mark.parametrize("columns", [500, 1000, 1800, 1960])
 def test_the_edges_of_a_steady_sweep_have_no_notches(start_hz, stop_hz, span_s, columns):
-    """The period of its middle was taken for that of its slow end: there the edges fell to half."""
+    """With the period of the sweep's middle the edges once fell to half at its slow end."""
     time_s = np.arange(round(span_s * RATE_HZ)) / RATE_HZ
     hz = start_hz + (stop_hz - start_hz) * time_s / span_s
     phase = 2 * np.pi * (start_hz * time_s + 0.5 * (stop_hz - start_hz) * time_s**2 / span_s)

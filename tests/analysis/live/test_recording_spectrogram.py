@@ -1,4 +1,4 @@
-"""The spectrogram of a stretch of a recording: right densities, at the right place."""
+"""The spectrogram of a part of a recording has the right densities at the right places."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ SIGMA = 0.01
 
 @pytest.fixture(scope="module")
 def request_(tmp_path_factory):
-    """A sine of 250 Hz for three seconds, then white noise of known density for as long."""
+    """Request for a recording of 3 s of a 250 Hz sine and 3 s of white noise of known density."""
     path = tmp_path_factory.mktemp("spectrogram") / "a.h5"
     time_s = np.arange(int(3 * RATE)) / RATE
     noise = SIGMA * np.random.default_rng(1).standard_normal(time_s.size)
@@ -41,8 +41,8 @@ def request_(tmp_path_factory):
     return SpectrogramRequest(path, "m0_velocity", 0, signal.size, 1000.0, RowSpacing.LINEAR)
 
 
-def at(found, time_s, frequency_hz):
-    """The decibels at a place of the picture."""
+def level_db(found, time_s, frequency_hz):
+    """Level [dB] of the spectrogram at a time and frequency."""
     rows, columns = found.decibel.shape
     low, high = found.frequency_hz
     if found.request.spacing is RowSpacing.LOGARITHMIC:
@@ -56,8 +56,8 @@ def at(found, time_s, frequency_hz):
 def test_a_sine_has_its_power_over_the_window_bandwidth(request_, spacing):
     found = recording_spectrogram(replace(request_, spacing=spacing))
     bandwidth_hz = 1.5 / found.segment_s
-    assert at(found, 1.5, 250.0) == pytest.approx(10 * np.log10(0.5**2 / 2 / bandwidth_hz), abs=0.1)
-    assert at(found, 4.5, 250.0) < at(found, 1.5, 250.0) - 30
+    assert level_db(found, 1.5, 250.0) == pytest.approx(10 * np.log10(0.5**2 / 2 / bandwidth_hz), abs=0.1)
+    assert level_db(found, 4.5, 250.0) < level_db(found, 1.5, 250.0) - 30
     assert found.unit == "m s-1"
 
 

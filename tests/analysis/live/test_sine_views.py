@@ -1,4 +1,4 @@
-"""Views of a sine and of a sweep: the motion is in closed form, so every number is known."""
+"""Live views of a sine and a sweep match a motion in closed form."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ A0 = 4e-6
 
 
 def motion(phase, omega):
-    """Base A0 cos; response 5 A0 cos(phase - 0.7) and a second harmonic of 1 A0."""
+    """Drive, base A0 cos(phase) and response 5 A0 cos(phase - 0.7) with a second harmonic of 1 A0."""
     velocity = -5 * A0 * omega * np.sin(phase - 0.7) - 2 * A0 * omega * np.sin(2 * phase)
     return np.stack((0.3 * np.cos(phase), -A0 * omega**2 * np.cos(phase), velocity))
 
@@ -69,8 +69,8 @@ def test_a_live_point_of_a_sweep_has_the_frequency_at_its_time():
     assert point.response_ii == pytest.approx(5.0, rel=0.01)
 
 
-def held_displacement(start_hz, rate_hz_per_s, level=1.0):
-    """Two seconds of a sweep whose drive follows the square of its frequency."""
+def constant_displacement_sweep(start_hz, rate_hz_per_s, level=1.0):
+    """Two seconds of a sweep whose drive voltage grows with the square of its frequency."""
     time_s = np.arange(int(2 * RATE)) / RATE
     frequency_hz = start_hz + rate_hz_per_s * time_s
     values = motion(
@@ -83,15 +83,15 @@ def held_displacement(start_hz, rate_hz_per_s, level=1.0):
 def test_no_live_point_is_drawn_while_the_drive_is_ramped_down():
     time_s = np.arange(int(2 * RATE)) / RATE
     ramp = np.cos(0.5 * np.pi * np.clip(time_s - 1.7, 0.0, 1.0)) ** 2
-    assert sine_point(held_displacement(260.0, 0.0), (0, 1, 2), RATE) is not None
-    assert sine_point(held_displacement(260.0, 0.0, ramp), (0, 1, 2), RATE) is None
+    assert sine_point(constant_displacement_sweep(260.0, 0.0), (0, 1, 2), RATE) is not None
+    assert sine_point(constant_displacement_sweep(260.0, 0.0, ramp), (0, 1, 2), RATE) is None
     silence = np.where(time_s < 1.9, 1.0, 0.0)
-    assert sine_point(held_displacement(260.0, 0.0, silence), (0, 1, 2), RATE) is None
+    assert sine_point(constant_displacement_sweep(260.0, 0.0, silence), (0, 1, 2), RATE) is None
 
 
 @pytest.mark.parametrize(("start_hz", "rate_hz_per_s"), [(110.0, -20.0), (260.0, -3.0), (260.0, 30.0)])
 def test_a_sweep_of_constant_displacement_is_not_taken_for_a_ramp(start_hz, rate_hz_per_s):
-    point = sine_point(held_displacement(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
+    point = sine_point(constant_displacement_sweep(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
     assert point.frequency_hz == pytest.approx(start_hz + rate_hz_per_s * point.time_s, rel=0.01)
 
 
@@ -136,7 +136,7 @@ def test_overlapping_portraits_give_each_poincare_point_once():
         section.add(found)
         kept.append(section.displacement_m.size - before)
     assert sum(kept) == section.displacement_m.size
-    # each portrait shows its 70 periods but 20 at either end; the last begins 28 160 samples after the first
+    # Each portrait shows 70 periods less 20 at each end; the last begins 28 160 samples after the first.
     assert section.displacement_m.size == pytest.approx(28_160 / RATE * 260 + 70 - 40, abs=2)
 
 
@@ -146,7 +146,7 @@ def test_a_full_poincare_section_drops_its_oldest_points():
     assert section.displacement_m.size == section.velocity_m_per_s.size == 10
 
 
-def test_a_trace_keeps_the_newest_points_in_order():
+def test_a_live_trace_keeps_the_newest_points_in_order():
     trace = SweepTrace(most=5)
     for number in range(23):
         trace.add(SinePoint(float(number), 100.0 + number, 1e-6, -1.0, 1.0, 2.0, 1.5))

@@ -1,4 +1,4 @@
-"""Noise of an amplifier whose output is not recorded, in the draws of a twin."""
+"""The draws of a twin include the noise of an amplifier whose output is not recorded."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ BETWEEN_HZ = (300.0, 900.0)
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    """A weak dwell at 25.6 kS/s, without a channel of the amplifier's output."""
+    """Recording of a weak dwell at 25.6 kS/s, without a channel for the amplifier's output."""
     rig = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"sample_rate_hz": 25_600.0})})
     path = tmp_path_factory.mktemp("unseen") / "dwell.h5"
     with open_bench(rig) as bench:
@@ -28,19 +28,19 @@ def recording(tmp_path_factory):
 
 
 def noise_power(acceleration, rate_hz):
-    """Mean power of the base beside the drive, while it plays."""
+    """Mean power of the base acceleration beside the drive frequency, during the drive."""
     part = acceleration[round(1.6 * rate_hz) : round(2.6 * rate_hz)]
     lines = np.abs(np.fft.rfft((part - part.mean()) * np.hanning(part.size))) ** 2
     return float(np.mean(lines[slice(*(round(each) for each in BETWEEN_HZ))]))
 
 
 def test_draws_include_unrecorded_amplifier_noise(recording):
-    """Without it the base of the draws was 0.7 times as noisy, and limits of weak motions too narrow."""
+    """Without it the simulated base has 0.7 times the noise, and limits of weak motions are too narrow."""
     source = voltage_source(recording, specimen_of(RIG), draws=8)
     rate_hz = recording.sample_rate_hz
     drawn = [noise_power(source.channels(number).base_acceleration, rate_hz) for number in range(8)]
     measured = noise_power(recording.read("base_acceleration"), rate_hz)
-    # 0.1 s of silence shows the noise's power to 15 %.
+    # 0.1 s without drive determines the noise power within 15 %.
     assert np.mean(drawn) == pytest.approx(measured, rel=0.2)
     assert source.run.why == ""
 

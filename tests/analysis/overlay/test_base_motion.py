@@ -1,4 +1,4 @@
-"""Base displacement from recorded acceleration: what was put in comes out, without drift or delay."""
+"""Base displacement from recorded acceleration equals the played motion, without drift or delay."""
 
 import numpy as np
 import pytest
@@ -70,11 +70,11 @@ def test_a_simulation_in_pieces_equals_the_whole_simulation(dwell_motions):
 def test_impacts_keep_their_times_across_pieces(dwell_motions):
     motion = dwell_motions["strong"][0].displacement_m
     first = shaken(gong2025(), motion, RATE, Accuracy.STANDARD)[1]
-    # A rest of ten seconds ahead moves the same impacts into a later piece.
+    # Ten seconds at rest before the motion shift the same impacts into a later piece.
     later = shaken(gong2025(), np.concatenate((np.zeros(round(10 * RATE)), motion)), RATE, Accuracy.STANDARD)[
         1
     ]
-    # Cumulated counts: when the first twenty impacts have begun.
+    # Times of the first twenty impacts from the cumulative counts.
     early = np.arange(1, 21)
     times = [np.searchsorted(counts, early) / RATE for counts in (first, later)]
     np.testing.assert_allclose(times[1], times[0] + 10.0, atol=1.5 / RATE)

@@ -1,4 +1,4 @@
-"""Agreement has a meaning: limits are passed as often as they say, bands hold, ranks are even."""
+"""Agreement limits have their stated rate, bands their coverage, and ranks are uniform."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_an_agreeing_twin_exceeds_the_limit_in_1_percent_of_cases(draws, points)
     rng = np.random.default_rng(1)
     trials = 3000
     outside = sum(not curve(rng, draws, points).agrees for _ in range(trials))
-    # 30 expected, sd 5.5, of single values; how long the tails of a curve are is known poorly from few draws.
+    # Expected for single values: 30, standard deviation 5.5; few draws determine a curve's tails poorly.
     assert (12 if points == 1 else 3) <= outside <= 50
 
 
@@ -42,12 +42,12 @@ def test_random_magnitudes_exceed_the_limit_in_1_percent_of_cases():
     for _ in range(2000):
         values = np.abs(rng.standard_normal((17, 40)) + 1j * rng.standard_normal((17, 40)))
         outside += not EnsembleCurve("q", FREQUENCY_HZ, values[0], values[1:]).agrees
-    # 20 expected, sd 4.4.
+    # Expected: 20, standard deviation 4.4.
     assert 5 <= outside <= 36
 
 
 def rare_dips(rng, size):
-    """As chaos has them: one value of a hundred lies a third lower."""
+    """Return values as in chaos: one in a hundred lies a third lower."""
     return (1 + 0.05 * rng.standard_normal(size)) * np.where(rng.random(size) < 0.01, 0.67, 1.0)
 
 
@@ -58,7 +58,7 @@ def long_tails(rng, size):
 @pytest.mark.parametrize("drawn", [rare_dips, long_tails])
 @pytest.mark.parametrize(("draws", "points"), [(8, 200), (16, 1000)])
 def test_long_tailed_values_exceed_the_limit_in_1_percent_of_cases(drawn, draws, points):
-    """With the limit of normal values 14 to 100 % lay outside."""
+    """With a limit for normally distributed values 14 to 100 % would lie outside."""
     rng, outside = np.random.default_rng(6), 0
     for _ in range(100):
         values = drawn(rng, (draws + 1, points))
@@ -68,10 +68,10 @@ def test_long_tailed_values_exceed_the_limit_in_1_percent_of_cases(drawn, draws,
 
 @pytest.mark.parametrize("draws", [5, 8, 16, 48, 200])
 def test_limits_from_few_draws_are_exceeded_in_1_percent_of_cases(draws):
-    """With the quantile of the fitted distribution 4.8, 3.1, 2.0, 1.3 and 1.1 % lay beyond."""
+    """With the quantile of the fitted distribution 4.8, 3.1, 2.0, 1.3 and 1.1 % would exceed the limit."""
     largest = np.random.default_rng(10).gumbel(3.7, 0.3, (20000, draws + 1))
     beyond = np.mean([each[0] > largest_of_chance(each[1:]) for each in largest])
-    # Standard deviation 0.0007.
+    # The rate has a standard deviation of 0.0007.
     assert beyond == pytest.approx(0.01, abs=0.0025)
 
 
@@ -138,7 +138,7 @@ def test_the_interval_of_the_escape_rate_contains_the_true_rate():
         low, high = found.bounds_per_s
         covered += low <= per_s <= high
     assert told > 0.99 * trials
-    # Exact bounds of a count are wide where it is small.
+    # Exact bounds of a small count are conservative.
     assert 0.94 <= covered / told <= 0.99
 
 
@@ -147,14 +147,14 @@ def test_no_escape_rate_is_given_for_an_end_common_to_all_runs():
     assert escape_rate(runs[:1], [(each,) for each in runs[1:]]) is None
     lasting = [Ending("collisions", 0.0, 90.0, ended=False)] * 17
     assert escape_rate(lasting[:1], [(each,) for each in lasting[1:]]) is None
-    # A sweep's last plateau without a contact: the collisions went on as long as there was a sweep.
+    # A last plateau without contact is no escape: the collisions lasted as long as the sweep.
     lasting[3] = Ending("collisions", 0.0, 89.8, ended=True)
     assert escape_rate(lasting[:1], [(each,) for each in lasting[1:]]) is None
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.45])
 def test_half_of_the_draws_suffice_for_a_clear_verdict(shift):
-    """So a wrong twin is not passed for want of draws: `benchmarks/twin_agreement.py --stop`."""
+    """Stopping early accepts no wrong twin; `benchmarks/twin_agreement.py --stop` tests this further."""
     rng = np.random.default_rng(12)
     decided = 0
     for _ in range(200):

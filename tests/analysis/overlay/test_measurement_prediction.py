@@ -1,4 +1,4 @@
-"""What is predicted of a plan: base amplitudes from the rig's model, collision bands from the points."""
+"""Predictions for a plan: base amplitudes from the rig model, collision bands from simulated points."""
 
 from pathlib import Path
 
@@ -42,20 +42,20 @@ def test_noise_is_represented_by_a_sine_of_equal_rms():
 
 
 def lowest_hz(start_hz, stop_hz, amplitude_vpp):
-    """The lowest frequency at which a sweep is predicted to collide."""
+    """Return the lowest frequency [Hz] at which a sweep is predicted to collide."""
     sweep = SineSweep(
         amplitude_vpp=amplitude_vpp, start_hz=start_hz, stop_hz=stop_hz, duration_s=60, hold="displacement"
     )
     return predict_measurement(Measurement(name="sweep", excitation=sweep), RIG).collision_bands_hz[0][0]
 
 
-def test_a_sweep_is_predicted_on_its_branch():
-    """Upwards the specimen stays clear of the stops until its linear motion reaches them; downwards it
-    goes on striking, and how far is a draw of its chaos."""
+def test_a_downward_sweep_is_predicted_to_collide_down_to_lower_frequencies():
+    """Upwards collisions begin where the linear motion closes the gap; downwards they last longer,
+    down to a frequency that varies with the chaotic motion."""
     levels_vpp = (1.45, 1.5, 1.55)
     rising = [lowest_hz(150.0, 350.0, each) for each in levels_vpp]
     falling = [lowest_hz(350.0, 150.0, each) for each in levels_vpp]
-    # Rig and specimen followed in time under the first of these voltages: from 230.7 and down to 218.0 Hz.
+    # Time simulation at 1.45 Vpp: collisions from 230.7 Hz upwards and down to 218.0 Hz.
     assert rising[0] == pytest.approx(230.7, abs=2.0)
     assert all(224.0 < each < 233.0 for each in rising)
     assert all(down < up - 1.0 for down, up in zip(falling, rising, strict=True))

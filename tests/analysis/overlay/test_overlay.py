@@ -1,4 +1,4 @@
-"""The simulation over a recording of that same simulation: where the motion is regular they are one."""
+"""A simulation overlaid on a recording of the same simulation: regular motions coincide."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def test_a_weak_dwell_and_its_simulation_differ_by_less_than_0_01_db(dwell_file)
     assert overlay.run.impacts == 0
     assert abs(overlay.difference.decibel[0]) < 0.01
     assert overlay.response.response_i == pytest.approx(analysis.response.response_i, rel=5e-3)
-    # Delays are aligned: the simulated response has none, the recorded one was taken out.
+    # The simulated response has no delay, and that of the recorded channel is corrected.
     assert overlay.response.phase_rad == pytest.approx(analysis.response.phase_rad, abs=2e-3)
     assert overlay.prediction.response_ii[0] == pytest.approx(analysis.response.response_ii, rel=1e-3)
 
@@ -90,7 +90,7 @@ def test_another_specimen_can_be_overlaid(dwell_file):
 def test_a_prediction_below_the_gap_equals_the_linear_response():
     found = predict(gong2025(), np.array([120.0, 200.0, 330.0]), 1e-7)
     assert not found.is_colliding.any()
-    # What is left of the transient from rest.
+    # The tolerance covers the remaining transient from rest.
     np.testing.assert_allclose(found.response_ii, found.linear, rtol=1e-4)
     np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-4)
 

@@ -1,4 +1,4 @@
-"""What was played of a voltage that a converter recorded with noise of its own."""
+"""The drive voltage is estimated from a recording with converter noise."""
 
 import numpy as np
 import pytest
@@ -7,13 +7,13 @@ from vibench.analysis.overlay.draws import PlayedVoltage, channel_noise
 
 RATE = 25_600.0
 TIME_S = np.arange(round(4 * RATE)) / RATE
-# Switched on and off within the record, as by a plan: without frames its skirts would cover all noise.
+# The tone is ramped on and off within the record, as in a plan, to limit its spectral leakage.
 TONE_V = 0.06 * np.sin(2 * np.pi * 180.0 * TIME_S) * ((TIME_S > 0.7) & (TIME_S < 3.5))
 BAND = (TIME_S > 1.5) & (TIME_S < 2.8)
 
 
 def level(volts, low_hz=240.0, high_hz=290.0):
-    """Power of a narrow band beside the tone, while it plays."""
+    """Power in a narrow band beside the tone, during the tone."""
     part = volts[BAND] * np.hanning(BAND.sum())
     frequency_hz = np.fft.rfftfreq(part.size, 1 / RATE)
     inside = (frequency_hz > low_hz) & (frequency_hz < high_hz)
@@ -22,7 +22,7 @@ def level(volts, low_hz=240.0, high_hz=290.0):
 
 @pytest.mark.parametrize(("played_rms", "own_rms"), [(5e-4, 4e-4), (2e-4, 4e-4), (5e-4, 1e-4)])
 def test_converter_noise_is_removed_from_the_drive_of_the_twin(played_rms, own_rms):
-    """With it, and once more for what is not known, a weak dwell lay 2 standard deviations off."""
+    """With converter noise in the drive a weak dwell was once 2 standard deviations off."""
     rng = np.random.default_rng(5)
     wanted, found, recorded = [], [], []
     for _ in range(12):
@@ -32,7 +32,7 @@ def test_converter_noise_is_removed_from_the_drive_of_the_twin(played_rms, own_r
         wanted.append(level(played))
         found.append(level(drawn))
         recorded.append(level(volts))
-    # 12 records of 64 lines: a mean power is known to 4 %, and their ratio to 5 %.
+    # 12 records of 64 lines determine a mean power within 4 % and a ratio within 5 %.
     assert np.mean(found) == pytest.approx(np.mean(wanted), rel=0.15)
     if own_rms > 0.5 * played_rms:
         assert np.mean(recorded) > 1.4 * np.mean(wanted)
@@ -58,7 +58,7 @@ def test_short_or_noise_free_voltages_drive_the_twin_unchanged(samples):
 
 
 def test_the_noise_of_a_channel_matches_all_its_quiet_blocks():
-    """The quietest of 240 alone was 9 to 12 % too low."""
+    """The quietest of 240 blocks alone would be 9 to 12 % too low."""
 
     class Recorded:
         sample_rate_hz, samples = RATE, TIME_S.size

@@ -1,4 +1,4 @@
-"""What is predicted of each shipped measurement is predicted at the base motion that it holds."""
+"""Predictions of shipped measurements use the base motion that the measurement holds."""
 
 from pathlib import Path
 
@@ -35,12 +35,12 @@ HELD_UM = {
 
 
 def played_hz(excitation):
-    """Frequencies of the sines that are recorded."""
+    """Return the frequencies [Hz] of the recorded sines."""
     return np.unique([step.play.frequency_hz for step in excitation.steps()])
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_the_base_motion_is_held_only_if_planned(name):
+def test_the_base_motion_is_controlled_only_if_the_plan_holds_a_level(name):
     assert (name in HELD_UM) == bool(list(SHIPPED[name].excitation.held_accelerations()))
 
 

@@ -1,4 +1,4 @@
-"""The similarity of response curves, against what can be worked out by hand."""
+"""The similarity of response curves, checked against hand calculations."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_a_curve_has_similarity_1_to_itself_even_at_zero_logarithm():
 
 
 def test_the_difference_of_curves_matches_equation_6_of_the_paper():
-    # 5 um times 2 is 0.01 mm, log -2; times 0.2 is 0.001 mm, log -3: they differ by half.
+    # 5 um x 2 = 0.01 mm, log10 = -2; 5 um x 0.2 = 0.001 mm, log10 = -3: the relative difference is 0.5.
     found = similarity(curve([2.0, 2.0]), curve([0.2, 2.0]), LogarithmOf.MILLIMETRES)
     assert found.difference == pytest.approx([0.5, 0.0])
     assert found.rate == 0.5
@@ -33,7 +33,7 @@ def test_the_difference_of_curves_matches_equation_6_of_the_paper():
 def test_similarity_depends_on_the_argument_of_the_logarithm():
     reference, model = curve(np.full(50, 2.0)), curve(np.full(50, 1.5))
     rates = {of: similarity(reference, model, of).rate for of in LogarithmOf}
-    # log10(0.75) = -0.125 against logarithms of 0.3, 5, 2 and 1.
+    # log10(0.75) = -0.125; the reference logarithms have magnitudes 0.3, 5, 2 and 1.
     assert rates == {
         LogarithmOf.NORMALISED: 0.0,
         LogarithmOf.METRES: 1.0,
@@ -61,14 +61,14 @@ def test_similarity_leaves_out_and_counts_points_without_a_value():
 
 
 def test_the_similarity_interval_covers_the_true_rate():
-    # Independent points: the interval must cover the true rate in about 95 % of draws.
+    # Points are independent: about 95 % of the intervals must contain the true rate.
     covered = 0
     for seed in range(200):
         rng = np.random.default_rng(seed)
         alike = rng.random(100) < 0.7
         found = similarity(curve(np.full(100, 2.0)), curve(np.where(alike, 2.0, 0.02)), seed=seed)
         covered += found.low <= 0.7 <= found.high
-    # Blocks of five give a bootstrap of 20 blocks, whose intervals are known to be somewhat short.
+    # A bootstrap of 20 blocks of five points gives intervals that are slightly too short.
     assert 0.87 <= covered / 200 <= 0.99
 
 

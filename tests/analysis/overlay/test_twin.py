@@ -1,4 +1,4 @@
-"""Rig and specimen under the recorded voltage, over recordings of the virtual rig."""
+"""The twin (rig and specimen driven by the recorded voltage) is compared with virtual-rig recordings."""
 
 import json
 from dataclasses import replace
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.thorough
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
-    """Weak noise and a chaotic dwell at 25.6 kS/s."""
+    """Folder with recordings of weak noise and a chaotic dwell at 25.6 kS/s."""
     folder = tmp_path_factory.mktemp("twin")
     rig = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"sample_rate_hz": 25_600.0})})
     with open_bench(rig) as bench:
@@ -68,7 +68,7 @@ def test_a_simulation_under_the_recorded_base_is_not_compared_with_draws(recordi
     base = twin_of(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).overlay
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)
     assert all(not each.compared for each in base.ensemble)
-    # The recorded base does not yield: the response at the drive is far below the measured one.
+    # A prescribed base motion does not react to the specimen: Response II is far too low.
     assert base.response.response_ii < chaotic.overlay.quantity("Response II").lower[0]
 
 
@@ -109,28 +109,28 @@ def test_a_shaker_is_found_from_weak_noise_within_its_bounds(recordings):
         assert abs(ratio) < 4 * found.relative_sd[name]
 
 
-def unsaid(recording):
-    """The same recording of a bench that says nothing of its shaker."""
+def without_shaker_description(recording):
+    """Return the recording with a bench that does not describe its shaker."""
     bench = {key: value for key, value in recording.bench.items() if key != "shaker"}
     return replace(recording, bench=bench)
 
 
-def test_noise_of_an_unknown_shaker_uses_the_fitted_shaker(recordings):
+def test_noise_on_an_undescribed_shaker_is_simulated_with_a_fitted_shaker(recordings):
     with open_recording(recordings / "noise.h5") as recording:
-        analysis = analyse(unsaid(recording))
-        found = overlay(unsaid(recording), analysis, draws=5)
+        analysis = analyse(without_shaker_description(recording))
+        found = overlay(without_shaker_description(recording), analysis, draws=5)
     assert found.run.driven is Driven.AMPLIFIER
     assert "fitted to" in found.run.why
     assert found.quantity("transmission").agrees
 
 
-def test_a_dwell_of_an_unknown_shaker_is_simulated_under_its_base_motion(recordings):
+def test_a_dwell_on_an_undescribed_shaker_is_simulated_with_the_recorded_base(recordings):
     with open_recording(recordings / "dwell.h5") as recording:
-        analysis = analyse(unsaid(recording))
-        found = overlay(unsaid(recording), analysis)
+        analysis = analyse(without_shaker_description(recording))
+        found = overlay(without_shaker_description(recording), analysis)
         with open_recording(recordings / "noise.h5") as noise:
             shaker = fit_shaker(noise, analyse(noise), gong2025())
-        driven = overlay(unsaid(recording), analysis, shaker=shaker, draws=6)
+        driven = overlay(without_shaker_description(recording), analysis, shaker=shaker, draws=6)
     assert found.run.driven is Driven.BASE
     assert "describes no shaker" in found.run.why
     assert driven.run.driven is Driven.AMPLIFIER

@@ -1,4 +1,4 @@
-"""What a person may ask of the simulation, and the answer as it grows; linear scenes need no compiling."""
+"""Simulation requests of a user, and the result while it grows; linear scenes need no compilation."""
 
 import re
 from pathlib import Path
@@ -57,7 +57,7 @@ def test_the_incremental_result_ends_at_the_linear_transmission():
 
 
 def test_the_simulation_uses_the_specimen_given_by_name_or_file(tmp_path):
-    """A shipped one by its name, one of one's own by its file."""
+    """Shipped specimens are given by name, other specimens by file."""
     file = tmp_path / "own.toml"
     file.write_text(
         'model = "gong2025"\nmasses_kg = [0.0061, 0.0019, 0.0025]\n'
@@ -105,7 +105,7 @@ def test_separate_bands_of_impacts_are_reported_separately():
 
 
 def is_about(found, stated):
-    """The page is measured anew now and then; a person choosing a level needs the size of the number."""
+    """Return whether a value is within a factor of 5 of the accuracy page, which is measured at intervals."""
     return found == stated or stated / 5 < found < 5 * stated
 
 
@@ -138,7 +138,7 @@ def test_a_higher_accuracy_is_stated_to_cost_more():
 
 @pytest.mark.thorough
 def test_a_short_request_completes_after_a_long_request_is_dropped():
-    """The real process; the answer to the short request comes whole."""
+    """In a real worker process the short request returns all its points."""
     first, second, pool = [], [], Pool(1)
     long = SimulationRequest(**{**LINEAR, "step_hz": 0.05})
     dropped = pool.stream(answer, first.extend, first.append, first.append, long)

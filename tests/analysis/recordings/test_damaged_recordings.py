@@ -1,4 +1,4 @@
-"""What must be so before a recording is read: its size can have been measured, and its seal is right."""
+"""Damaged recordings, and files that declare an implausible size, are refused before reading."""
 
 import zlib
 from pathlib import Path
@@ -20,8 +20,8 @@ CHUNK, CHUNKS = 51_200, 300
 WAVE = np.round(3e5 * np.sin(2 * np.pi * np.arange(CHUNK) / 32)).astype("<i4")
 
 
-def packed_wave(path):
-    """Let every channel be a sine that packs into nothing: 190 kB a channel declare 15 million samples."""
+def write_compression_bomb(path):
+    """Replace every channel by a compressible sine: 190 kB that declare 15 million samples."""
     packed = zlib.compress(WAVE.view(np.uint8).reshape(CHUNK, 4).T.tobytes(), 9)
     with h5py.File(path, "r+") as file:
         for name in ("seal", "overview", "view"):
@@ -42,7 +42,7 @@ def packed_wave(path):
 def test_a_small_file_that_declares_a_huge_data_size_is_refused(dwell_file, tmp_path):
     path = tmp_path / "packed.h5"
     path.write_bytes(Path(dwell_file("weak")).read_bytes())
-    packed_wave(path)
+    write_compression_bomb(path)
     with (
         open_recording(path) as recording,
         pytest.raises(UnusableData, match="data of a converter do not allow"),
@@ -57,7 +57,7 @@ def test_a_noise_free_sine_is_not_mistaken_for_a_compression_bomb(dwell_file):
 
 @pytest.fixture
 def damaged(dwell_file, tmp_path):
-    """A recording with one sample other than it was sealed with."""
+    """A recording with one sample changed after it was sealed."""
     path = tmp_path / "damaged.h5"
     path.write_bytes(Path(dwell_file("weak")).read_bytes())
     with h5py.File(path, "r+") as file:

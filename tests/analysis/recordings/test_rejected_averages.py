@@ -1,4 +1,4 @@
-"""An average of noise that the operator rejected counts for nothing."""
+"""Averages that the operator rejects are excluded from the results."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""m0's motion by an accelerometer or a displacement probe: the same results as by a vibrometer."""
+"""An accelerometer or displacement probe on m0 gives the same results as a vibrometer."""
 
 import numpy as np
 import pytest
@@ -18,21 +18,21 @@ DISPLACEMENT = ("m0_displacement", "displacement", "m", 1e-4)
 
 
 def accelerations(velocity):
-    """Differentiate by the FFT; mirrored, the velocity has no jump at its ends."""
+    """Differentiate by FFT; the velocity is mirrored to avoid a jump at its ends."""
     whole = np.concatenate((velocity, velocity[::-1]))
     lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
     return np.fft.irfft(lines * np.fft.rfft(whole), whole.size)[: velocity.size]
 
 
 def displacements(velocity):
-    """Integrate by the FFT; the mean velocity is not a motion of a specimen on a table."""
+    """Integrate by FFT without the mean velocity."""
     whole = np.concatenate((velocity, velocity[::-1]))
     lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
     lines[0] = np.inf
     return np.fft.irfft(np.fft.rfft(whole) / lines, whole.size)[: velocity.size]
 
 
-def analysed(path):
+def analysis_of(path):
     return analyse_files([path], "response", Simulation.LEFT_OUT).results[0].analysis
 
 
@@ -61,8 +61,8 @@ def test_dwell_responses_are_equal_for_any_sensor(dwell_file, dwell_motions, tmp
     path = synthetic.write_recording(
         tmp_path, plan, motion, made(velocity), [DWELL_PART], delay_s=1 / RATE, response=response
     )
-    expected = analysed(dwell_file(level))
-    found = analysed(path)
+    expected = analysis_of(dwell_file(level))
+    found = analysis_of(path)
     assert found.response.response_i == pytest.approx(expected.response.response_i, rel=1e-4)
     assert found.response.response_ii == pytest.approx(expected.response.response_ii, rel=1e-4)
     assert found.motion.verdict.kind is expected.motion.verdict.kind
@@ -74,7 +74,7 @@ def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp
     base, velocity, parts = noise_motion
     plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
     path = synthetic.write_recording(tmp_path, plan, base, made(velocity), parts, response=response)
-    expected, found = (analysed(each).response for each in (noise_file(), path))
+    expected, found = (analysis_of(each).response for each in (noise_file(), path))
     np.testing.assert_allclose(
         found.frequency_response.value, expected.frequency_response.value, rtol=1e-3, atol=1e-3
     )
@@ -92,7 +92,7 @@ def test_samples_do_not_depend_on_the_start_of_reading(dwell_motions, tmp_path, 
         whole = ResponseChannel(recording).read(0, recording.samples)
         part = ResponseChannel(recording).read(10_001, 23_456)
     np.testing.assert_array_equal(part, whole[10_001:23_456])
-    # In the first second the transient moves slower than 5 Hz, too.
+    # The first second is excluded: the transient has components below 5 Hz.
     assert np.abs(whole - velocity)[round(RATE) : -64].max() < 2e-3 * np.abs(velocity).max()
 
 

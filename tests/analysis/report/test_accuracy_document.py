@@ -1,4 +1,4 @@
-"""The page on accuracy is made from a measurement, and the page in docs was made by this code."""
+"""The accuracy page follows from a measurement, and the page in docs matches the current code."""
 
 import runpy
 import sys

@@ -1,4 +1,4 @@
-"""A row says yes, no or cannot tell, with the reason; a recording without a result has a row too."""
+"""Each row of a report states agreement, disagreement or neither with a reason, also without a result."""
 
 from types import SimpleNamespace as Of
 

@@ -1,4 +1,4 @@
-"""A page of any content is short with all folds closed, shows text as text, and prints on A4."""
+"""A report page is short with closed folds, escapes text from files and prints on A4."""
 
 import re
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from vibench.analysis.report._page import LONGEST_CAPTION, MOST_OPEN_CARDS, divi
 HOSTILE = '<script>alert("x")</script>'
 
 
-def written(path, cards, text="words"):
+def page_text(path, cards, text="words"):
     page = Page(text, text, (text,), text, None, "recording", cards, Fold("More", ()), (), (text,))
     return write_page(page, path / "page.html").read_text(encoding="utf-8")
 
@@ -24,7 +24,7 @@ def card(name, text="words"):
 
 @pytest.mark.parametrize("number", [0, 1, MOST_OPEN_CARDS, MOST_OPEN_CARDS + 1, 60])
 def test_every_result_card_has_a_table_row_and_many_cards_are_folded(number, tmp_path):
-    page = Read(written(tmp_path, tuple(card(f"c{each}", "result " * 20) for each in range(number))))
+    page = Read(page_text(tmp_path, tuple(card(f"c{each}", "result " * 20) for each in range(number))))
     rows = page.visible.split("figure and remarks")[1].split("Individual results")[0]
     assert rows.count("cannot tell") == number
     assert [each for each in page.ids if each.startswith("card-")] == [
@@ -34,14 +34,14 @@ def test_every_result_card_has_a_table_row_and_many_cards_are_folded(number, tmp
     assert shown == (0 if number > MOST_OPEN_CARDS else 100 * number)
 
 
-def test_text_from_files_is_shown_as_text_in_every_place(tmp_path):
-    text = written(tmp_path, (card(HOSTILE, HOSTILE),), HOSTILE)
+def test_html_in_text_from_files_is_escaped_everywhere_in_a_report(tmp_path):
+    text = page_text(tmp_path, (card(HOSTILE, HOSTILE),), HOSTILE)
     assert "<script" not in text
     assert Read(text).visible.count(HOSTILE) >= 9
 
 
 def test_reports_have_dark_and_print_styles_and_closed_folds_are_not_printed(tmp_path):
-    style = written(tmp_path, ())
+    style = page_text(tmp_path, ())
     assert "@media (prefers-color-scheme: dark)" in style
     assert "@page { size: A4" in style
     assert re.search(r"@media print \{.*details:not\(\[open\]\) \{ display: none; \}", style, re.DOTALL)

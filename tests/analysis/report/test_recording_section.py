@@ -1,4 +1,4 @@
-"""What a report says of a bench: how its last check came out, how long before, and what it did not like."""
+"""A report states the result, the age and the warnings of the last bench check."""
 
 from types import SimpleNamespace
 

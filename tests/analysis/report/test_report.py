@@ -1,4 +1,4 @@
-"""A report is one file that needs nothing else, says what the results say, and hides no failure."""
+"""A report is one self-contained file with all results and all failures."""
 
 import json
 import shutil
@@ -38,14 +38,14 @@ def campaign(dwell_file, noise_file, sweep_file):
 
 
 @pytest.fixture(scope="module")
-def written(campaign, tmp_path_factory):
+def report_path(campaign, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
     return write_report(campaign, folder / "report.html", folder / "figures")
 
 
 @pytest.fixture(scope="module")
-def page(written):
-    return Page(written.read_text(encoding="utf-8"))
+def page(report_path):
+    return Page(report_path.read_text(encoding="utf-8"))
 
 
 def test_a_report_needs_no_other_file_and_no_network(page):
@@ -147,12 +147,12 @@ def test_a_recording_without_a_result_is_named_first_in_the_report(page, campaig
     assert page.visible.count("cannot tell") >= 1
 
 
-def test_text_from_a_plan_is_shown_as_text(page):
+def test_html_in_a_campaign_name_is_escaped_in_the_report(page):
     assert "a <b>campaign</b> & more" in page.text
 
 
-def test_figures_are_saved_beside_the_report_with_their_numbers(written):
-    names = {each.suffix for each in (written.parent / "figures").iterdir()}
+def test_figures_are_saved_beside_the_report_with_their_numbers(report_path):
+    names = {each.suffix for each in (report_path.parent / "figures").iterdir()}
     assert names == {".png", ".svg", ".csv"}
 
 

@@ -1,4 +1,4 @@
-"""The findings of a report in plain words are right for every kind of result, and short."""
+"""The summary sentences of a report are correct and short for every kind of result."""
 
 from types import SimpleNamespace as Of
 
@@ -35,7 +35,7 @@ def campaign(noise=(), dwells=(), failures=()):
     return Of(noise=noise, dwells=dwells, in_order=results, results=results, failures=failures)
 
 
-def said(**parts):
+def report(**parts):
     return summary(campaign(**parts), ())
 
 
@@ -65,24 +65,24 @@ def test_the_papers_campaign_is_reported_in_three_findings():
     ],
 )
 def test_measured_changes_of_resonances_are_reported(strong, words):
-    assert words in said(noise=(noise(0.05, 94.6, 266.2, 499.6), strong))
+    assert words in report(noise=(noise(0.05, 94.6, 266.2, 499.6), strong))
 
 
 @pytest.mark.parametrize(
     "second", [noise(0.05, 201.0), noise(10.0, 201.0, specimen="another")], ids=["level", "specimen"]
 )
 def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
-    words = said(noise=(noise(0.05, 94.6, 266.2), second))
+    words = report(noise=(noise(0.05, 94.6, 266.2), second))
     assert "gone" not in words
     assert words.count("noise 0.05: Noise at 0.05 Vpp: resonances at 94.6, 266.2 Hz.") == 1
     assert words.count("Vpp: resonances at 201.0 Hz.") == 1
 
 
 def test_undecided_motion_is_named_and_long_lists_are_shortened():
-    assert "undecided at 1 Vpp." in said(dwells=(dwell(1.0, MotionKind.UNDECIDED),) * 2), "up and down"
-    assert said(dwells=(dwell(1.0, MotionKind.UNDECIDED),)) == "At 260 Hz the motion is undecided at 1 Vpp."
+    assert "undecided at 1 Vpp." in report(dwells=(dwell(1.0, MotionKind.UNDECIDED),) * 2), "up and down"
+    assert report(dwells=(dwell(1.0, MotionKind.UNDECIDED),)) == "At 260 Hz the motion is undecided at 1 Vpp."
     many = tuple(dwell(1.0, MotionKind.PERIODIC, 200.0 + each) for each in range(50))
-    words = said(dwells=many)
+    words = report(dwells=many)
     assert len(words.split()) <= MOST_WORDS
     assert words.endswith("The table shows all results.")
 
@@ -106,7 +106,7 @@ def test_agreement_is_stated_for_every_mix_of_verdicts(verdicts, words):
 
 def test_a_recording_without_a_result_comes_first_and_many_findings_stay_short():
     failed = AnalysisFailure("x.h5", FailedStep.ANALYSIS, "broken")
-    assert said(failures=(failed,)) == "One recording of one gave no result."
+    assert report(failures=(failed,)) == "One recording of one gave no result."
     many = tuple(noise(0.05, 94.6, 266.2, 499.6) for _ in range(40))
     words = summary(campaign(many, failures=(failed,)), [YES] * 40)
     assert len(words.split()) <= MOST_WORDS

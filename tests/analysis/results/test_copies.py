@@ -22,12 +22,12 @@ def dwells(dwell_file, tmp_path_factory):
     return folder
 
 
-def analysed(folder):
+def analysis_of(folder):
     return analyse_files(recordings_in(folder), "dwells", Simulation.LEFT_OUT)
 
 
 def test_a_copy_of_a_recording_is_counted_once_and_named(dwells):
-    found = analysed(dwells)
+    found = analysis_of(dwells)
     assert [each.name for each in found.facts] == ["weak"]
     said = "weak: copies: weak_copy.h5 has the same samples as weak.h5; it is counted once"
     assert said in list(check_warnings(found))
@@ -40,13 +40,13 @@ def test_a_copy_with_added_results_and_a_link_are_counted_as_copies(dwells, tmp_
     shutil.copy(dwells / "weak.h5", tmp_path / "c.h5")
     with open_recording(tmp_path / "c.h5") as recording:
         recording.save_results("late", {"ones": ResultArray(np.ones(3), "1")}, {})
-    assert len(analysed(tmp_path).results) == 1
+    assert len(analysis_of(tmp_path).results) == 1
 
 
 def test_two_recordings_of_the_same_samples_are_counted_once(dwell_file, tmp_path):
     for name in "ab":
         shutil.copy(dwell_file("weak"), tmp_path / f"{name}.h5")
-    found = analysed(tmp_path)
+    found = analysis_of(tmp_path)
     assert len(found.results) == 1
     assert any("has the same samples as" in each for each in check_warnings(found))
 
@@ -57,7 +57,7 @@ def test_a_different_recording_with_the_same_identity_gives_a_warning(dwells, dw
     with h5py.File(tmp_path / "a.h5") as one, h5py.File(tmp_path / "b.h5", "r+") as other:
         other.attrs["recording_id"] = one.attrs["recording_id"]
         del other["seal"], other["overview"], other["view"]
-    found = analysed(tmp_path)
+    found = analysis_of(tmp_path)
     assert len(found.results) == 1
     (said,) = (each for each in check_warnings(found) if "copies" in each)
     assert "has the identity of the recording" in said

@@ -1,4 +1,4 @@
-"""Recordings of a known specimen: each excitation gives the closed form, and what is missing is said."""
+"""Analyses of a known specimen match the closed form and report missing or faulty data."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from vibench.sim import base_transmissibility, gong2025
 RATE = 6400.0
 
 
-def analysed(path):
+def analysis_of(path):
     with open_recording(path) as recording:
         return analyse(recording)
 
@@ -39,20 +39,20 @@ def test_analyse_accepts_a_recording_as_path_or_text(dwell_file):
 
 
 def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file):
-    found = analysed(dwell_file("weak"))
+    found = analysis_of(dwell_file("weak"))
     assert isinstance(found, DwellAnalysis)
     assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=1e-8)
     assert found.response.drive.amplitude_m == pytest.approx(0.5e-6, rel=1e-4)
     exact = truth(260.0)[0]
     assert found.response.response_ii == pytest.approx(abs(exact), rel=1e-3)
-    # Without a collision both responses are the same, but for what lies between two samples.
+    # Without collisions both responses are equal, except for the sampling of the maximum.
     assert found.response.response_i == pytest.approx(found.response.response_ii, rel=1e-2)
-    # The channel's delay of one sample would be 14.6 degrees.
+    # Without correction the channel's delay of one sample would add 14.6 degrees.
     assert found.response.phase_rad == pytest.approx(np.angle(exact), abs=2e-3)
 
 
 def test_a_colliding_dwell_has_a_lower_response_ii_and_fills_the_terminal_bands(dwell_file):
-    weak, strong = analysed(dwell_file("weak")), analysed(dwell_file("strong"))
+    weak, strong = analysis_of(dwell_file("weak")), analysis_of(dwell_file("strong"))
     assert strong.response.response_ii < 0.3 * weak.response.response_ii
     assert strong.response.response_i > 2 * strong.response.response_ii
     for quiet, loud in zip(weak.terminal, strong.terminal, strict=True):
@@ -60,12 +60,12 @@ def test_a_colliding_dwell_has_a_lower_response_ii_and_fills_the_terminal_bands(
 
 
 def test_all_three_estimators_give_the_closed_form_on_every_line_of_noise(noise_file):
-    found = analysed(noise_file())
+    found = analysis_of(noise_file())
     assert isinstance(found, NoiseAnalysis)
     estimate = found.response
     lines = estimate.frequency_response.frequency_hz
     assert lines.size == 126
-    # What settling leaves of the first mode, exp(-11), shows at its sharp flanks.
+    # The remaining transient of the first mode, exp(-11), affects the flanks of its resonance.
     for each in (estimate.frequency_response, estimate.h1, estimate.h2):
         np.testing.assert_allclose(each.value, truth(lines), rtol=2e-3)
     assert estimate.left_out == 0
@@ -74,20 +74,20 @@ def test_all_three_estimators_give_the_closed_form_on_every_line_of_noise(noise_
     assert middle[0].frequency_hz == pytest.approx(gong2025().natural_frequencies_hz[1], rel=1e-3)
 
 
-def test_a_sweep_finds_where_the_simulated_masses_began_to_collide(sweep_file):
-    found = analysed(sweep_file)
+def test_a_sweep_matches_the_closed_form_below_its_collision_region(sweep_file):
+    found = analysis_of(sweep_file)
     assert isinstance(found, SweepAnalysis)
     region = found.collisions.regions[0]
     before = found.response.frequency_hz < region.low_hz - 5
     quiet = found.response.response_ii[before][5:]
-    # A sweep of 5 Hz/s lags the steady curve by a little.
+    # A sweep at 5 Hz/s lags slightly behind the steady curve.
     exact = np.abs(truth(found.response.frequency_hz[before][5:]))
     np.testing.assert_allclose(quiet, exact, rtol=0.03)
     assert found.response.drive_amplitude_m[20:-5] == pytest.approx(5e-6, rel=1e-3)
 
 
 def test_every_step_of_a_stepped_sine_is_analysed_like_a_dwell(stepped_file):
-    found = analysed(stepped_file)
+    found = analysis_of(stepped_file)
     assert isinstance(found, SteppedSineAnalysis)
     assert found.response.frequency_hz == pytest.approx([150.0, 180.0], rel=1e-7)
     assert found.response.response_ii == pytest.approx(np.abs(truth([150.0, 180.0])), rel=1e-3)
@@ -96,7 +96,7 @@ def test_every_step_of_a_stepped_sine_is_analysed_like_a_dwell(stepped_file):
 
 def test_a_stopped_dwell_is_analysed_with_a_warning(dwell_file):
     path = dwell_file("weak", state=RecordingState.STOPPED, reason="cancelled", samples=round(4 * RATE))
-    found = analysed(path)
+    found = analysis_of(path)
     assert found.response.window_s < 2.0
     assert found.response.response_ii == pytest.approx(abs(truth(260.0)[0]), rel=2e-3)
     assert verdict(found, "How it ended") is Verdict.WARNING
@@ -106,18 +106,18 @@ def test_a_stopped_dwell_is_analysed_with_a_warning(dwell_file):
 def test_a_recording_that_ended_before_its_dwell_is_refused_with_the_reason(dwell_file):
     path = dwell_file("weak", state=RecordingState.FAILED, reason="cable out", samples=round(1 * RATE))
     with pytest.raises(NotEnoughData, match=r"weak\.h5 \(failed: cable out\).*before its dwell began"):
-        analysed(path)
+        analysis_of(path)
 
 
 def test_a_dwell_with_a_gap_is_refused_with_the_number_of_lost_samples(dwell_file):
     path = dwell_file("weak", hole=(round(3 * RATE), round(3 * RATE) + 40))
     with pytest.raises(UnusableData, match="40 of 19200 samples were lost"):
-        analysed(path)
+        analysis_of(path)
 
 
 def test_a_realisation_with_a_gap_is_excluded(noise_file):
     first = round(3.1 * RATE)
-    found = analysed(noise_file(hole=(first, first + 10)))
+    found = analysis_of(noise_file(hole=(first, first + 10)))
     assert found.response.left_out == 1
     assert found.response.periodic.realisations == 1
     assert found.facts.lost_samples == 10
@@ -130,7 +130,7 @@ def test_a_realisation_with_a_gap_is_excluded(noise_file):
 
 
 def test_a_faultless_recording_passes_its_checks(dwell_file):
-    found = analysed(dwell_file("weak"))
+    found = analysis_of(dwell_file("weak"))
     assert {each.verdict for each in found.checks} <= {Verdict.PASSED, Verdict.NOTE}
     assert verdict(found, "Calibration") is Verdict.PASSED
     assert verdict(found, "Drive frequency") is Verdict.PASSED
@@ -149,7 +149,7 @@ def test_a_drive_at_another_frequency_than_the_plan_is_reported():
 )
 def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
     generator = load_rig("virtual_rig").generator.model_dump(mode="json")
-    facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
+    facts = replace(analysis_of(dwell_file("weak")).facts, bench={"generator": generator})
     setting_v = facts.measurement.excitation.amplitude_vpp / 2
     levels = tuple(
         replace(each, peak=share * setting_v) if each.header.role == "drive_voltage" else each
@@ -164,13 +164,13 @@ def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
 
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
 def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, generator):
-    facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
+    facts = replace(analysis_of(dwell_file("weak")).facts, bench={"generator": generator})
     (found,) = [each for each in measurement_checks(facts) if "level" in each.what]
     assert found.verdict is Verdict.PASSED
 
 
-def test_a_calibration_after_the_measurement_is_not_called_old(dwell_file):
-    facts = analysed(dwell_file("weak")).facts
+def test_a_calibration_dated_after_the_measurement_gives_a_warning_without_an_age(dwell_file):
+    facts = analysis_of(dwell_file("weak")).facts
     channels = tuple(
         replace(each, header=replace(each.header, calibration_date="2098-02-10")) for each in facts.channels
     )
@@ -182,7 +182,7 @@ def test_a_calibration_after_the_measurement_is_not_called_old(dwell_file):
 
 
 def test_a_channel_level_states_peak_and_rms(dwell_file, dwell_motions):
-    found = analysed(dwell_file("weak"))
+    found = analysis_of(dwell_file("weak"))
     velocity = dwell_motions["weak"][1]
     level = found.facts.level("m0_velocity")
     assert level.peak == pytest.approx(np.max(np.abs(velocity)), rel=1e-6)

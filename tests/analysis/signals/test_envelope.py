@@ -1,4 +1,4 @@
-"""An envelope holds the signal, and touches it in every stretch."""
+"""The envelope contains the signal and touches it in every interval."""
 
 import numpy as np
 from hypothesis import given, strategies as st

@@ -1,4 +1,4 @@
-"""Values between samples, of one channel or of several at the same places."""
+"""Interpolation between samples of one or several channels."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ SAMPLES = 3000
 
 
 def tones(positions):
-    """Three channels of tones below the trusted band."""
+    """Return three channels of tones within the accurate band of the interpolation."""
     cycles = np.array([[0.013], [0.21], [0.39]])
     return np.cos(2 * np.pi * cycles * positions + np.array([[0.3], [1.0], [2.0]]))
 

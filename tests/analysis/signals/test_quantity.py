@@ -1,4 +1,4 @@
-"""Displacement, velocity and acceleration: exact factors, no drift, no gain error."""
+"""Conversion of displacement, velocity and acceleration is exact, without drift or gain error."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_velocity_over_acceleration_becomes_displacement_over_displacement():
 
 
 def test_integration_of_a_260_hz_line_has_no_gain_error_and_no_drift():
-    """The trapezoid rule would be 8.5e-3 low at this rate, and an offset would grow without bound."""
+    """The trapezoid rule would be 0.85 % low at this sampling rate, and an offset would drift."""
     time = np.arange(int(4 * RATE)) / RATE
     omega = 2 * np.pi * 260
     velocity = omega * 5e-6 * np.cos(omega * time) + 0.3 + 0.01 * time

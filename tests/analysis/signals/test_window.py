@@ -1,4 +1,4 @@
-"""Windows are those of scipy, value by value."""
+"""Window values equal those of scipy."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A sweep in three arrays, given to the sums in blocks as a recording gives it."""
+"""Analysis of a sweep in memory, block by block as for a recording."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ BLOCK = 1 << 19
 def sweep_response(
     drive, base, response, rate_hz, *, low_hz, high_hz, interval_s=0.1, delay_s=0.0, linear=None
 ):
-    """Drive [V], base acceleration [m/s2] and response velocity [m/s] become a sweep's response."""
+    """Return the sweep response from drive [V], base acceleration [m/s2] and m0 velocity [m/s]."""
     sums = SweepSums(rate_hz, low_hz=low_hz, high_hz=high_hz, interval_s=interval_s)
     for first in range(0, drive.size, BLOCK):
         sums.add(np.stack([row[first : first + BLOCK] for row in (drive, base, response)]))

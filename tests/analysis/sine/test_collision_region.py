@@ -1,4 +1,4 @@
-"""Collision regions, on simulated sweeps whose impacts are known."""
+"""Collision regions of simulated sweeps with known impacts."""
 
 from dataclasses import replace
 from functools import cache
@@ -16,17 +16,17 @@ from vibench.analysis.sine.collision_region import collisions
 from vibench.sim import LinearSweep, base_transmissibility, gong2025, integrate
 
 RATE = 12_800.0
-NOISE_DENSITY = 2e-7  # m/s per root hertz, a vibrometer's
+NOISE_DENSITY = 2e-7  # of a vibrometer [m/s per root hertz]
 
 
 @cache
-def simulated(amplitude_m, start_hz, stop_hz, duration_s=32.0):
+def simulate_sweep(amplitude_m, start_hz, stop_hz, duration_s=32.0):
     drive = LinearSweep(start_hz, stop_hz, duration_s, amplitude_m)
     path = integrate(gong2025(), drive, duration_s, sample_rate_hz=RATE)
     phase = 2 * np.pi * drive.turns(path.time_s)
     omega = 2 * np.pi * drive.frequency_hz(path.time_s)
     base = -amplitude_m * omega**2 * np.sin(phase)
-    # Amplifier and shaker distort by a tenth of a per cent, which the specimen sees little of.
+    # Amplifier and shaker distort the base motion by 0.1 %.
     base += 1e-3 * amplitude_m * omega**2 * (np.sin(2 * phase) + np.sin(3 * phase) + np.sin(5 * phase))
     impacts_hz = drive.frequency_hz(path.impacts.times_s)
     return np.sin(phase), base, path.states[:, 3], impacts_hz
@@ -37,8 +37,8 @@ def linear(frequency_hz):
     return base_transmissibility(gong2025(), frequency_hz)[:, 0]
 
 
-def found(amplitude_m, start_hz, stop_hz, spoil=lambda velocity, rng: velocity, known=linear):
-    drive, base, velocity, impacts_hz = simulated(amplitude_m, start_hz, stop_hz)
+def find_collisions(amplitude_m, start_hz, stop_hz, spoil=lambda velocity, rng: velocity, known=linear):
+    drive, base, velocity, impacts_hz = simulate_sweep(amplitude_m, start_hz, stop_hz)
     rng = np.random.default_rng(1)
     noisy = velocity + NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
     ends = sorted((start_hz, stop_hz))
@@ -54,7 +54,7 @@ def found(amplitude_m, start_hz, stop_hz, spoil=lambda velocity, rng: velocity, 
     [(5e-6, 225.0, 385.0), (2e-6, 225.0, 385.0), (5e-6, 385.0, 225.0)],
 )
 def test_the_collision_region_extends_from_first_to_last_impact(amplitude_m, start_hz, stop_hz):
-    result, impacts_hz = found(amplitude_m, start_hz, stop_hz)
+    result, impacts_hz = find_collisions(amplitude_m, start_hz, stop_hz)
     assert impacts_hz.size > 1000
     first, last = result.regions[0], result.regions[-1]
     assert first.start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
@@ -65,15 +65,15 @@ def test_the_collision_region_extends_from_first_to_last_impact(amplitude_m, sta
 
 
 @pytest.mark.thorough
-def test_without_impacts_there_is_no_collision_region():
-    result, impacts_hz = found(2e-7, 225.0, 385.0)
+def test_a_sweep_without_impacts_has_no_collision_region():
+    result, impacts_hz = find_collisions(2e-7, 225.0, 385.0)
     assert impacts_hz.size == 0
     assert result.regions == ()
     assert not result.is_colliding.any()
 
 
 def test_continuous_collisions_give_a_region_over_the_whole_sweep():
-    result, _ = found(20e-6, 240.0, 300.0)
+    result, _ = find_collisions(20e-6, 240.0, 300.0)
     (region,) = result.regions
     assert region.reaches_start
     assert region.reaches_stop
@@ -83,7 +83,7 @@ def test_ten_times_the_noise_does_not_move_the_collision_edges():
     def spoil(velocity, rng):
         return velocity + 10 * NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
 
-    result, impacts_hz = found(5e-6, 225.0, 385.0, spoil)
+    result, impacts_hz = find_collisions(5e-6, 225.0, 385.0, spoil)
     assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
     assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
 
@@ -95,10 +95,10 @@ def test_laser_drop_outs_do_not_change_the_region():
             spoilt[place : place + 20] = 0.2
         return spoilt
 
-    result, impacts_hz = found(5e-6, 225.0, 385.0, spoil)
+    result, impacts_hz = find_collisions(5e-6, 225.0, 385.0, spoil)
     assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
     assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
-    quiet, _ = found(2e-7, 225.0, 385.0, spoil)
+    quiet, _ = find_collisions(2e-7, 225.0, 385.0, spoil)
     assert quiet.regions == ()
 
 
@@ -107,7 +107,7 @@ def test_laser_drop_outs_do_not_change_the_region():
     ("start_hz", "stop_hz", "duration_s"), [(150, 330, 10), (330, 150, 6), (150, 330, 3), (60, 150, 5)]
 )
 def test_ringing_after_steps_of_a_fast_sweep_is_not_a_collision(tmp_path, start_hz, stop_hz, duration_s):
-    """m1 stays within half of its gap; "the masses collide from 257 to 304 Hz" was said."""
+    """m1 stays within half its gap; collisions from 257 to 304 Hz were once reported."""
     plan = SineSweep(
         amplitude_vpp=0.1 if max(start_hz, stop_hz) > 200 else 0.01,
         start_hz=start_hz,
@@ -124,7 +124,7 @@ def test_ringing_after_steps_of_a_fast_sweep_is_not_a_collision(tmp_path, start_
         left = np.sqrt(np.maximum(found.residual_rms**2 - (4 * found.noise_rms) ** 2, 0))
         share = left[1:-1] / np.abs(sweep.velocity.order(1.0))[1:-1]
         assert np.max(share) == pytest.approx(0.0023 * sweep.sweep_rate_hz_per_s, rel=0.15)
-        # A collision must leave twice the residual of the linear specimen.
+        # A collision is reported from twice the residual of the linear specimen.
         assert np.max(share) < 1.15 * np.max(sweep.linear_residual[1:-1])
 
 
@@ -139,22 +139,22 @@ def test_collisions_in_a_fast_sweep_are_reported(tmp_path, duration_s):
 
 
 @pytest.mark.thorough
-def test_without_a_specimen_ringing_and_weak_impacts_are_not_distinguished():
-    """Orders 2 and 3 show the impacts of strong collisions, whatever is known of the specimen."""
-    strong, _ = found(20e-6, 240.0, 300.0, known=None)
+def test_ringing_and_weak_impacts_are_not_distinguished_without_a_specimen():
+    """Orders 2 and 3 show strong collisions even without a description of the specimen."""
+    strong, _ = find_collisions(20e-6, 240.0, 300.0, known=None)
     assert len(strong.regions) == 1
-    weak, impacts_hz = found(2e-6, 225.0, 385.0, known=None)
+    weak, impacts_hz = find_collisions(2e-6, 225.0, 385.0, known=None)
     assert weak.regions == ()
     (stretch,) = weak.too_fast_hz
     assert stretch[0] == pytest.approx(impacts_hz[0], abs=3)
-    quiet, _ = found(2e-7, 225.0, 385.0, known=None)
+    quiet, _ = find_collisions(2e-7, 225.0, 385.0, known=None)
     assert quiet.too_fast_hz == ()
 
 
 @pytest.mark.parametrize("seed", [3, 5, 11])
 @pytest.mark.parametrize("contact", ["linear", "hertz"])
 def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact):
-    """Drawn so that `benchmarks/fast_sweeps.py` does the same for hours."""
+    """`benchmarks/fast_sweeps.py` tests more random sweeps of this kind."""
     scene = fast_sweep(seed)
     outcome = simulate_and_analyse(scene, contact, scene.specimen)
     assert not outcome.is_wrong, outcome
@@ -162,7 +162,7 @@ def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact
 
 @pytest.mark.parametrize("is_known", [True, False])
 def test_a_mode_ringing_at_twice_the_drive_is_not_a_collision(is_known):
-    """Collisions from 46 to 39 Hz were reported of a specimen without stops, whose mode at 82 Hz rang on."""
+    """Collisions from 46 to 39 Hz were once reported without stops: the mode at 82 Hz was ringing."""
     specimen = gong2025(damping_time_s=3.5e-6)
     outcome = simulate_and_analyse(
         FastSweep(specimen, 125.0, 40.0, 12.0, 1e-5, 1), "linear", specimen if is_known else None
@@ -171,7 +171,7 @@ def test_a_mode_ringing_at_twice_the_drive_is_not_a_collision(is_known):
 
 
 def test_a_short_collision_is_reported():
-    """ "The masses did not collide" was reported where m1 passed its gap for less than half a second."""
+    """No collision was once reported although m1 exceeded its gap for less than 0.5 s."""
     specimen = gong2025(damping_time_s=1.28e-5, gap_m=67.4e-6)
     sweep = FastSweep(specimen, 123.5, 83.5, 6.0, 1e-6, 1)
     found = simulate_and_analyse(sweep, "hertz", specimen)
@@ -185,7 +185,7 @@ def test_a_short_collision_is_reported():
 @pytest.mark.parametrize("is_known", [True, False])
 @pytest.mark.parametrize(("seed", "level_m"), [(10, 3.2e-7), (15, 2.18e-6), (28, 1.72e-5)])
 def test_a_sweep_that_just_reaches_the_gap_is_not_called_free_of_collisions(seed, level_m, is_known):
-    """Nine of 80 sweeps at 1 to 1.3 times the level that closes the gap were reported without any."""
+    """Of 80 sweeps at 1 to 1.3 times the level that closes the gap, nine were reported as collision-free."""
     scene = fast_sweep(seed)
     found = simulate_and_analyse(
         replace(scene, amplitude_m=level_m), "hertz", scene.specimen if is_known else None
@@ -195,7 +195,7 @@ def test_a_sweep_that_just_reaches_the_gap_is_not_called_free_of_collisions(seed
 
 
 def test_ringing_above_the_drive_level_is_not_a_collision():
-    """Collisions from 97 to 118 Hz were reported of a specimen without stops, which rings."""
+    """Collisions from 97 to 118 Hz were once reported of a ringing specimen without stops."""
     specimen = gong2025(damping_time_s=4e-7)
     sweep = FastSweep(specimen, 88.0, 118.0, 8.0, 1e-6, 1)
     assert simulate_and_analyse(sweep, "linear", None).colliding == 0
@@ -203,7 +203,7 @@ def test_ringing_above_the_drive_level_is_not_a_collision():
 
 @pytest.mark.parametrize(("damping_time_s", "is_stated"), [(3e-6, True), (2e-7, False)])
 def test_steady_responses_are_stated_only_where_the_linear_run_matches(damping_time_s, is_stated):
-    """32 % too much was stated where the specimen still rang of what was before the recording."""
+    """The stated response was once 32 % too large while the specimen still rang from an earlier motion."""
     specimen = gong2025(damping_time_s=damping_time_s)
     outcome = simulate_and_analyse(FastSweep(specimen, 120.0, 45.0, 4.0, 1e-6, 1), "linear", specimen)
     if is_stated:
@@ -213,7 +213,7 @@ def test_steady_responses_are_stated_only_where_the_linear_run_matches(damping_t
 
 
 def test_the_steady_range_follows_from_the_linear_specimen():
-    """22.104 was reported of a sweep at 20 Hz/s, and nothing of 22.815 under steady sines."""
+    """A sweep at 20 Hz/s has a largest response of 22.104; steady sines have 22.815."""
     outcome = simulate_and_analyse(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
     steady = float(np.max(np.abs(linear(np.linspace(200.0, 300.0, 5001)))))
     assert outcome.largest_ii < 0.98 * steady

@@ -1,4 +1,4 @@
-"""Dwells: responses, lines and points of motions that are known, and of the simulated specimen."""
+"""Dwells: responses, spectral lines and Poincaré points of known motions and of the simulated specimen."""
 
 from functools import cache
 
@@ -15,7 +15,7 @@ from vibench.analysis.tones.sine_fit import drive_level, noise_drive_level
 from vibench.sim import Harmonic, gong2025, integrate
 
 RATE = 12_800.0
-DRIVE_HZ = 260.0031  # the generator's 260 Hz by the converter's clock
+DRIVE_HZ = 260.0031  # the generator's 260 Hz measured by the converter's clock
 
 
 def dwell(duration_s, orders, noise=0.0, drive_hz=DRIVE_HZ, seed=1):
@@ -49,7 +49,7 @@ def test_the_largest_displacement_is_found_between_samples(samples_per_period):
 
 
 def test_bounds_of_response_i_contain_the_truth_at_any_noise():
-    """Without noise, ringing from the ends of the record used to exceed the bounds in half of the cases."""
+    """Without noise, ringing from the record ends once exceeded the bounds in half of the cases."""
     rng = np.random.default_rng(43)
     for seed in range(20):
         drive_hz, part = rng.uniform(150.0, 600.0), 15e-6 * np.exp(1j * rng.uniform(0.0, 2 * np.pi))
@@ -64,7 +64,7 @@ def test_bounds_of_response_i_contain_the_truth_at_any_noise():
 
 @pytest.mark.parametrize("per_s", [0.1, 10.0])
 def test_a_drifting_sensor_does_not_change_the_responses(per_s):
-    """A straight line over the window leaks into every order: 10 times the amplitude a second, by 0.1 %."""
+    """Without correction a drift of 10 amplitudes per second changes every order by 0.1 %."""
     drive, base, velocity = dwell(4, {1: 15e-6 * np.exp(-0.7j)})
     line = per_s * np.linspace(0.0, 4.0, drive.size)
     drifting = (base + np.max(base) * line, velocity - np.max(velocity) * line)
@@ -75,7 +75,7 @@ def test_a_drifting_sensor_does_not_change_the_responses(per_s):
 
 
 def test_no_order_leaks_into_response_ii():
-    """The window is not a whole number of subharmonic periods; a one-term estimate would be off by 1e-4."""
+    """The window is no whole number of subharmonic periods; a single-order fit would err by 1e-4."""
     parts = {0.5: 3e-6, 1: 15e-6, 1.5: 2e-6j, 2: 1e-6, 3: -4e-6}
     drive, base, velocity = dwell(3, parts)
     result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=1.2345)
@@ -115,13 +115,13 @@ def test_stated_noise_bias_and_spread_match_repeated_dwells():
 
 @pytest.mark.thorough
 def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent():
-    """Ten tenths of a window tell their own scatter to a quarter only: twice it held A0 in 92."""
+    """Ten sections of a window determine their scatter within 25 % only; uncorrected coverage was 92 %."""
     rng, draws, held = np.random.default_rng(4), 1000, 0
     for _ in range(draws):
         drive, base, _ = dwell(0.5, {1: 1e-7})
         level = drive_level(drive, base + 0.2 * rng.standard_normal(base.size), RATE, near_hz=260)
         held += abs(level.amplitude_m - 5e-6) < 2 * level.sd_amplitude_m
-    # Three standard deviations of 1000 draws about 0.954.
+    # Tolerance: three standard deviations of 1000 draws.
     assert held / draws == pytest.approx(0.954, abs=0.02)
 
 
@@ -133,7 +133,7 @@ def test_twice_the_error_of_a_complex_mean_covers_its_true_value_in_95_percent(c
 
 
 @cache
-def simulated(amplitude_m):
+def simulate_dwell(amplitude_m):
     specimen = gong2025()
     path = integrate(specimen, Harmonic(260.0, amplitude_m), 8.0, sample_rate_hz=RATE)
     omega = 2 * np.pi * 260.0
@@ -146,7 +146,7 @@ def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_two():
         drive, _, velocity = dwell(4, parts)
         section = stroboscope(drive, velocity, RATE, near_hz=260, phase_rad=1.0)
         x, v = section.displacement_m, section.velocity_m_per_s
-        # What the ends of the record leave is a few 1e-4 of the amplitude.
+        # Effects of the record ends are a few 1e-4 of the amplitude.
         for start in range(points):
             assert np.ptp(x[start::points]) < 1e-8
             assert np.ptp(v[start::points]) < 2e-5

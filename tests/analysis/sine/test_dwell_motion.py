@@ -1,4 +1,4 @@
-"""How recorded dwells of the simulated specimen repeat, and how that is shown."""
+"""Motion verdict, Poincaré points and phase portraits of recorded dwells."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_poincare_points_lie_on_the_orbit_once_per_drive_period(analyses):
     orbit = np.column_stack((section.orbit_displacement_m, section.orbit_velocity_m_per_s / 1634))
     points = np.column_stack((section.displacement_m, section.velocity_m_per_s / 1634))
     nearest = [np.min(np.linalg.norm(orbit - point, axis=1)) for point in points[::50]]
-    # Samples lie a thirtieth of a turn apart, so the nearest is within a sixtieth of one.
+    # With about 30 samples per period the nearest sample is within 1/60 period.
     assert max(nearest) < 0.06 * np.max(np.abs(section.orbit_displacement_m))
 
 

@@ -1,4 +1,4 @@
-"""What feedback noted in a recording comes back as numbers and sentences."""
+"""Feedback notes in a recording become numbers and sentences."""
 
 import json
 from dataclasses import replace
@@ -69,10 +69,10 @@ def test_recordings_without_feedback_give_no_feedback_sentence():
 
 
 @pytest.fixture
-def analysed(tmp_path):
-    """Carry out an excitation on the virtual rig, and analyse its recording."""
+def record_and_analyse(tmp_path):
+    """Return a function that records an excitation on the virtual rig and analyses the recording."""
 
-    def played(excitation):
+    def analysis_of(excitation):
         shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
         daq = shipped.daq.model_copy(update={"sample_rate_hz": 10240.0})
         with open_bench(shipped.model_copy(update={"daq": daq})) as bench:
@@ -81,11 +81,11 @@ def analysed(tmp_path):
         with open_recording(outcome.path) as recording:
             return analyse(recording)
 
-    return played
+    return analysis_of
 
 
 @pytest.mark.thorough
-def test_a_tracked_resonance_is_analysed_and_stated(analysed):
+def test_a_tracked_resonance_is_analysed_and_stated(record_and_analyse):
     tracked = ResonanceTracking(
         amplitude_vpp=0.2,
         start_hz=265,
@@ -94,8 +94,8 @@ def test_a_tracked_resonance_is_analysed_and_stated(analysed):
         accelerations_m_per_s2=(0.5,),
         flank_pairs=2,
     )
-    analysis = analysed(tracked)
-    # The analysis' own estimate of what the loop saw: 22.58 where m0 lags a quarter of a period.
+    analysis = record_and_analyse(tracked)
+    # Response II at 90 degrees lag is 22.58, estimated independently of the control loop.
     assert analysis.response.response_ii[0] == pytest.approx(22.58, rel=0.01)
     (sentence,) = feedback_sentences(analysis.facts.feedback)
     assert sentence.startswith("Phase resonance at 266.")
@@ -124,8 +124,8 @@ def test_a_tracked_resonance_is_analysed_and_stated(analysed):
     assert [np.isnan(each.get_xydata()[:, 1]).tolist() for each in lines] == [[False, True, False]] * 3
 
 
-def test_settled_steps_are_analysed_like_any_stepped_sine(analysed):
-    analysis = analysed(SettledSine(amplitude_vpp=0.05, frequencies_hz=(230, 240), record_s=0.5))
+def test_settled_steps_are_analysed_like_any_stepped_sine(record_and_analyse):
+    analysis = record_and_analyse(SettledSine(amplitude_vpp=0.05, frequencies_hz=(230, 240), record_s=0.5))
     assert analysis.response.left_out == 0
     assert analysis.response.response_ii == pytest.approx([3.21, 4.24], rel=0.02)
     assert analysis.response.direction == ("up", "up")

@@ -1,4 +1,4 @@
-"""Jumps of a swept response, put where they are known to be, and those of a hardening specimen."""
+"""Jumps of a swept response: at known positions, and of a hardening specimen."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_a_resonance_with_few_intervals_is_not_a_jump(step_hz, ratio, noise):
     ("start_hz", "stop_hz", "duration_s"), [(220, 310, 8), (50, 600, 20), (600, 50, 60), (80, 110, 20)]
 )
 def test_the_ringing_of_a_linear_specimen_is_not_a_jump(start_hz, stop_hz, duration_s, error, is_described):
-    """Its description has modes at other frequencies (1.02), or is missing."""
+    """The description has mode frequencies 2 % off, or is missing."""
     specimen, rate, amplitude_m = gong2025(), 8192.0, 1e-8
     run = integrate(
         specimen, LinearSweep(start_hz, stop_hz, duration_s, amplitude_m), duration_s, sample_rate_hz=rate
@@ -109,7 +109,7 @@ def test_rows_of_different_length_are_refused():
 
 @pytest.fixture(scope="module")
 def hardening():
-    """Sweeps up and down through the first resonance of the specimen whose stops are a cubic spring."""
+    """Sweeps up and down through the first resonance of a specimen with a cubic spring as stops."""
     specimen, amplitude_m, rate = gong2025(contact="power:3"), 2e-8, 4096.0
     found = []
     for start_hz, stop_hz in (BAND_HZ, BAND_HZ[::-1]):
@@ -138,7 +138,7 @@ def test_a_hardening_specimen_jumps_up_and_down_at_the_folds_of_its_branch(harde
     up_jumps = jumps(up.time_s, up.frequency_hz, up.response_ii)
     down_jumps = jumps(down.time_s, down.frequency_hz, down.response_ii)
     assert len(up_jumps) == len(down_jumps) == 1
-    # Up, the motion leaves the upper fold late: half a hertz per second against a slow escape.
+    # The upward sweep (0.5 Hz/s) leaves the upper fold late, since the jump is slow.
     assert up_jumps[0].frequency_hz == pytest.approx(folds[-1], rel=0.02)
     assert up_jumps[0].decibel < 0 < down_jumps[0].decibel
     found = hysteresis(up, down, up_jumps, down_jumps)

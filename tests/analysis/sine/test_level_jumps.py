@@ -1,4 +1,4 @@
-"""Jumps of a stepped level: found on the virtual rig at two levels, and none where there is none."""
+"""Jumps in a stepped level: found at two levels on the virtual rig, and none in a constant response."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.tom
 
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory):
-    """195 Hz from 0.1 to 0.8 Vpp and back; collisions at 0.2 Vpp end by chance, early or late."""
+    """Steps at 195 Hz from 0.1 to 0.8 Vpp and back; collisions at 0.2 Vpp end at a random time."""
     rig = RIG.model_copy(
         update={
             "daq": RIG.daq.model_copy(update={"sample_rate_hz": 5120.0}),
@@ -65,7 +65,7 @@ def test_between_the_jumps_the_motion_depends_on_the_direction(analysis):
 
 
 def test_the_maximum_of_a_step_excludes_neighbouring_steps(analysis):
-    """Without contact the motion is a sine, and both responses are one."""
+    """Without contact the motion is a sine, and both responses are equal."""
     found = analysis.response
     rising = [
         way == "up" and 0.15 < level < 0.65

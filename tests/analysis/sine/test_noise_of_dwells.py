@@ -1,4 +1,4 @@
-"""Bounds of a weak Response I hold its truth, whatever shakes the bench: the noise is taken where it acts."""
+"""Bounds of a weak Response I contain the true value, since noise is measured during the drive."""
 
 import json
 from dataclasses import replace
@@ -23,8 +23,8 @@ AMPLIFIER_NOISE_V = (0.0, 0.02)
 """That of the generator alone, which is white and fills resonances; and a floor that outdoes the drive."""
 
 
-def measured(folder, excitation, **virtual):
-    """Measure on a virtual rig of its own, with its check, and give the result of the recording."""
+def measure(folder, excitation, **virtual):
+    """Record with a bench check on a changed virtual rig, and return the result."""
     rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update=virtual)})
     path = folder / "weak.h5"
     with open_bench(rig) as bench:
@@ -33,7 +33,7 @@ def measured(folder, excitation, **virtual):
 
 
 def linear(frequency_hz):
-    """Both Responses of the specimen without noise, which touches no stop at this level."""
+    """Response I = Response II of the specimen without noise and contact."""
     return float(abs(base_transmissibility(RIG.specimen.specimen(), [frequency_hz])[0, 0]))
 
 
@@ -52,39 +52,39 @@ def test_bounds_of_response_i_hold_in_bench_noise(frequency_hz, tmp_path):
     for noise_v, seed in product(AMPLIFIER_NOISE_V, range(1, 7)):
         folder = tmp_path / f"{noise_v}_{seed}"
         folder.mkdir()
-        found = measured(folder, dwell(frequency_hz), seed=seed, amplifier_noise_v=noise_v)
+        found = measure(folder, dwell(frequency_hz), seed=seed, amplifier_noise_v=noise_v)
         first = budgets_of(found)[1]
         assert Cause.NOISE not in first.not_stated
         held.append(covers(first, linear(frequency_hz)))
-    # Of 95 %, two misses in twelve have a chance of 12 %, three of 2 %.
+    # With 95 % coverage two misses in twelve have a probability of 12 %, three of 2 %.
     assert np.count_nonzero(held) >= len(held) - 2, held
 
 
 @pytest.mark.thorough
 def test_bounds_include_noise_that_appears_only_during_the_drive(tmp_path):
-    """Noise rings the modes, nine times what was heard: Response I was 0.234 +- 0.030 where it is 0.107."""
+    """Amplifier noise excites the modes: Response I was once 0.234 +- 0.030; 0.107 is true."""
     for seed in range(6, 12):
         folder = tmp_path / f"{seed}"
         folder.mkdir()
-        found = measured(folder, dwell(404.1, 0.03), seed=seed, amplifier_noise_v=0.0003)
+        found = measure(folder, dwell(404.1, 0.03), seed=seed, amplifier_noise_v=0.0003)
         first = budgets_of(found)[1]
         assert covers(first, linear(404.1)), first.sentence
 
 
 @pytest.mark.thorough
 def test_bounds_include_noise_larger_than_the_drive(tmp_path):
-    found = measured(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.02)
+    found = measure(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.02)
     first = budgets_of(found)[1]
     assert first.value > 2 * linear(180.0)
     assert covers(first, linear(180.0)), first.sentence
 
 
 def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
-    """A twentieth of a linear motion did not repeat; the silence before it alone was believed.
+    """The part of a linear motion that does not repeat (5 %) counts as noise.
 
-    Response I was 0.863 +- 0.027 where it is 0.738: so much was lifted by the amplifier's noise.
+    With the noise before the drive alone, Response I was 0.863 +- 0.027; 0.738 is true.
     """
-    found = measured(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.001).analysis.response
+    found = measure(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.001).analysis.response
     heard = replace(found, noise_bias_i=1e-3, noise_error_i=2e-3, noise_source="silence before the check")
     told = heard.with_rest_as_noise(is_known_to_repeat=True)
     assert told.noise_error_i == found.rest_error_i > 2e-3
@@ -99,14 +99,14 @@ def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
 
 @pytest.mark.thorough
 def test_a_motion_remainder_too_large_for_noise_is_not_counted_as_noise(tmp_path):
-    found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1).analysis.response
+    found = measure(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1).analysis.response
     assert np.isnan(found.rest_error_i)
     assert found.with_rest_as_noise(is_known_to_repeat=True) is found
 
 
 @pytest.mark.thorough
 def test_chaos_is_not_reported_as_noise(tmp_path):
-    found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1)
+    found = measure(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1)
     first = budgets_of(found)[1]
     assert found.analysis.response.response_i > 1.5 * found.analysis.response.response_ii
     assert first.share(Cause.NOISE) < 0.01
@@ -115,14 +115,14 @@ def test_chaos_is_not_reported_as_noise(tmp_path):
 
 @pytest.mark.thorough
 def test_noise_also_present_in_silence_is_not_chaos(tmp_path):
-    """Of eight seeds this one's points look like more than linear noise to the surrogates."""
-    found = measured(tmp_path, dwell(180.0), seed=8, amplifier_noise_v=0.005)
+    """The surrogate test rejects linear noise for this seed, one of eight."""
+    found = measure(tmp_path, dwell(180.0), seed=8, amplifier_noise_v=0.005)
     assert found.analysis.motion.verdict.kind is MotionKind.UNDECIDED
 
 
 @pytest.mark.thorough
-def test_without_a_silent_part_large_noise_is_not_determined(tmp_path):
-    """The same recording once more, its check left out."""
+def test_large_noise_is_not_determined_without_a_silent_part(tmp_path):
+    """The recording has no bench check, so it has no part without drive."""
     rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"amplifier_noise_v": 0.02})})
     path = tmp_path / "weak.h5"
     plan = Measurement(name="weak", excitation=dwell(180.0), ramp_s=0.5)

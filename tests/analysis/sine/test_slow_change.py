@@ -1,4 +1,4 @@
-"""Motions that change slowly are not periodic, and the bound of a maximum holds for another record."""
+"""Slowly changing motions are not periodic, and bounds of a maximum hold for a repeated record."""
 
 import numpy as np
 import pytest
@@ -15,9 +15,9 @@ A0_M, GAIN, HZ, SECONDS = 1e-6, 5.0, 260.0, 12.5
 
 @pytest.fixture
 def dwell(tmp_path):
-    """Analyse a dwell at 260 Hz whose complex envelope is given."""
+    """Return a function that analyses a dwell at 260 Hz with a given complex envelope."""
 
-    def analysed(envelope, seed=0):
+    def analyse_dwell(envelope, seed=0):
         motion, time_s = synthetic.sine(SECONDS + 1, HZ, A0_M), synthetic.times(SECONDS + 1)
         moved = A0_M * GAIN * np.real(envelope(time_s) * np.exp(2j * np.pi * HZ * time_s - 0.5j * np.pi))
         velocity = np.gradient(moved) * synthetic.RATE
@@ -33,11 +33,11 @@ def dwell(tmp_path):
         (result,) = analyse_files([tmp_path / f"s{seed}.h5"], "slow", Simulation.LEFT_OUT).results
         return result
 
-    return analysed
+    return analyse_dwell
 
 
-def told(result, name):
-    """Return value and expanded uncertainty; None where noise or chance is not stated."""
+def stated_value(result, name):
+    """Return value and expanded uncertainty, or None if the contribution of chance is not stated."""
     (budget,) = (each for each in budgets_of(result) if each.quantity == name)
     is_told = not any(each.relative is None and each.cause.value == "chance" for each in budget.contributions)
     return (budget.value, budget.expanded) if is_told else None
@@ -45,18 +45,18 @@ def told(result, name):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_slow_beat_is_not_periodic_and_its_bound_covers_later_records(dwell, seed):
-    """30 % at 260.2 Hz was "periodic, Response I 6.373591 +- 0.000023"."""
+    """A beat of 30 % at 260.2 Hz was once periodic, with Response I 6.373591 +- 0.000023."""
     rng = np.random.default_rng(seed)
     beat_hz, share = (0.2, 0.3) if seed == 0 else (10 ** rng.uniform(-1.5, 0.5), rng.uniform(0.02, 0.5))
     start = rng.uniform(0, 2 * np.pi)
     result = dwell(lambda time_s: 1 + share * np.exp(1j * (2 * np.pi * beat_hz * time_s + start)), seed)
     kind = result.analysis.motion.verdict.kind
     assert kind in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}
-    found = told(result, "Response I")
+    found = stated_value(result, "Response I")
     scale = result.analysis.response.response_i / GAIN
     assert scale < 1.1 * (1 + share)
     if found is not None:
-        # A record that begins elsewhere in the beat: largest envelope of any window of 5 s.
+        # Largest envelope in 5 s records that begin at other phases of the beat.
         window_s = np.linspace(0, 5, 200)
         again = [
             np.max(np.abs(1 + share * np.exp(1j * (2 * np.pi * beat_hz * window_s + phase))))
@@ -78,14 +78,14 @@ def test_slow_modulation_of_amplitude_or_phase_is_not_periodic(dwell, rate_hz):
 
 
 def test_mains_hum_is_named(dwell):
-    """It was "every 26" drive periods: 260 Hz and 50 Hz meet so often."""
+    """260 Hz and 50 Hz hum once gave period 26, the common period of both."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp(2j * np.pi * (50 - HZ) * time_s)).analysis.motion.verdict
     assert (verdict.kind, verdict.period) == (MotionKind.PERIODIC, 1)
     assert "mains hum" in verdict.why
 
 
 def test_a_decaying_transient_is_not_given_a_long_period(dwell):
-    """It was "every 11 periods"."""
+    """The transient was once reported as period 11."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp((-0.2 + 2j * np.pi * 23.6) * time_s)).analysis.motion
     assert verdict.verdict.period in {None, 1}
 
@@ -94,7 +94,7 @@ MODE_HZ, SETTLE_S, RECORD_S = 200.0, 3.0, 1.0
 
 
 def unsettled_step(folder, hz, damping, seed):
-    """Record a step of 1 s, 3 s after its begin; give its result, and Response I and II of a settled one."""
+    """Record 1 s of a step, 3 s after its begin; return the result and the settled response."""
     rng = np.random.default_rng(seed)
     motion, time_s = (
         synthetic.sine(SETTLE_S + RECORD_S + 1, hz, A0_M),
@@ -120,7 +120,7 @@ def unsettled_step(folder, hz, damping, seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_an_unsettled_step_is_reported_or_has_a_valid_bound(tmp_path, seed):
-    """44.38 +- 0.51 was said instead of 49.97, and 246.6 +- 0.58 instead of 249.8."""
+    """The stated values were once 44.38 +- 0.51 for 49.97 and 246.6 +- 0.58 for 249.8."""
     rng = np.random.default_rng(seed)
     hz, damping = (
         ((198.0, 5e-4), (199.6, 1e-3))[seed]
@@ -150,7 +150,7 @@ def test_a_trend_counts_as_slow_change_and_random_scatter_does_not():
 
 
 def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
-    """Response I 0.0886 +- 0.0006 was reported of a weak step whose truth is 0.0871."""
+    """Response I of a weak step was once 0.0886 +- 0.0006; 0.0871 is true."""
     hz = 416.15
     motion, time_s = synthetic.sine(2.0, hz, A0_M), synthetic.times(2.0)
     velocity = A0_M * 2 * np.pi * hz * np.cos(2 * np.pi * hz * time_s)
@@ -165,7 +165,7 @@ def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
 
 @pytest.mark.thorough
 def test_a_maximum_caused_by_one_short_fault_is_given_no_bound(dwell):
-    """17.9 +- 2.5 was reported where 3 ms without light were read as motion, and 11.8 is true."""
+    """A drop-out of 3 ms read as motion once gave 17.9 +- 2.5; 11.8 is true."""
     result = dwell(lambda time_s: np.where(np.abs(time_s - 11.0) < 0.004, 1.5, 1.0))
     assert result.analysis.motion.verdict.kind is MotionKind.UNDECIDED
-    assert told(result, "Response I") is None
+    assert stated_value(result, "Response I") is None

@@ -1,4 +1,4 @@
-"""Sweeps: the recorded drive is the clock, orders come apart, envelopes and responses are what was put in."""
+"""Sweep analysis: phase from the recorded drive, separate orders, exact envelopes and responses."""
 
 import re
 from dataclasses import dataclass, field
@@ -24,15 +24,15 @@ RATE = 8192.0
 
 
 def sweep(duration_s, start_hz=150.0, stop_hz=350.0, clock_ppm=0.0, rate_hz=RATE):
-    """Time by the converter's clock and the phase of a sweep by the generator's."""
+    """Return times [s] of the converter's clock and the sweep phase [rad] of the generator's clock."""
     time = np.arange(int(duration_s * rate_hz)) / rate_hz
     own = time * (1 + clock_ppm * 1e-6)
     return time, 2 * np.pi * (start_hz * own + 0.5 * (stop_hz - start_hz) / duration_s * own**2)
 
 
 @dataclass
-class Recorded:
-    """A sweep somewhere in a recording, as an estimator sees it."""
+class RecordedSweep:
+    """Channels of a recording that contains a sweep."""
 
     data: np.ndarray
     start: int
@@ -43,24 +43,24 @@ class Recorded:
 
     @property
     def samples(self):
-        """Of each channel."""
+        """Number of samples per channel."""
         return self.data.shape[1]
 
     def response_gain(self, frequency_hz):
-        """Nothing that a sensor adds."""
+        """Return the gain 1 of an ideal sensor."""
         return np.ones(frequency_hz.size, dtype=complex)
 
     def stretches(self, label):
-        """Give the sweep."""
+        """Return the range of the sweep."""
         assert label == "sweep"
         return (Stretch(self.start, self.stop, {}, is_complete=True),)
 
     def read(self, start, stop):
-        """Give drive, base and response."""
+        """Return drive, base and response."""
         return self.data[:, start:stop]
 
     def bridged(self, start, stop):
-        """Give the bridges."""
+        """Return a mask of the bridged samples."""
         return np.isin(np.arange(start, stop), self.bridges)
 
 
@@ -72,7 +72,7 @@ def test_lost_samples_outside_a_sweep_do_not_affect_its_results(lost):
     data[:, list(lost)] = np.nan
     start, stop = round(1.0 * RATE), round(7.0 * RATE)
     plan = SineSweep(amplitude_vpp=1, start_hz=167.5, stop_hz=332.5, duration_s=6.0)
-    found, _ = measured_sweep(Recorded(data, start, stop), plan)
+    found, _ = measured_sweep(RecordedSweep(data, start, stop), plan)
     np.testing.assert_allclose(found.peak_displacement_m, 1.0, atol=0.012)
     np.testing.assert_allclose(found.time_s, (found.frequency_hz - 167.5) / 27.5, atol=0.01)
     assert found.time_s.size == 60 if not lost else 54 < found.time_s.size < 60
@@ -80,7 +80,7 @@ def test_lost_samples_outside_a_sweep_do_not_affect_its_results(lost):
 
 
 def bridged_sweep(per_s, seed=1):
-    """A sine of 1 m in displacement, whose bridges swing to 3 times its speed."""
+    """Return a sweep of 1 m displacement whose bridged samples have 3 times its peak velocity."""
     time, phase = sweep(8.0, 140, 360)
     speed = np.gradient(phase, time)
     data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
@@ -89,7 +89,7 @@ def bridged_sweep(per_s, seed=1):
     bridges = (first[:, np.newaxis] + np.arange(12)).ravel()
     data[2, bridges] = -3 * np.max(speed)
     plan = SineSweep(amplitude_vpp=1, start_hz=167.5, stop_hz=332.5, duration_s=6.0)
-    return Recorded(data, round(RATE), round(7 * RATE), bridges=bridges), plan, np.max(speed)
+    return RecordedSweep(data, round(RATE), round(7 * RATE), bridges=bridges), plan, np.max(speed)
 
 
 @pytest.mark.parametrize("per_s", [0.5, 2, 5])
@@ -113,7 +113,7 @@ def test_a_sweep_with_drop_outs_everywhere_is_refused():
 
 
 def test_the_first_and_last_intervals_use_samples_outside_the_sweep():
-    """A sine in displacement of one amplitude, recorded for longer than its sweep."""
+    """A displacement of constant amplitude is recorded for longer than the analysed sweep."""
     time, phase = sweep(6.0)
     rows = np.stack((np.cos(phase), -np.cos(phase) * np.gradient(phase, time) ** 2, np.zeros(time.size)))
     rows[2] = -np.sin(phase) * np.gradient(phase, time)
@@ -125,7 +125,7 @@ def test_the_first_and_last_intervals_use_samples_outside_the_sweep():
     found = sums.response()
     assert found.time_s.size == (time.size - 2 * reach) // round(found.interval_s * RATE)
     np.testing.assert_allclose(found.peak_displacement_m, 1.0, atol=0.01)
-    # Without them the ends are wrong.
+    # Without the neighbouring samples the first and last intervals are wrong.
     alone = sweep_response(*rows, RATE, low_hz=150, high_hz=350)
     assert np.max(np.abs(alone.peak_displacement_m[[0, -1]] - 1)) > 0.02
 
@@ -189,7 +189,7 @@ def test_the_stated_uncertainty_of_an_order_is_its_scatter():
 
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_a_swept_linear_motion_has_equal_responses_and_its_exact_envelope(direction):
-    """x = 3 exp(-0.5 i) U at every frequency, by its velocity and the base's acceleration."""
+    """The motion is x = 3 exp(-0.5 i) U at every frequency."""
     ends = (150.0, 350.0) if direction == "up" else (350.0, 150.0)
     time, phase = sweep(20, *ends)
     omega = np.gradient(phase) * RATE
@@ -239,7 +239,7 @@ def test_the_vibrometer_delay_is_removed_from_the_phase():
     ("quality", "shift_hz", "amplitude"), [(10, 0.02, 1.001), (50, 0.12, 1.000), (250, 0.45, 0.943)]
 )
 def test_a_resonance_swept_at_1_hz_per_s_shifts_as_theory_predicts(quality, shift_hz, amplitude):
-    """A 260 Hz resonator, exact step response between samples; the ISO 7626 limit at Q 250 is 0.97 Hz/s."""
+    """A 260 Hz resonator is swept; the ISO 7626 limit of the sweep rate at Q = 250 is 0.97 Hz/s."""
     _, phase = sweep(40, 240.0, 280.0)
     natural = 2 * np.pi * 260
     system = signal.cont2discrete(([natural**2], [1, natural / quality, natural**2]), 1 / RATE, method="foh")
@@ -253,7 +253,7 @@ def test_a_resonance_swept_at_1_hz_per_s_shifts_as_theory_predicts(quality, shif
     peak_hz = frequency[top] - fit[1] / (2 * fit[0])
     steady_hz = 260 * np.sqrt(1 - 1 / (2 * quality**2))
     assert peak_hz - steady_hz == pytest.approx(shift_hz, abs=0.05)
-    hold = np.sinc(260 / RATE) ** 2  # straight lines between samples weaken the drive by this
+    hold = np.sinc(260 / RATE) ** 2  # gain of linear interpolation between drive samples
     steady = hold * quality / np.sqrt(1 - 1 / (4 * quality**2))
     assert size[top] / steady == pytest.approx(amplitude, abs=0.004)
 

@@ -1,4 +1,4 @@
-"""The level of a band is the level of what was put into it."""
+"""The level of a terminal band equals the amplitude of the tone in it."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A backbone is read from the notes of its levels, and what it says of stiffness follows from them."""
+"""The backbone and its stiffness statement follow from the notes of tracked resonances."""
 
 import math
 
@@ -32,7 +32,7 @@ def note(number, base, frequency_hz, **more):
     return ResonanceNote(**numbers | more)
 
 
-def lost(number, base):
+def lost_note(number, base):
     return note(number, base, None, frequency_u_hz=None, lock="outside the range")
 
 
@@ -47,13 +47,13 @@ def test_tracked_resonances_are_sorted_by_base_level():
 def test_a_level_with_a_lost_resonance_is_excluded_from_the_backbone():
     notes = [
         note(0, 1.0, 100.0),
-        lost(1, 3.0),
-        lost(2, 2.0),
+        lost_note(1, 3.0),
+        lost_note(2, 2.0),
         DwellNote(segment="dwell", looks=1, looks_outside=0),
     ]
     assert [each.number for each in tracked_resonances(notes)] == [0]
     assert lost_levels(notes) == (2.0, 3.0)
-    assert tracked_resonances([lost(0, 1.0)]) == ()
+    assert tracked_resonances([lost_note(0, 1.0)]) == ()
 
 
 def test_a_level_without_resonance_reports_periods_phase_and_frequency():
@@ -69,7 +69,7 @@ def test_a_level_without_resonance_reports_periods_phase_and_frequency():
 
 
 def test_a_superharmonic_resonance_is_named_and_drawn_by_its_harmonic():
-    met, unmet = note(0, 8.0, 31.7, harmonic=3, harmonic_m=8e-8), lost(1, 9.0)
+    met, unmet = note(0, 8.0, 31.7, harmonic=3, harmonic_m=8e-8), lost_note(1, 9.0)
     found, not_found = feedback_sentences([met, unmet.model_copy(update={"harmonic": 3})])
     assert found == "Superharmonic 3:1 phase resonance at 31.700 ± 0.060 Hz (8 m/s²)."
     assert not_found.startswith("No superharmonic 3:1 phase resonance at 9 m/s²: outside the range;")

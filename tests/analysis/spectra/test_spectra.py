@@ -1,4 +1,4 @@
-"""Spectral densities and amplitude spectra: scaling, bounds, and peaks between lines."""
+"""Spectral densities and amplitude spectra: scaling, bounds and peaks between spectral lines."""
 
 import numpy as np
 import pytest

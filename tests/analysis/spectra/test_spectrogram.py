@@ -1,4 +1,4 @@
-"""A spectrogram of bounded size: right amplitudes at right times, however the blocks fall."""
+"""A spectrogram of bounded size has the right amplitudes and times for any block size."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Errors that no averaging removes are as large as theory says: short segments, holes filled with zeros."""
+"""Systematic errors of the transmission from delay and finite resolution match theory."""
 
 import numpy as np
 import pytest
@@ -11,14 +11,14 @@ SEGMENT = 256
 
 
 def lagged_share(lag):
-    """Correlation of the Hann window with itself, ``lag`` samples later."""
+    """Autocorrelation of the Hann window at ``lag`` samples."""
     taper = signal.get_window("hann", SEGMENT)
     return float(taper[:-lag] @ taper[lag:] / (taper @ taper))
 
 
 @pytest.mark.parametrize("lag", [3, 40, 90])
 def test_a_delay_lowers_h1_by_the_lost_share_of_the_segment(lag):
-    """E[h1] = rho(lag) exp(-i omega lag): what of a segment's response belongs to its own drive."""
+    """E[h1] = rho(lag) exp(-i omega lag), with the autocorrelation rho of the window."""
     record = np.random.default_rng(41).standard_normal(600_000)
     found = transmissibility(record[lag:], record[:-lag], RATE, segment_samples=SEGMENT)
     inner = slice(3, -3)
@@ -29,7 +29,7 @@ def test_a_delay_lowers_h1_by_the_lost_share_of_the_segment(lag):
 
 
 def test_a_peak_narrower_than_the_resolution_has_the_shape_of_the_window_spectrum():
-    """E[h1] = sum H |W|^2 / sum |W|^2 for a white drive: a half-power width of 8 Hz, lines 6 Hz wide."""
+    """E[h1] = sum H |W|^2 / sum |W|^2 for a white drive; peak width 8 Hz, resolution 6 Hz."""
     omega, damping = 2 * np.pi * 260, 0.02
     section = signal.bilinear([2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2], fs=RATE)
     drive = np.random.default_rng(42).standard_normal(1_500_000)

@@ -1,4 +1,4 @@
-"""What noise adds to a maximum, against its scatter in repeated draws."""
+"""The bias of a maximum by noise matches repeated draws."""
 
 import numpy as np
 import pytest

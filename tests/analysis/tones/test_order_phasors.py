@@ -1,4 +1,4 @@
-"""Turning numbers of the orders are their exponentials."""
+"""Order phasors computed by multiplication equal the complex exponentials."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Fitting a steady sine: exact without noise, and as scattered as it says with noise."""
+"""The fit of a steady sine is exact without noise and has correct uncertainties with noise."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Budgets are what propagation of distributions gives, and say what nobody stated."""
+"""Uncertainty budgets match propagation of distributions and list unstated uncertainties."""
 
 import json
 from dataclasses import dataclass, replace
@@ -44,13 +44,13 @@ BASE_NOISE, LASER_NOISE = 0.02, 2e-4
 
 
 @dataclass(frozen=True)
-class Laid:
-    """Draws of one quantity."""
+class OneCurveOverlay:
+    """Overlay with the draws of one quantity."""
 
     curve: EnsembleCurve
 
     def quantity(self, name):
-        """Give it by its name."""
+        """Return the curve of this name, or None."""
         return self.curve if name == self.curve.name else None
 
 
@@ -68,15 +68,15 @@ def samples(dwell_file):
         return np.stack([recording.read(each, part.start, part.stop) for each in roles]), rate
 
 
-def seen(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
-    """Analyse the dwell as sensors and a clock show it that are off."""
+def response_of(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
+    """Analyse the dwell with errors of the sensor gains and of the clock."""
     (drive, acceleration, velocity), rate = samples
     noisy = (
         drive,
         base * (acceleration + BASE_NOISE * np.abs(acceleration).max() * rng.standard_normal(drive.size)),
         response * (velocity + LASER_NOISE * np.abs(velocity).max() * rng.standard_normal(drive.size)),
     )
-    # What a fast clock counts is taken for more seconds than passed.
+    # A clock error changes the assumed sampling rate.
     return dwell_response(
         *noisy, rate * (1 + clock), near_hz=weak.analysis.excitation.frequency_hz, window_s=2.0
     )
@@ -84,7 +84,7 @@ def seen(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
 
 @pytest.mark.thorough
 def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, weak):
-    """JCGM 101:2008: all inputs drawn from their distributions, through the whole analysis."""
+    """Reference: JCGM 101:2008, with all inputs drawn from their distributions."""
     rng = np.random.default_rng(12)
 
     def calibrated(relative, factor=2.0):
@@ -97,18 +97,18 @@ def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, wea
     for _ in range(DRAWS):
         base = calibrated(0.0173, 1.73) * calibrated(0.006) * tilted(3.0)
         response = calibrated(0.012) * calibrated(0.004) * tilted(6.0)
-        one = seen(samples, weak, rng, base=base, response=response, clock=rng.uniform(-1, 1) * 4e-3)
+        one = response_of(samples, weak, rng, base=base, response=response, clock=rng.uniform(-1, 1) * 4e-3)
         found.append((1e6 * one.drive.amplitude_m, one.response_i, one.response_ii))
     facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
-    measured = replace(weak.analysis, facts=facts, response=seen(samples, weak, rng))
+    measured = replace(weak.analysis, facts=facts, response=response_of(samples, weak, rng))
     budgets = dwell_budgets(measured, None)
-    truth = seen(samples, weak, np.random.default_rng(0))
+    truth = response_of(samples, weak, np.random.default_rng(0))
     true_values = (1e6 * truth.drive.amplitude_m, truth.response_i, truth.response_ii)
     for budget, values, true in zip(budgets, np.transpose(found), true_values, strict=True):
-        # The cosine's error has a mean, too: uncorrected, it is a part of the uncertainty.
+        # The mean of the cosine error is not corrected, so it is part of the uncertainty.
         rms = np.sqrt(np.mean((values - true) ** 2))
         assert budget.not_stated == ()
-        # Three standard deviations of an rms from so many draws.
+        # Tolerance: three standard deviations of the rms.
         assert budget.standard == pytest.approx(rms, rel=3 / np.sqrt(2 * DRAWS)), budget.quantity
         assert budget.share(Cause.CHANCE) == 0.0
 
@@ -154,7 +154,7 @@ def test_the_response_i_budget_of_an_aperiodic_motion_includes_chance(dwell_file
     (strong,) = results.results
     _, first, second = budgets_of(strong)
     assert first.share(Cause.CHANCE) > 0.005
-    # No silence was recorded that would tell noise from chaos.
+    # Without a silent part, noise and chaos cannot be separated.
     assert first.share(Cause.NOISE) is None
     assert second.share(Cause.CHANCE) > 0.0
     said = campaign_summary(results)["results"][0]["uncertainty"]
@@ -181,7 +181,7 @@ def test_a_stated_uncertainty_requires_a_source():
 
 @pytest.mark.parametrize("bounded", [False, True])
 def test_the_scatter_of_a_maximum_is_estimated_from_one_window(bounded):
-    """Against many windows: of unbounded motion, and of one whose largest value has a bound."""
+    """The estimate matches many windows, for unbounded and for bounded values."""
     rng = np.random.default_rng(5)
     values = rng.beta(2, 3, (400, 2000)) if bounded else rng.exponential(size=(400, 2000))
     true = np.std(values.max(axis=1))
@@ -197,7 +197,7 @@ def test_the_scatter_of_a_maximum_is_estimated_from_one_window(bounded):
 @example(sd=5e-324, value=5e-324, maxima=np.array([5e-324, *np.zeros(49)]))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, maxima, request):
-    """Whatever an analysis comes to: nothing heard, a constant signal, a measure that has no sign."""
+    """This holds for any values, also without noise and for a constant signal."""
     weak = request.getfixturevalue("weak")
     assert 0.0 <= sd_of_largest(maxima) < np.inf
     found = replace(
@@ -220,7 +220,7 @@ def test_a_colliding_sweep_reports_the_scatter_of_its_draws(sweep_file):
     (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
     whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
     (largest,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))
-    assert collides[np.argmax(whole.response_i)]  # and not where the sweep begins
+    assert collides[np.argmax(whole.response_i)]  # not at the begin of the sweep
     assert Cause.CHANCE in largest.not_stated
     before = replace(
         sweep.analysis, response=replace(whole, response_i=np.where(collides, 1e-3, whole.response_i))
@@ -240,20 +240,20 @@ def test_a_colliding_sweep_reports_the_scatter_of_its_draws(sweep_file):
     assert first.quantity.startswith(f"largest Response I, at {at}, swept at ")
     assert first.value == found.response_i.max()
     assert Cause.CHANCE in first.not_stated
-    # Parts of a tenth of a second do not tell how another run would differ.
+    # Parts of 0.1 s do not show the scatter between repeated runs.
     assert Cause.CHANCE in second.not_stated
     assert Cause.CHANCE in amplitude.not_stated
     drawn = EnsembleCurve(RESPONSE_I, found.frequency_hz, found.response_i, np.outer(DRAWN, found.response_i))
-    told = sweep_budgets(part, Laid(drawn))[1]
-    # Square roots scatter half as much as what they are of, to the first order.
+    told = sweep_budgets(part, OneCurveOverlay(drawn))[1]
+    # To first order a square root has half the relative scatter of its argument.
     assert told.share(Cause.CHANCE) == pytest.approx(np.std(DRAWN, ddof=1), rel=0.01)
     assert told.contributions[-1].source == f"{DRAWN.size} simulated draws"
     second_drawn = EnsembleCurve(
         RESPONSE_II, found.frequency_hz, found.response_ii, np.outer(DRAWN, found.response_ii)
     )
-    assert sweep_budgets(part, Laid(second_drawn))[2].share(Cause.CHANCE) > 0.0
-    # Where a sweep rattles from beginning to end, that passes for the bench's own noise: among repeats
-    # its amplitude lay up to 13 bounds away.
+    assert sweep_budgets(part, OneCurveOverlay(second_drawn))[2].share(Cause.CHANCE) > 0.0
+    # A sweep with collisions throughout has no quiet part to measure the noise: its amplitude
+    # differed between repeats by up to 13 times the bounds.
     seen = replace(sweep.analysis.collisions, is_colliding=np.zeros_like(collides))
     assert seen.is_unexplained[np.argmax(found.response_ii)]
     for budget in sweep_budgets(replace(part, collisions=seen), None):
@@ -270,7 +270,7 @@ def test_the_uncertainty_of_steps_without_collisions_is_noise_only(stepped_file)
     assert first.share(Cause.CHANCE) < 1e-7
     assert second.share(Cause.CHANCE) == 0.0
     assert Cause.CHANCE not in first.not_stated
-    # The lifted maximum and the scatter of A0 are one cause, named once.
+    # The bias of the maximum and the scatter of A0 have one cause, named once.
     assert sum(each.cause is Cause.NOISE for each in first.contributions) == 2
     assert first.sentence.count("noise ") == 1
     assert f"noise {100 * first.share(Cause.NOISE):.2g} %" in first.sentence

@@ -1,4 +1,4 @@
-"""What a plan will know, said before it is played, against what its recording says afterwards."""
+"""The uncertainty predicted from a plan matches the uncertainty of its recording."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,13 +38,13 @@ def test_the_uncertainty_of_noise_matches_its_prediction(tmp_path):
     for said, found in zip(expected, budgets, strict=True):
         assert said.quantity == found.quantity
         assert said.not_stated == found.not_stated
-        # Hiss of generator and amplifier, which no rig states, comes on top of the sensors' noise.
+        # The recording also contains noise of generator and amplifier, which the rig file omits.
         assert 0.5 < said.scatter / found.share(Cause.NOISE) < 1.2, said.quantity
 
 
 @pytest.mark.parametrize("damping_time_s", [1.2e-5, 2.05e-5, 2.9e-5])
 def test_a_prediction_without_noise_on_its_lines_can_be_fitted(damping_time_s):
-    """A mode tried in vain got a factor of exactly zero, and the fit raised LinAlgError."""
+    """A mode with an amplitude of exactly zero once made the fit raise LinAlgError."""
     specimen = RIG.specimen.model_copy(update={"damping_time_s": damping_time_s})
     rig = RIG.model_copy(update={"specimen": specimen})
     assert len(expected_uncertainty(Measurement(name="weak", excitation=NOISE), rig)) == 9
@@ -98,7 +98,7 @@ def test_chance_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_one():
 
 
 def test_response_i_of_a_weak_dwell_has_no_expected_uncertainty():
-    """A recording of it has 0.7 % where the sensors' noise, averaged over the window, makes 0.002 %."""
+    """Its recording has 0.7 % uncertainty; averaged sensor noise alone would give 0.002 %."""
     first, second = expected_uncertainty(dwell(260, 0.05), RIG)
     assert first.after(5.0) is None
     assert "Response I: not known beforehand, because noise in the motion raises" in first.sentence
@@ -119,10 +119,10 @@ def test_a_dwell_with_a_period_of_hours_has_no_expected_uncertainty():
 
 
 def test_an_uncomputable_motion_has_no_expected_uncertainty(monkeypatch):
-    def lost(*_, **__):
+    def raise_lost(*_, **__):
         raise MotionFailed("it is not finite")
 
-    monkeypatch.setattr(LoadedShaker, "move", lost)
+    monkeypatch.setattr(LoadedShaker, "move", raise_lost)
     assert expected_uncertainty(dwell(260.0, 1.5), RIG) == ()
 
 
@@ -131,7 +131,7 @@ def test_an_uncomputable_motion_has_no_expected_uncertainty(monkeypatch):
     ("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), pytest.param(300.0, 5.0, marks=pytest.mark.slow)]
 )
 def test_the_uncertainty_of_a_colliding_dwell_matches_its_prediction(tmp_path, at_hz, level_vpp):
-    """One run under a base that does not yield told it up to 3.4 times too well."""
+    """One run with a prescribed base motion once predicted up to 3.4 times too small values."""
     plan = dwell(at_hz, level_vpp)
     said = {each.quantity: each.after(each.time_s) for each in expected_uncertainty(plan, RIG)}
     with open_bench(RIG) as bench:
@@ -139,12 +139,12 @@ def test_the_uncertainty_of_a_colliding_dwell_matches_its_prediction(tmp_path, a
     (result,) = analyse_files([tmp_path / "dwell.h5"], "dwell", Simulation.LEFT_OUT).results
     told = {each.quantity: each.expanded / each.value for each in budgets_of(result)}
     for name in ("Response I", "Response II"):
-        # Tenths of a window tell a scatter within a third; the rest is another draw of chaos.
+        # Ten sections of a window give the scatter within 30 %; chaotic runs differ further.
         assert 0.3 < said[name] / told[name] < 4.0, name
 
 
 def test_a_held_dwell_has_the_uncertainty_of_an_open_loop_dwell():
-    """The same base by a setting and by feedback: the same promise."""
+    """The base motion is the same by generator voltage and by feedback, so the uncertainty is equal."""
     by_setting = expected_uncertainty(dwell(260, 0.05), RIG)
     base_m = base_motion(dwell(260, 0.05).excitation, RIG, np.array([260.0])).amplitude_m
     level = {"acceleration_m_per_s2": float((2 * np.pi * 260) ** 2 * base_m[0])}
@@ -157,7 +157,7 @@ def test_a_held_dwell_has_the_uncertainty_of_an_open_loop_dwell():
 
 
 def test_a_start_dependent_motion_has_no_expected_uncertainty():
-    """Begun gently m1 stays between the stops; thrown against them it stays at them."""
+    """From rest m1 stays clear of the stops; after a kick it keeps colliding with them."""
     first, second = expected_uncertainty(dwell(430, 2.0), RIG)
     for each in (first, second):
         assert each.after(each.time_s) is None
@@ -167,7 +167,7 @@ def test_a_start_dependent_motion_has_no_expected_uncertainty():
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", shipped_specimens())
 def test_expected_uncertainty_handles_every_shipped_specimen(name):
-    """Stops on one side, rigid ones and none at all included."""
+    """The shipped specimens include one-sided stops, rigid stops and none."""
     document = RIG.model_dump(mode="json")
     limit_m = document["specimen"]["amplitude_limit_m"]
     document["specimen"] = {"model": name, "amplitude_limit_m": limit_m}
@@ -177,7 +177,7 @@ def test_expected_uncertainty_handles_every_shipped_specimen(name):
 
 @pytest.mark.parametrize(("duration_s", "window_s"), [(2.0, 2.0), (30.0, 5.0)])
 def test_a_dwell_is_analysed_over_its_window_or_completely(duration_s, window_s):
-    """Of four seconds it said "after 5 s as planned"."""
+    """A dwell of 4 s was once described as "after 5 s as planned"."""
     dwell = Dwell(amplitude_vpp=0.05, frequency_hz=130.0, settle_s=1.0, duration_s=duration_s)
     found = expected_uncertainty(Measurement(name="dwell", excitation=dwell), RIG)
     assert {each.time_s for each in found} == {window_s}

@@ -1,4 +1,4 @@
-"""Bounds of reports hold on short measurements with random rigs; a shard takes some twenty minutes."""
+"""Bounds in reports hold for short measurements on random rigs; a shard takes about 20 minutes."""
 
 import json
 import subprocess

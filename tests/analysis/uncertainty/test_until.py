@@ -1,4 +1,4 @@
-"""How long a measurement with until will take, how a campaign's time is distributed, and the wider bounds."""
+"""Predicted time of measurements with `until`, distribution of campaign time, widened bounds."""
 
 import subprocess
 import sys
@@ -23,47 +23,45 @@ def plan(excitation, until, name="a"):
     return Measurement(name=name, excitation=excitation, until=until)
 
 
-def noise_wish(time_s):
-    """Give the wish for frequencies that noise is expected to meet after a time."""
+def reachable_uncertainty(time_s):
+    """Return the frequency uncertainty [Hz] that noise is expected to reach after a time."""
     found = expected_uncertainty(plan(NOISE, None), RIG)
     return WIDENING * max(each.after(time_s) for each in found if each.quantity.endswith("frequency"))
 
 
 @pytest.mark.thorough
-def test_the_time_to_a_target_grows_with_its_inverse_square():
+def test_the_time_to_a_target_inverts_the_expected_uncertainty():
     for time_s in (20.0, 80.0, 320.0):
-        found_s = time_to_wishes_s(plan(NOISE, Until(resonance_hz=noise_wish(time_s))), RIG)
+        found_s = time_to_wishes_s(plan(NOISE, Until(resonance_hz=reachable_uncertainty(time_s))), RIG)
         assert found_s == pytest.approx(time_s, rel=1e-6)
 
 
 @pytest.mark.thorough
 def test_a_recording_is_predicted_to_end_at_an_analysis_or_at_its_longest_time():
     times_s = [
-        expected_recorded_s(plan(NOISE, Until(resonance_hz=noise_wish(time_s))), RIG)
+        expected_recorded_s(plan(NOISE, Until(resonance_hz=reachable_uncertainty(time_s))), RIG)
         for time_s in (1.0, 12.0, 1000.0)
     ]
     assert times_s == pytest.approx([8.0, 16.0, 40.0])
 
 
-def test_steps_are_predicted_step_by_step():
+def test_the_recording_time_of_a_stepped_sine_is_the_sum_over_its_steps():
     steps = SteppedSine(amplitude_vpp=0.1, frequencies_hz=(150, 160, 170), record_s=30)
     assert expected_recorded_s(plan(steps, Until(response_ii=0.01)), RIG) == pytest.approx(6.0)
 
 
-def test_unpredictable_results_have_no_expected_uncertainty():
+def test_a_plan_without_a_predictable_target_has_no_expected_recording_time():
     assert expected_recorded_s(plan(QUIET, Until(response_i=0.01)), RIG) is None
     assert expected_recorded_s(plan(QUIET, None), RIG) is None
 
 
 @pytest.mark.thorough
-def test_campaign_time_is_distributed_in_proportion_to_need():
-    first = plan(NOISE, Until(resonance_hz=noise_wish(50.0)), "first")
-    second = plan(NOISE, Until(resonance_hz=noise_wish(100.0)), "second")
+def test_campaign_time_is_distributed_in_proportion_to_the_needed_times():
+    first = plan(NOISE, Until(resonance_hz=reachable_uncertainty(50.0)), "first")
+    second = plan(NOISE, Until(resonance_hz=reachable_uncertainty(100.0)), "second")
     campaign = Campaign(name="c", measurements=(first, second, plan(QUIET, None, "fixed")))
     changed, shares = within(campaign, RIG, 1800.0)
-    assert changed.duration_s == pytest.approx(
-        1800.0, abs=15.0
-    )  # whole realisations, of 7 s with their ramps
+    assert changed.duration_s == pytest.approx(1800.0, abs=15.0)  # whole realisations of 7 s including ramps
     assert shares[1].allotted_s == pytest.approx(2 * shares[0].allotted_s, abs=4.0)
     assert [each.needed_s for each in shares] == [pytest.approx(50.0), pytest.approx(100.0), None]
     assert recorded_s(changed.measurements[2]) == 60.0
