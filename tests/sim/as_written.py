@@ -1,4 +1,4 @@
-"""The equations of motion as written, integrated by scipy, and how states are compared."""
+"""Reference solution: the equations of motion integrated by scipy; and a distance between states."""
 
 import math
 
@@ -16,17 +16,17 @@ def paper(contact="hertz", **options):
 
 
 def distance(first, second):
-    """Largest difference of two states in units of 100 um and 0.1 m/s."""
+    """Return the largest difference of two states in units of 100 um and 0.1 m/s."""
     return np.max(np.abs(first - second) / UNITS)
 
 
 def as_written(specimen, drive, duration_s, start=(0.0,) * 6, longest_step_s=2e-5):
-    """Final state by scipy, from the paper's equations and the force as harmonic balance knows it."""
+    """Return the final state by scipy, from the paper's equations and the harmonic-balance force law."""
     (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
     spring, size = spring_of(specimen), drive.amplitude_m
 
-    def turning(t):
-        """Angle of the drive and its rate."""
+    def drive_angle(t):
+        """Return the drive angle [rad] and its rate [rad/s]."""
         if isinstance(drive, Harmonic):
             omega = 2.0 * math.pi * drive.frequency_hz
             return omega * t, omega
@@ -34,7 +34,7 @@ def as_written(specimen, drive, duration_s, start=(0.0,) * 6, longest_step_s=2e-
 
     def rates(t, state):
         x, y, z, vx, vy, vz = state
-        angle, omega = turning(t)
+        angle, omega = drive_angle(t)
         force = spring.force(np.array([y - z]), np.array([vy - vz]))[0]
         upper, inner = k2 * (z - x) + c2 * (vz - vx), k1 * (y - z) + c1 * (vy - vz) + force
         base = k0 * (size * math.sin(angle) - x) + c0 * (size * omega * math.cos(angle) - vx)

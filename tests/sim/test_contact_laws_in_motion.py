@@ -1,4 +1,4 @@
-"""Every contact law followed in time: against the equations as written, closed forms, and mechanics."""
+"""Motions with every contact law match direct integration, closed forms and mechanics."""
 
 import math
 from dataclasses import dataclass, replace
@@ -28,8 +28,8 @@ POWERS = ["power:3", "power:7", "power:3+5+7", "power:29"]
 STOPS = ["linear_gap", "hunt_crossley:0.5", "hertz"]
 
 
-def pair(contact, gap_m=45e-6, faint=(1e-2, 2e-2, 3e-2)):
-    """Masses m1 and m2 that collide while nothing else happens to them: all other springs are faint."""
+def colliding_pair(contact, gap_m=45e-6, faint=(1e-2, 2e-2, 3e-2)):
+    """Return a specimen whose m1 and m2 collide; all springs are negligibly soft."""
     return Specimen((1.0, 2.1e-3, 2.0e-3), faint, (0.0, 0.0, 0.0), gap_m, contact)
 
 
@@ -45,7 +45,7 @@ def test_every_contact_law_agrees_with_direct_integration(contact, drive):
 
 @dataclass(frozen=True)
 class EveryTerm:
-    """A law that no table names: it says its numbers, and that is all."""
+    """A contact law outside the registry, defined by its parameters only."""
 
     stops = Stops(linear_stiffness=2e6, contact_stiffness=4.9e9, loss=0.3)
 
@@ -75,7 +75,7 @@ def test_unequal_stops_agree_with_direct_integration(contact, gap_m):
 def test_exchanging_unequal_stops_mirrors_the_motion(frequency_hz, amplitude_m, contact):
     here = paper(contact, gap_m=(20e-6, 50e-6))
     there = paper(contact, gap_m=(50e-6, 20e-6))
-    # Short: chaos makes of the rounding of pi ten thousand times more in 10 ms, and its square in 20 ms.
+    # 10 ms only: chaos amplifies the rounding of pi by 1e4 in 10 ms and by 1e8 in 20 ms.
     one = integrate(here, Harmonic(frequency_hz, amplitude_m), 0.01, Accuracy.REFERENCE)
     other = integrate(there, Harmonic(frequency_hz, amplitude_m, math.pi), 0.01, Accuracy.REFERENCE)
     assert one.impacts.count == other.impacts.count
@@ -84,8 +84,8 @@ def test_exchanging_unequal_stops_mirrors_the_motion(frequency_hz, amplitude_m, 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7, 29, 47])
 def test_a_free_power_oscillator_has_the_period_of_its_closed_form(exponent):
-    # The law itself is faint at 40 um for the highest exponents: it makes 5e-3 N of p^47, once in 50 ms.
-    specimen = pair(PowerLaw(46e-6, ((exponent, 5.0),)), faint=(1e-9, 2e-9, 3e-9))
+    # For the highest exponents the force at 40 um is weak: 5e-3 N for p^47, a period of 50 ms.
+    specimen = colliding_pair(PowerLaw(46e-6, ((exponent, 5.0),)), faint=(1e-9, 2e-9, 3e-9))
     amplitude, force = 40e-6, 5.0
     m1, m2 = specimen.masses[1:]
     mass = m1 * m2 / (m1 + m2)
@@ -96,7 +96,7 @@ def test_a_free_power_oscillator_has_the_period_of_its_closed_form(exponent):
         else force / 46e-6 * (amplitude / 46e-6) ** (exponent - 1)
     )
     inverse = 1.0 / (exponent + 1)
-    # T = 4 sqrt((n+1)/2) / sqrt(k A^(n-1) / m) times the integral of du/sqrt(1 - u^(n+1)), a beta function.
+    # T = 4 sqrt((n+1)/2) / sqrt(k A^(n-1) / m) times the integral of du/sqrt(1 - u^(n+1)) (beta function).
     quarter = math.sqrt(math.pi) * math.gamma(inverse) * inverse / math.gamma(inverse + 0.5)
     period = 4.0 * math.sqrt((exponent + 1) / 2.0) * quarter / math.sqrt(coefficient / mass)
     start = np.array([0.0, amplitude * m2 / (m1 + m2), -amplitude * m1 / (m1 + m2), 0.0, 0.0, 0.0])
@@ -120,7 +120,7 @@ def test_every_engine_gives_the_same_free_motion(contact):
 
 def test_a_linear_stop_gives_the_bilinear_frequency():
     stiffness = 4e5
-    specimen = replace(pair(LinearGap(stiffness), 1e-12), stiffnesses=(1e-2, 2e4, 3e-2))
+    specimen = replace(colliding_pair(LinearGap(stiffness), 1e-12), stiffnesses=(1e-2, 2e4, 3e-2))
     specimen = replace(specimen, lower_gap_m=math.inf)
     m1, m2 = specimen.masses[1:]
     mass = m1 * m2 / (m1 + m2)
@@ -136,7 +136,7 @@ def test_a_linear_stop_gives_the_bilinear_frequency():
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1e-2, 1.0), st.floats(0.0, 2.0))
 def test_the_speed_after_a_lossy_collision_matches_the_closed_form(speed, loss):
-    specimen = replace(pair(HuntCrossley(4.9e9, loss)), lower_gap_m=math.inf)
+    specimen = replace(colliding_pair(HuntCrossley(4.9e9, loss)), lower_gap_m=math.inf)
     m1, m2 = specimen.masses[1:]
     p = 44.999e-6
     share = np.array([0.0, m2 / (m1 + m2), -m1 / (m1 + m2)])
@@ -145,8 +145,8 @@ def test_the_speed_after_a_lossy_collision_matches_the_closed_form(speed, loss):
     )
     after = run.final_state[5] - run.final_state[4]
 
-    # d(r^2/2)/dd = -(k/m) d^1.5 (1 + loss r): r - ln(1 + loss r)/loss changes by the same each way.
-    def held(r):
+    # d(r^2/2)/dd = -(k/m) d^1.5 (1 + loss r): r - ln(1 + loss r)/loss changes equally in and out.
+    def invariant(r):
         return (
             (loss * r - math.log1p(loss * r)) / loss**2
             if loss * abs(r) > 1e-3
@@ -155,7 +155,7 @@ def test_the_speed_after_a_lossy_collision_matches_the_closed_form(speed, loss):
 
     assert run.impacts.count == 1
     assert 0.0 < after <= speed * (1.0 + 1e-4)
-    assert held(-after) == pytest.approx(held(speed), rel=1e-3)
+    assert invariant(-after) == pytest.approx(invariant(speed), rel=1e-3)
 
 
 @pytest.mark.parametrize("contact", ["power:5", "linear_gap", "hunt_crossley:0.5"])

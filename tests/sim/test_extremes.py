@@ -1,4 +1,4 @@
-"""The engine at its extremes: right, or refused in one sentence; never a hang, never a silent NaN."""
+"""Extreme parameters give a correct result or a refusal in one sentence, and never hang or give NaN."""
 
 import math
 from dataclasses import replace
@@ -37,7 +37,7 @@ DRIVE = Harmonic(130.0, 20e-6)
 
 
 def steady_start(specimen, drive):
-    """State at time zero of the steady motion without contact."""
+    """Return the state at time zero of the steady motion without contact."""
     moved = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
     return np.concatenate([moved, 2j * math.pi * drive.frequency_hz * moved]).real
 
@@ -66,7 +66,7 @@ def motion(specimen, drive, duration_s):
 def test_every_drive_is_integrated_to_its_end(contact, drive, duration_s):
     run = motion(paper(contact), drive, duration_s)
     p = np.abs(run.states[:, 1] - run.states[:, 2])
-    # Not even ten millimetres press a stop in by more than a hundred micrometres.
+    # Even 10 mm of base motion compress a stop by less than 200 um.
     assert p.max() < 200e-6
 
 
@@ -80,7 +80,7 @@ def test_a_drive_of_one_picometre_gives_the_transmissibility(contact, frequency_
     expected = abs(base_transmissibility(specimen, frequency_hz)[0])
     assert response.impacts == response.impacts_before == 0
     assert response.response_ii == pytest.approx(expected[0], rel=1e-6)
-    # At 0.01 Hz p is a part in 10^8 of x, and a power law follows x with a millionth's accuracy.
+    # At 0.01 Hz p is about 1e-8 x, and a power law has an accuracy of 1e-6 in x.
     assert response.relative_ii == pytest.approx(expected[3], rel=1e-5, abs=1e-11)
 
 
@@ -137,7 +137,7 @@ def test_mass_ratios_of_a_million_agree_with_direct_integration(contact, factor,
         [0.0, 0.0, 0.0, 0.0, 0.1, 0.0],
     )
     if (factor, place) == (1e-6, 1):
-        # Too light to get anywhere against its damper: let it start on the stop.
+        # The damper stops such a light m1 at once, so it starts on the stop.
         start[1] = 1e-6
     ours = integrate(specimen, DRIVE, 1e-4, Accuracy.REFERENCE, start)
     assert ours.outcome is Outcome.REACHED_END
@@ -164,20 +164,20 @@ def test_only_motion_beyond_grazing_strikes_the_stop(contact, frequency_hz):
     specimen = paper(contact)
     path = base_transmissibility(specimen, frequency_hz)[0, 3]
     omega = 2.0 * math.pi * frequency_hz
-    # p = Re(-i A0 path exp(i omega t)) has its first extreme here.
+    # Time of the first extreme of p = Re(-i A0 path exp(i omega t)).
     peak = ((0.5 * math.pi - np.angle(path)) % math.pi) / omega
     for margin, strikes in ((-1e-11, 0), (1e-11, 1)):
         drive = Harmonic(frequency_hz, specimen.gap_m / abs(path) * (1.0 + margin))
         start = steady_start(specimen, drive)
         run = integrate(specimen, drive, peak + 0.1 / frequency_hz, initial_state=start)
         assert run.impacts.count == strikes
-        # The stop is reached as long before the extreme as a parabola is off its top by the margin.
+        # Near its extreme p is a parabola, which gives the time of the impact before the extreme.
         if strikes:
             assert peak - run.impacts.times_s[0] == pytest.approx(math.sqrt(2.0 * margin) / omega, rel=0.1)
 
 
-def pulled_away(contact, acceleration):
-    """A specimen at rest in a frame that is pulled away evenly, m1 just touching its lower stop."""
+def accelerated_specimen(contact, acceleration):
+    """Return a specimen at rest in a constantly accelerated frame, m1 just touching its lower stop."""
     specimen, rate = paper(contact, damping_time_s=2e-4), 10_000.0
     time_s = np.arange(6001) / rate
     base = Sampled(0.5 * acceleration * time_s**2, rate)
@@ -190,7 +190,7 @@ def pulled_away(contact, acceleration):
 @pytest.mark.parametrize("contact", SPRINGY)
 def test_a_slow_pressed_contact_settles_where_its_springs_balance(contact):
     acceleration = 20.0
-    specimen, base, start = pulled_away(contact, acceleration)
+    specimen, base, start = accelerated_specimen(contact, acceleration)
     run = integrate(specimen, base, 0.6, Accuracy.REFERENCE, start)
     left = specimen.masses[1] * acceleration - specimen.stiffnesses[1] * specimen.gap_m
     exponent = 1.0 if contact == "linear_gap" else 1.5
@@ -204,8 +204,8 @@ def test_a_slow_pressed_contact_settles_where_its_springs_balance(contact):
 @pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.5", "rigid:1"])
 @pytest.mark.parametrize(("acceleration", "stays"), [(20.0, True), (17.0, False)])
 def test_m1_stays_on_a_rigid_stop_only_while_pressed_against_it(contact, acceleration, stays):
-    specimen, base, start = pulled_away(contact, acceleration)
-    # k1 gap / m1 = 17.8 m/s^2: below it the spring draws m1 off the stop.
+    specimen, base, start = accelerated_specimen(contact, acceleration)
+    # Below k1 gap / m1 = 17.8 m/s^2 the spring lifts m1 off the stop.
     threshold = specimen.stiffnesses[1] * specimen.gap_m / specimen.masses[1]
     assert (acceleration > threshold) is stays
     run = integrate(specimen, base, 0.05, Accuracy.REFERENCE, start, sample_rate_hz=1e4)
@@ -219,7 +219,7 @@ def test_m1_stays_on_a_rigid_stop_only_while_pressed_against_it(contact, acceler
 
 
 def stored_energy(specimen, states):
-    """Kinetic and elastic energy with the base at rest, between impacts [J]."""
+    """Return kinetic plus elastic energy [J] with the base at rest, between impacts."""
     x, y, z, vx, vy, vz = states.T
     (m0, m1, m2), (k0, k1, k2) = specimen.masses, specimen.stiffnesses
     elastic = k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2
@@ -235,7 +235,7 @@ def test_perfect_rigid_stops_lose_nothing_in_any_number_of_impacts(duration_s):
     )
     assert run.impacts.count > 1000 * duration_s
     energy = stored_energy(specimen, run.states)
-    # A rounding an impact.
+    # One rounding error per impact.
     np.testing.assert_allclose(energy, energy[0], rtol=2e-15 * run.impacts.count)
 
 

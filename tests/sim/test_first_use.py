@@ -1,4 +1,4 @@
-"""The first run on a machine compiles nothing: a process of its own, and what it loads."""
+"""The first simulation in a new process needs no compiler."""
 
 import json
 import subprocess

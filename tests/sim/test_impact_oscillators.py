@@ -1,8 +1,7 @@
-"""Impact oscillators of the literature, as a specimen whose base is too heavy to feel the oscillator.
+"""Impact oscillators of the literature, as a specimen with a frame too heavy to react to the oscillator.
 
-m2 then moves as the drive and its own modes say, and p'' + damping p' + p + F(p) is the acceleration of a
-shaken frame: the engine, its tangent through stops soft and hard, and its statistics are tested as users
-run them.
+The acceleration of m2 is then prescribed, and p'' + damping p' + p + F(p) equals it: this tests the
+engine, its tangent through soft and hard stops, and its statistics.
 """
 
 import math
@@ -41,7 +40,7 @@ GRAZING = 0.8019281
 
 
 def on_heavy_base(law, gap, damping):
-    """An oscillator of mass and stiffness 1 with one stop, at positive p."""
+    """Return an oscillator of mass and stiffness 1 with one stop at positive p."""
     return Specimen(
         masses=(HEAVY, 1.0, HEAVY),
         stiffnesses=(HEAVY * FAST**2, 1.0, HEAVY * SLOW**2),
@@ -52,30 +51,30 @@ def on_heavy_base(law, gap, damping):
     )
 
 
-def shaken(specimen, omega, acceleration):
-    """Drive that gives m2 a harmonic acceleration of this amplitude."""
+def drive_for(specimen, omega, acceleration):
+    """Return the drive that gives m2 a harmonic acceleration of this amplitude."""
     frequency = omega / (2.0 * math.pi)
     moved = abs(base_transmissibility(specimen, frequency)[0, 2])
     return Harmonic(frequency, acceleration / omega**2 / moved)
 
 
 def hard(omega, restitution):
-    """x'' + x = cos(omega t), x <= 0: the stop at the place of rest."""
+    """Return x'' + x = cos(omega t), x <= 0, with the stop at the rest position."""
     specimen = on_heavy_base(RigidStops(restitution), 1e-9, 0.0)
-    return specimen, shaken(specimen, omega, 1.0)
+    return specimen, drive_for(specimen, omega, 1.0)
 
 
 def soft(omega):
-    """x'' + 0.02 x' + x + 29 (x - 1.26) H(x - 1.26) = 0.7 omega^2 sin(omega t): Ing et al.
+    """Return x'' + 0.02 x' + x + 29 (x - 1.26) H(x - 1.26) = 0.7 omega^2 sin(omega t), Ing et al.
 
     Phil. Trans. R. Soc. A 366 (2008) 679.
     """
     specimen = on_heavy_base(LinearGap(29.0), 1.26, 0.02)
-    return specimen, shaken(specimen, omega, 0.7 * omega**2)
+    return specimen, drive_for(specimen, omega, 0.7 * omega**2)
 
 
 def start_at(case, p=0.0, rate=0.0):
-    """State at time zero with the frame in its steady motion and the oscillator where it is put in it."""
+    """Return the state at time zero with the frame in steady motion and the oscillator at (p, rate)."""
     specimen, drive = case
     moved = drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0]
     speed = 2.0 * math.pi * drive.frequency_hz * moved
@@ -96,7 +95,7 @@ def exponent(case, omega, periods, p=0.0, rate=0.0):
 
 
 def next_impacts(times, speeds, omega):
-    """Time to the next impact of x'' + x = cos(omega t), from x = 0 at ``speeds`` < 0, and its speed."""
+    """Return time to and speed of the next impact of x'' + x = cos(omega t), from x = 0, x' < 0."""
     forced = 1.0 / (1.0 - omega * omega)
     cosine = -forced * np.cos(omega * times)
     sine = speeds + forced * omega * np.sin(omega * times)
@@ -118,7 +117,7 @@ def next_impacts(times, speeds, omega):
 
 @dataclass(frozen=True)
 class MapExponents:
-    """Means over the motions of `by_impact_map`, per unit time."""
+    """Exponents and impact rate per unit time, means over the motions of `by_impact_map`."""
 
     largest: float
     standard_error: float
@@ -127,7 +126,7 @@ class MapExponents:
 
 
 def by_impact_map(omega, restitution, motions, impacts, settling=100):
-    """Exponents of the map from impact to impact on (phase of the drive, speed just after it)."""
+    """Return the exponents of the impact map on (drive phase, speed after the impact)."""
     draws = np.random.default_rng(1)
     phase, speed = 0.3 + 1e-3 * draws.random(motions), np.full(motions, -0.5)
     change = np.ones((2, motions))
@@ -137,7 +136,7 @@ def by_impact_map(omega, restitution, motions, impacts, settling=100):
         flights, reached = next_impacts(times, speed, omega)
         before, after = np.cos(phase), np.cos(omega * (times + flights))
         columns = []
-        # A later start at the same place is a change of the state at one time.
+        # A delay of the impact is expressed as a change of the state at a fixed time.
         for late, faster in ((1.0 / omega, 0.0), (0.0, 1.0)):
             dx, dv = -speed * late, faster - before * late
             delay = -(dx * np.cos(flights) + dv * np.sin(flights)) / reached
@@ -174,7 +173,7 @@ def test_each_hard_impact_adds_twice_the_logarithm_of_the_restitution():
     found = lyapunov_spectrum(
         specimen, drive, duration_s=3000.0 * period, settle_s=300.0 * period, interval_s=period
     )
-    # The four of the frame are the decays of two masses damped by half.
+    # The sum of the frame's four exponents is the trace of its damping.
     frame = -(FAST + 2.0 * SLOW)
     of_the_oscillator = found.sum_per_s - frame
     assert found.exponents_per_s[0] > 0.1
@@ -187,29 +186,29 @@ def test_the_soft_oscillator_grazes_where_its_linear_resonance_reaches_the_stop(
     case = soft(omega)
     moved = case[1].amplitude_m * base_transmissibility(case[0], case[1].frequency_hz)[0]
     assert abs(moved[3]) == pytest.approx(1.26, rel=1e-4)
-    # From its linear motion: it goes on for ever below, and strikes in the first period above.
+    # Started on the linear motion: no impact below grazing, an impact in the first period above.
     found = exponent(case, omega, 600, moved[3].imag, (1j * omega * moved[3]).imag)
     assert (found.impacts > 0) == (beyond > 0.0)
     assert (found.motion is FinalMotion.QUIET) == (beyond < 0.0)
 
 
 def test_the_ueda_oscillator_has_the_published_exponent():
-    # x'' + 0.05 x' + x^3 = 7.5 cos t; its spring is next to nothing.
+    # Ueda: x'' + 0.05 x' + x^3 = 7.5 cos t; the linear spring is negligible.
     specimen = replace(on_heavy_base(PowerLaw(1.0, ((3, 1.0),)), 1.0, 0.05), stiffnesses=UEDAS_SPRINGS)
-    drive, period = shaken(specimen, 1.0, 7.5), 2.0 * math.pi
+    drive, period = drive_for(specimen, 1.0, 7.5), 2.0 * math.pi
     times = {"settle_s": 200.0 * period, "interval_s": 0.25 * period}
     found = lyapunov_exponent(specimen, drive, duration_s=50_000.0 * period, **times)
     assert found.standard_error_per_s < 1e-3
     assert found.exponent_per_s == pytest.approx(0.1034, abs=4.0 * found.standard_error_per_s)
     spectrum = lyapunov_spectrum(specimen, drive, duration_s=1000.0 * period, **times)
-    # Of the two masses of the frame, and of the oscillator.
+    # The sum is the damping of the two frame masses and of the oscillator.
     assert spectrum.sum_per_s == pytest.approx(-(FAST + 2.0 * SLOW) - 0.05, rel=1e-9)
 
 
 @pytest.mark.parametrize(("omega", "chaotic", "largest"), [(0.802, 0.0285, 1.4552), (0.8025, 0.0242, 1.4570)])
 def test_two_attractors_coexist_just_above_grazing(omega, chaotic, largest):
     case, period = soft(omega), 2.0 * math.pi / omega
-    # On its way to chaos a start may come near the other attractor and stay there: one of sixteen does.
+    # One of sixteen runs reaches the other attractor during its transient.
     strays = [exponent(case, omega, 5000, p) for p in (1.0, 0.5, 1.2)]
     chaos = [each for each in strays if each.verdict is ExponentVerdict.CHAOTIC]
     assert len(chaos) >= 2
@@ -218,7 +217,7 @@ def test_two_attractors_coexist_just_above_grazing(omega, chaotic, largest):
         assert each.exponent_per_s == pytest.approx(chaotic, abs=allowed)
     quiet = exponent(case, omega, 2000)
     assert quiet.source is Source.MULTIPLIERS
-    # A complex pair of multipliers: its size is that of the damping alone.
+    # The modulus of a complex pair of multipliers follows from the damping alone.
     assert quiet.exponent_per_s == pytest.approx(-0.01, abs=1e-6)
     orbit = integrate(*case, 10.0 * period, initial_state=quiet.final_state, sample_rate_hz=5000.0 / period)
     assert (orbit.states[:, 1] - orbit.states[:, 2]).max() == pytest.approx(largest, abs=1e-4)

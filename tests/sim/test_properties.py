@@ -1,4 +1,4 @@
-"""What holds for every law and any numbers: symmetry, scales of length, time, mass, and how it is asked."""
+"""Properties of motions for every contact law: symmetry, scaling, and independence of how they are run."""
 
 import math
 from dataclasses import replace
@@ -33,7 +33,7 @@ places = st.tuples(*[st.floats(-20e-6, 20e-6)] * 3)
 speeds = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
 
 
-def end(specimen, drive=DRIVE, duration_s=DURATION_S, start=None):
+def end_state(specimen, drive=DRIVE, duration_s=DURATION_S, start=None):
     run = integrate(specimen, drive, duration_s, Accuracy.REFERENCE, start)
     assert run.outcome is Outcome.REACHED_END
     assert run.impacts.count > 5 or isinstance(specimen.contact, PowerLaw)
@@ -41,7 +41,7 @@ def end(specimen, drive=DRIVE, duration_s=DURATION_S, start=None):
 
 
 def noise(seed, rate=20_000.0, duration_s=0.03):
-    """Band-limited displacement of about 20 um."""
+    """Return a band-limited random displacement of about 20 um."""
     coarse = np.random.default_rng(seed).normal(0.0, 20e-6, round(duration_s * 1000) + 2)
     time_s = np.arange(round(duration_s * rate))
     return Sampled(np.interp(time_s, np.arange(len(coarse)) * rate / 1000.0, coarse), rate)
@@ -56,7 +56,7 @@ def noise(seed, rate=20_000.0, duration_s=0.03):
     drive=st.sampled_from([Harmonic(40.0, 2e-3), Harmonic(170.0, 50e-6), Harmonic(430.0, 1e-4)]),
 )
 def test_an_unreached_stop_has_no_effect(contact, place, gap_m, is_upper, drive):
-    """Without a stop above, the one below was passed through while p moved upwards."""
+    """Without an upper stop, p once passed through the lower stop while moving upwards."""
     far, none = ((gap, gap_m) if is_upper else (gap_m, gap) for gap in (1.0, math.inf))
     start = np.array([*place, 0.0, 0.0, 0.0])
     ends = []
@@ -73,7 +73,7 @@ def test_an_unreached_stop_has_no_effect(contact, place, gap_m, is_upper, drive)
 
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, place=places, speed=speeds, seed=st.integers(0, 1000))
-def test_a_mirrored_drive_and_start_mirror_the_motion_bit_for_bit(contact, place, speed, seed):
+def test_a_mirrored_drive_and_initial_state_mirror_the_motion_bit_for_bit(contact, place, speed, seed):
     start, drive, still = np.array([*place, *speed]), noise(seed), Harmonic(100.0, 0.0)
     mirrored = Sampled(-drive.displacement_m, drive.sample_rate_hz)
     for one, other, duration_s in ((drive, mirrored, 0.02), (still, still, 0.05)):
@@ -84,7 +84,7 @@ def test_a_mirrored_drive_and_start_mirror_the_motion_bit_for_bit(contact, place
 
 
 def longer(specimen, scale):
-    """The specimen whose lengths are ``scale`` times as long under forces ``scale`` times as large."""
+    """Return the specimen with lengths and forces multiplied by ``scale``."""
     match specimen.contact:
         case Hertz(stiffness=stiffness):
             law = Hertz(stiffness / math.sqrt(scale))
@@ -101,12 +101,12 @@ def longer(specimen, scale):
 @given(contact=laws, log_scale=st.floats(-4.0, 4.0))
 def test_motion_scales_with_the_unit_of_length(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
-    long = end(longer(specimen, scale), Harmonic(170.0, 20e-6 * scale)) / scale
-    assert np.all(np.abs(long - end(specimen)) < LIMITS)
+    long = end_state(longer(specimen, scale), Harmonic(170.0, 20e-6 * scale)) / scale
+    assert np.all(np.abs(long - end_state(specimen)) < LIMITS)
 
 
 def slower(specimen, scale):
-    """The specimen for which every time is ``scale`` times as long."""
+    """Return the specimen with all times multiplied by ``scale``."""
     match specimen.contact:
         case Hertz(stiffness=stiffness):
             law = Hertz(stiffness / scale**2)
@@ -130,13 +130,13 @@ def slower(specimen, scale):
 @given(contact=laws, log_scale=st.floats(-3.0, 3.0))
 def test_motion_scales_with_the_unit_of_time(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
-    slow = end(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
+    slow = end_state(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
     slow[3:] *= scale
-    assert np.all(np.abs(slow - end(specimen)) < LIMITS)
+    assert np.all(np.abs(slow - end_state(specimen)) < LIMITS)
 
 
 def heavier(specimen, scale):
-    """The specimen with all masses and all forces ``scale`` times as large."""
+    """Return the specimen with all masses and forces multiplied by ``scale``."""
     match specimen.contact:
         case Hertz(stiffness=stiffness):
             law = Hertz(stiffness * scale)
@@ -161,7 +161,7 @@ def heavier(specimen, scale):
 @given(contact=laws, log_scale=st.floats(-6.0, 6.0))
 def test_motion_scales_with_mass_and_stiffness(contact, log_scale):
     specimen = paper(contact)
-    assert np.all(np.abs(end(heavier(specimen, 10.0**log_scale)) - end(specimen)) < LIMITS)
+    assert np.all(np.abs(end_state(heavier(specimen, 10.0**log_scale)) - end_state(specimen)) < LIMITS)
 
 
 @settings(max_examples=20, deadline=None)
@@ -177,7 +177,7 @@ def test_the_output_sampling_rate_does_not_change_the_motion(contact, rate):
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, cuts=st.lists(st.floats(0.0, 0.1), min_size=1, max_size=6))
 def test_a_run_split_at_any_time_ends_in_the_same_state(contact, cuts):
-    # Damped, and not driven into chaos: a run that is cut rounds anew at every cut.
+    # The motion is not chaotic, since every split of a run adds a rounding error.
     specimen = paper(contact, damping_time_s=1e-4)
     for drive in (Harmonic(95.0, 8e-6), LogarithmicSweep(90.0, 110.0, 0.1, 8e-6)):
         whole, motion, now = integrate(specimen, drive, 0.1, Accuracy.REFERENCE), None, 0.0

@@ -1,4 +1,4 @@
-"""The public faces of the simulation: their examples run, and words stand for enums."""
+"""The public API of the simulation accepts enums as text and has the documented types."""
 
 import inspect
 import typing
@@ -61,16 +61,16 @@ CALLS = {
     ),
     sim.BalanceOptions: sim.BalanceOptions,
 }
-"""How each thing that asks for an enum is called."""
+"""A call of each public function that takes an enum."""
 
 
 def enum_in(annotation):
-    """Find the enum that an annotation names, if any."""
+    """Return the enum in a type annotation, or None."""
     parts = typing.get_args(annotation) or (annotation,)
     return next((part for part in parts if isinstance(part, type) and issubclass(part, StrEnum)), None)
 
 
-def asked_enums():
+def enum_parameters():
     for face in (sim, study, maps, chain):
         for name in face.__all__:
             function = getattr(face, name)
@@ -83,7 +83,7 @@ def asked_enums():
     yield pytest.param(sim.BalanceOptions, "kept", sim.HarmonicSet, id="BalanceOptions-kept")
 
 
-@pytest.mark.parametrize(("function", "parameter", "kind"), list(asked_enums()))
+@pytest.mark.parametrize(("function", "parameter", "kind"), list(enum_parameters()))
 def test_enum_arguments_accept_their_values_as_text_and_refuse_others(function, parameter, kind):
     call = CALLS[function]
     call(**{parameter: next(iter(kind)).value})
@@ -101,7 +101,7 @@ def test_observables_and_accuracy_may_be_given_as_text():
 
 
 def test_type_hints_list_every_text_value_of_an_enum():
-    for case in asked_enums():
+    for case in enum_parameters():
         function, parameter, kind = case.values
         if inspect.isfunction(function):
             literals = [

@@ -1,4 +1,4 @@
-"""The sentence on each motion says what its table shows, whichever level buys something."""
+"""The sentence on each motion agrees with its table on which accuracy levels improve the result."""
 
 import pytest
 

@@ -36,7 +36,7 @@ def test_the_engine_at_reference_accuracy_matches_the_independent_solution(conta
     assert state_error(engine, state) < 1e-8
 
 
-def test_a_start_beyond_the_gap_is_in_contact():
+def test_an_initial_state_beyond_the_gap_is_in_contact():
     specimen = gong2025()
     pressed = np.array([0.0, 47e-6, 0.0, 0.0, 0.0, 0.0])
     engine = integrate(specimen, STILL, 0.01, Accuracy.REFERENCE, pressed).final_state

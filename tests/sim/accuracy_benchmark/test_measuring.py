@@ -1,4 +1,4 @@
-"""The trade of speed for accuracy: what is promised is kept, and the second opinion is right."""
+"""The benchmark of accuracy levels: stated accuracies are met, and the independent solution is right."""
 
 import numpy as np
 import pytest

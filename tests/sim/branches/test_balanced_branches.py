@@ -1,4 +1,4 @@
-"""Branches of harmonic balances against closed forms and against exact branches."""
+"""Harmonic-balance branches match closed forms."""
 
 import math
 

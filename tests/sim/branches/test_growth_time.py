@@ -1,4 +1,4 @@
-"""How fast a motion leaves an unstable branch: the growth time against the motion itself."""
+"""The growth time of an unstable periodic motion matches the simulated departure from it."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def test_distance_from_an_unstable_motion_grows_by_factor_e_per_growth_time():
     told_s = float(growth_time_s(drive.frequency_hz, abs(orbit.floquet_multipliers[0])))
     scales = state_scales(specimen, drive)
     start = orbit.state + 1e-6 * scales
-    # The first periods turn any small distance into the direction that grows.
+    # During the first periods the difference turns into the growing direction.
     run = integrate(specimen, drive, 4 * PERIODS / drive.frequency_hz, "reference", start, drive.frequency_hz)
     away = np.linalg.norm((run.states - orbit.state) / scales, axis=1)
     grown_s = 2 * PERIODS / drive.frequency_hz / np.log(away[4 * PERIODS] / away[2 * PERIODS])

@@ -1,4 +1,4 @@
-"""Folds against numbers of other programs: harmonic balance and Runge-Kutta shooting of other hands."""
+"""Fold points match other programs: independent harmonic balance and Runge-Kutta shooting."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ FEW = MotionSearch(places=2, starts=1)
 
 
 def hardening():
-    """The paper's specimen with k3 p^3 in the place of stops, a tenth of k1 p at 100 um."""
+    """Return the paper's specimen with a force k3 p^3 instead of stops, 10 % of k1 p at 100 um."""
     specimen = gong2025()
     force = 0.1 * specimen.stiffnesses[1] * 100e-6
     return replace(specimen, contact=PowerLaw(100e-6, ((3, force),)))

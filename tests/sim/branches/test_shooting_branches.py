@@ -1,4 +1,4 @@
-"""Branches of exact motions against solutions that no line of the engine made, and against the exact flow."""
+"""Branches by shooting match independent exact solutions and the exact flow."""
 
 import math
 
@@ -29,8 +29,8 @@ FEW = MotionSearch(places=2, starts=2)
 LEVEL = FrequencyPath((5e-6,))
 
 
-def off(specimen, drive, found, k):
-    """How far the exact flow takes a point of a branch from itself, over its scale."""
+def error(specimen, drive, found, k):
+    """Return the scaled distance between a branch point and its image after one period."""
     mapping = PeriodMap(specimen, found.shape, found.periods)
     state = found.branch.states[k]
     return float(np.abs((mapping.image(state, drive) - state) / state_scales(specimen, drive)).max())
@@ -38,12 +38,12 @@ def off(specimen, drive, found, k):
 
 @pytest.fixture(scope="module")
 def near_the_first_resonance():
-    """Branches of the paper's specimen from 88 to 101 Hz at 5 um, around its first resonance."""
+    """Branches of the paper's specimen around its first resonance, from 88 to 101 Hz at 5 um."""
     return list(shot_branches(gong2025(), LEVEL, 88.0, 101.0, MotionSearch(places=3, starts=12)))
 
 
 class PiecewiseLinear:
-    """The specimen between linear stops as two linear systems, solved by matrix exponentials alone."""
+    """The specimen between linear stops as two linear systems, solved by matrix exponentials."""
 
     def __init__(self, specimen, drive):
         mass, damping, stiffness = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
@@ -73,7 +73,7 @@ class PiecewiseLinear:
         return expm(system * length) @ (state - steady(start)) + steady(start + length)
 
     def motion(self, state, touch, contact):
-        """Entry state, its time and its duration of the mirrored motion with one contact a half period."""
+        """Return entry state, time and duration of the contact, one per half period of a mirrored motion."""
         half = math.pi / self.omega
 
         def equations(unknowns):
@@ -138,9 +138,9 @@ def test_every_branch_point_is_periodic_within_its_error(near_the_first_resonanc
     specimen = gong2025()
     for found in near_the_first_resonance:
         branch = found.branch
-        # Where a branch joins a simpler one its own map is singular, and the last point only near it.
+        # End points are excluded: the period map is singular where a branch joins another one.
         inner = range(1, len(branch.frequencies_hz) - 1)
-        assert max(off(specimen, Harmonic(branch.frequencies_hz[k], 5e-6), found, k) for k in inner) < 2e-9
+        assert max(error(specimen, Harmonic(branch.frequencies_hz[k], 5e-6), found, k) for k in inner) < 2e-9
         assert np.median(branch.left_out) < 1e-6
 
 
@@ -153,7 +153,7 @@ def test_an_isolated_branch_of_period_three_is_found_from_random_states(near_the
     folds = [e.frequency_hz for e in isolated.branch.events if e.kind is BifurcationKind.FOLD]
     assert sorted(folds) == pytest.approx([94.188, 98.815], abs=0.01)
     assert 0.2 < isolated.branch.is_stable.mean() < 0.8
-    # A run from there stays there: the motion is real, and not the drive's own period.
+    # The motion does not repeat after one drive period.
     k = int(np.flatnonzero(isolated.branch.is_stable)[0])
     drive = Harmonic(float(isolated.branch.frequencies_hz[k]), 5e-6)
     once = PeriodMap(gong2025()).image(isolated.branch.states[k], drive)
@@ -190,7 +190,7 @@ def test_a_rigid_stop_branch_is_exact_until_a_grazing_contact():
     for each in found:
         branch = each.branch
         inner = range(1, len(branch.frequencies_hz) - 1)
-        worst = max(off(specimen, Harmonic(float(branch.frequencies_hz[k]), 20e-6), each, k) for k in inner)
+        worst = max(error(specimen, Harmonic(float(branch.frequencies_hz[k]), 20e-6), each, k) for k in inner)
         assert worst < 2e-9
         if branch.end is ArcEnd.STEP_TOO_SHORT:
             assert branch.events[-1].kind is BifurcationKind.GRAZING
@@ -205,7 +205,7 @@ def test_each_branch_point_uses_the_recorded_level_at_its_frequency():
     assert np.ptp(branch.amplitudes_m) > 1e-6
     for k in range(0, len(branch.frequencies_hz), 10):
         drive = Harmonic(float(branch.frequencies_hz[k]), float(branch.amplitudes_m[k]))
-        assert off(specimen, drive, found, k) < 2e-9
+        assert error(specimen, drive, found, k) < 2e-9
 
 
 @pytest.mark.parametrize(

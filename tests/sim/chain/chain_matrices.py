@@ -8,9 +8,9 @@ MASSES_PER_CELL = 3
 
 
 def chain_state_matrix(chain):
-    """Flight as d/dt s = A s + b f, with f = k0 U + c0 dU/dt of the first cell.
+    """Return the state equation without contact, d/dt s = A s + b f, f = k0 U + c0 dU/dt of cell 1.
 
-    Returns A, shape (6 cells, 6 cells), and b, shape (6 cells,).
+    A has the shape (6 cells, 6 cells), b the shape (6 cells,).
     """
     size = MASSES_PER_CELL * chain.size
     system = np.zeros((2 * size, 2 * size))
@@ -23,7 +23,7 @@ def chain_state_matrix(chain):
 
 
 def chain_impulses(chain):
-    """State just after a unit impulse in each cell, shape (6 cells, cells): m1 and m2 part."""
+    """Return the state after a unit impulse between m1 and m2 of each cell, shape (6 cells, cells)."""
     entry = np.zeros((2 * MASSES_PER_CELL * chain.size, chain.size))
     velocities = MASSES_PER_CELL * chain.size
     for place, cell in enumerate(chain.cells):
@@ -34,8 +34,8 @@ def chain_impulses(chain):
 
 
 def chain_modal_form(chain):
-    """Diagonalise the state matrix, for any damping.
+    """Return the diagonal form of the state matrix, for any damping.
 
-    Raises ValueError when two modes coincide (critical damping): then no full set of modes exists.
+    Raises ValueError if two modes coincide (critical damping).
     """
     return diagonal_form(np.diag(chain.masses), chain.stiffness_matrix, chain.damping_matrix)

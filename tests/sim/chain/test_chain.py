@@ -1,4 +1,4 @@
-"""A chain's matrices, and what it refuses."""
+"""Matrices of a chain, and refused chains."""
 
 import numpy as np
 import pytest

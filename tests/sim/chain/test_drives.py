@@ -1,4 +1,4 @@
-"""Chains under sweeps and sampled drives, and the energy of their cells."""
+"""Chains driven by sweeps and samples, the energy of their cells, and unit cells of several cells."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def distance(first, second):
 
 
 def noise(seed, count, rate_hz, rms_m):
-    """Band-limited noise, its slow drift left out."""
+    """Return noise band-limited to 40 to 600 Hz."""
     spectrum = np.fft.rfft(np.random.default_rng(seed).normal(size=count))
     frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)
     spectrum[(frequency < 40.0) | (frequency > 600.0)] = 0.0
@@ -55,7 +55,7 @@ def noise(seed, count, rate_hz, rms_m):
     ],
 )
 def test_a_cell_of_negligible_mass_does_not_disturb_its_neighbour(drive):
-    """The heavy cell moves as the specimen does, whose intervals and contacts are another code."""
+    """The heavy cell moves like the single specimen, which is integrated by other code."""
     heavy, lightness = gong2025(), 1e-12
     light = replace(
         heavy,
@@ -68,7 +68,7 @@ def test_a_cell_of_negligible_mass_does_not_disturb_its_neighbour(drive):
     theirs = integrate(heavy, drive, 0.1, Accuracy.REFERENCE, sample_rate_hz=5e3)
     assert ours.outcome is Outcome.REACHED_END
     struck = theirs.impacts.times_s
-    # Every impact makes four of a difference.
+    # Every impact multiplies a difference by about four, so only the first impacts are compared.
     near = theirs.time_s < (struck[8] if len(struck) > 8 else 0.1)
     assert near.sum() > 100
     assert distance(ours.states[near, 0], theirs.states[near]) < 1e-5
@@ -151,6 +151,6 @@ def test_waves_of_unequal_cells_propagate_in_bands_and_decay_in_gaps(seed, cells
     for gap in band_gaps(unit):
         middle = 0.5 * (gap.lower_hz + min(gap.upper_hz, 2.0 * gap.lower_hz))
         assert abs(bloch_factor(unit, [middle])[0]) < 1.0
-        # A free end may hold one mode of its own in a gap of a unit that is not its own mirror image.
+        # Each free end of a chain of asymmetric unit cells may have one mode in a band gap.
         inside = (natural > gap.lower_hz * (1 + 1e-9)) & (natural < gap.upper_hz * (1 - 1e-9))
         assert np.count_nonzero(inside) <= 2

@@ -1,4 +1,4 @@
-"""Energy of undamped chains at standard accuracy, and what one cell is."""
+"""Energy conservation of undamped chains, and a chain of one cell."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ SEEDS = range(8)
 
 
 def drifts(contact, cells, duration_s):
-    """What undamped chains in motion gain or lose, over their energy."""
+    """Return the relative energy errors of undamped chains."""
     chain = chain_of(gong2025(damping_time_s=0.0, contact=contact), cells)
     found = []
     for seed in SEEDS:
@@ -53,7 +53,7 @@ def test_undamped_chains_under_other_laws_keep_their_energy(contact, bound):
     ],
 )
 def test_energy_is_conserved_for_every_law_drive_and_level(contact, cells, accuracy):
-    """Steps took up to 2e-2 of it on a sampled drive, and gave or took 2e-3 of it under a power law."""
+    """Energy errors were once 2e-2 with a sampled drive and 2e-3 with a power law."""
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     chain = chain_of(specimen, cells)
     moving = np.random.default_rng(1).normal(size=(cells, 6)) * np.repeat([3e-5, 0.15], 3)
@@ -69,7 +69,7 @@ def test_energy_is_conserved_for_every_law_drive_and_level(contact, cells, accur
 
 @pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
 def test_motion_deep_in_a_steep_contact_is_integrated_at_every_accuracy(accuracy):
-    """At reference its steps asked for more than the digits of a number hold, and the run stalled."""
+    """At reference accuracy the step control once asked for less than rounding, and the run stalled."""
     specimen = gong2025(damping_time_s=0.0, contact="power:47")
     chain = chain_of(specimen, 1)
     start = np.array([0.0, 1.5 * specimen.gap_m, 0.0, 0.0, 0.0, 0.0])
@@ -82,7 +82,7 @@ def test_motion_deep_in_a_steep_contact_is_integrated_at_every_accuracy(accuracy
 @pytest.mark.parametrize("contact", ["power:5", "power:29", "hertz", "linear_gap:2e5"])
 @pytest.mark.parametrize("gaps", [3.0, 1e3, pytest.param(1e6, marks=pytest.mark.thorough)])
 def test_a_failed_chain_run_ends_at_its_last_valid_state(contact, gaps):
-    """Deep in a wall a run went on from a half-made window: 1e172 times the energy."""
+    """A run deep in contact once continued from an unfinished window, with 1e172 times the energy."""
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     start = np.zeros((2, 6))
     start[0, 1] = gaps * specimen.gap_m

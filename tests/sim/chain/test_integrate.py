@@ -1,4 +1,4 @@
-"""Whole runs of chains: against scipy, against the engine of one cell, and against the laws of mechanics."""
+"""Runs of chains match scipy, and invalid or failing runs are reported."""
 
 from dataclasses import replace
 
@@ -26,8 +26,8 @@ UNITS = np.repeat([1e-4, 0.1], 3)
 """Errors are in units of 100 um and 0.1 m/s."""
 
 
-def lively(cells, seed=1):
-    """A state in which every cell moves, none in contact."""
+def state_of(cells, seed=1):
+    """Return a state in which every cell moves without contact."""
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (cells, 6)) * np.repeat([2e-5, 0.15], 3)
 
 
@@ -48,8 +48,8 @@ def law_force(cell, p, rate):
             return sum(force * (p / reference) ** n for n, force in terms)
 
 
-def independent(chain, drive, duration_s, state):
-    """The equations as written, by scipy's DOP853 restarted wherever a stop is touched or left."""
+def reference_state(chain, drive, duration_s, state):
+    """Return the final state by scipy's DOP853, restarted at every begin and end of a contact."""
     size, first = 3 * chain.size, chain.cells[0]
     mass, stiffness, damping = chain.masses, chain.stiffness_matrix, chain.damping_matrix
     omega = 2.0 * np.pi * drive.frequency_hz
@@ -79,7 +79,7 @@ def independent(chain, drive, duration_s, state):
         run = solve_ivp(rates, (t, duration_s), now, events=events, **options)
         t, now = run.t[-1], run.y[:, -1]
         if run.status == 1:
-            # Past the event by a step too short to matter, so that it is not found again.
+            # A tiny step past the event, so that it is not found again.
             hop = min(1e-12, duration_s - t)
             t, now = t + hop, now + hop * rates(t, now)
     return np.concatenate([now[:size].reshape(-1, 3), now[size:].reshape(-1, 3)], axis=1)
@@ -98,14 +98,14 @@ def test_coupled_cells_of_every_law_match_an_independent_integrator():
             paper,
         )
     )
-    theirs = independent(chain, HARD, 0.004, lively(5, 3))
-    ours = integrate_chain(chain, HARD, 0.004, Accuracy.REFERENCE, lively(5, 3))
+    theirs = reference_state(chain, HARD, 0.004, state_of(5, 3))
+    ours = integrate_chain(chain, HARD, 0.004, Accuracy.REFERENCE, state_of(5, 3))
     assert np.all(ours.impacts.per_cell[[0, 2, 4]] > 0)
     assert distance(ours.final_state, theirs) < 1e-7
 
 
 def test_sixty_four_strongly_driven_cells_stay_finite():
-    run = integrate_chain(chain_of(gong2025(), 64), Harmonic(220.0, 500e-6), 0.03, initial_state=lively(64))
+    run = integrate_chain(chain_of(gong2025(), 64), Harmonic(220.0, 500e-6), 0.03, initial_state=state_of(64))
     assert run.outcome is Outcome.REACHED_END
     assert np.all(np.isfinite(run.final_state))
     assert np.all(np.diff(run.impacts.times_s) >= 0.0)

@@ -1,4 +1,4 @@
-"""Exponents of chains: against the modes, and against the exact tangent flow of one cell."""
+"""Lyapunov exponents of chains match the modes and the exact tangent flow of one cell."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A chain without contact against closed forms."""
+"""Chains without contact match closed forms."""
 
 from dataclasses import replace
 
@@ -66,7 +66,7 @@ def test_one_cell_has_the_transmissibility_of_the_specimen():
 @given(frequency=st.floats(5.0, 1500.0), cells=st.integers(1, 40), damping=st.floats(1e-6, 1e-4))
 @settings(max_examples=40, deadline=None)
 def test_a_finite_chain_responds_as_two_bloch_waves(frequency, cells, damping):
-    """The free end reflects: x_n = U cos((N - n + 1/2) mu) / cos((N + 1/2) mu), written in q = exp(i mu)."""
+    """The free end reflects waves: x_n = U cos((N - n + 1/2) mu) / cos((N + 1/2) mu), q = exp(i mu)."""
     specimen = gong2025(damping_time_s=damping)
     ours = chain_transmissibility(chain_of(specimen, cells), [frequency])[0, :, 0]
     q, n = bloch_factor(chain_of(specimen, 1), [frequency])[0], np.arange(1, cells + 1)

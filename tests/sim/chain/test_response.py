@@ -1,4 +1,4 @@
-"""Responses of chains: against the engine of one cell, samples and closed forms."""
+"""Responses of chains match the single specimen, dense samples and closed forms."""
 
 import time
 
@@ -69,7 +69,7 @@ def test_peaks_and_lines_match_a_densely_sampled_run():
     "contact", ["hertz", "linear_gap:2e5", "hunt_crossley:0.5", "power:5", "power:3+5+7"]
 )
 def test_largest_values_of_a_long_run_of_unequal_cells_match_dense_samples(contact):
-    # Most windows are only summed up: the largest values must be those of the samples all the same.
+    # Most windows are only summed up; the largest values must still match the samples.
     rng = np.random.default_rng(11)
     gap_m = 45e-6 if contact.startswith("power") else (25e-6, 120e-6)
     cells = tuple(gong2025(contact=contact, gap_m=gap_m, damping_time_s=each) for each in (0.0, 3e-5))
@@ -82,7 +82,7 @@ def test_largest_values_of_a_long_run_of_unequal_cells_match_dense_samples(conta
     sampled = np.stack([np.abs(x).max(axis=0), np.abs(p).max(axis=0)], axis=1)
     np.testing.assert_array_equal(response.final_state, run.final_state)
     assert np.all(response.largest_m > sampled * (1.0 - 2e-6))
-    # A sample lies within 1 us of the deepest point of a contact of some 30 us.
+    # The nearest sample is within 1 us of the deepest point of a 30 us contact.
     assert np.all(response.largest_m < sampled * (1.0 + 2e-3))
 
 
@@ -92,7 +92,7 @@ def test_both_chain_responses_without_contact_are_the_transmissibility():
     moved = chain_transmissibility(chain, drive.frequency_hz)[0]
     np.testing.assert_allclose(response.response_ii, np.abs(moved), rtol=1e-8)
     np.testing.assert_allclose(response.response_i, np.abs(moved)[:, [0, 3]], rtol=1e-8)
-    # U = A0 sin: its own phasor is -i A0.
+    # The phasor of U = A0 sin is -i A0.
     np.testing.assert_allclose(response.lines_m, -1j * drive.amplitude_m * moved, rtol=1e-8)
 
 

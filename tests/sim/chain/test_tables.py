@@ -1,4 +1,4 @@
-"""The bound on what one cell's force does to another's contact, which lets each keep its own time."""
+"""The bound on the coupling between contacts of different cells, which allows separate time steps."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from vibench.sim.chain._tables import CROSS_SHARE, chain_tables, cross_answers, 
 DRIVE = Harmonic(220.0, 40e-6)
 
 
-def answer_to_an_impulse(chain, later):
-    """Velocity of every p after a unit impulse in every cell, by the matrix exponential."""
+def impulse_response(chain, later):
+    """Return dp/dt of every cell after a unit impulse in every cell, by the matrix exponential."""
     system, _ = chain_state_matrix(chain)
     moved = expm(later * system) @ chain_impulses(chain)
     velocities = moved[3 * chain.size :].reshape(chain.size, 3, -1)
@@ -26,8 +26,8 @@ def test_cross_responses_of_cells_within_a_window_stay_below_their_bound(damping
     window = 40e-6
     bounds = cross_answers(markov_between(chain), window)
     for part in (0.3, 0.7, 1.0):
-        answer = np.abs(answer_to_an_impulse(chain, part * window))
-        relative = answer / np.diagonal(answer_to_an_impulse(chain, 0.0))[:, None]
+        answer = np.abs(impulse_response(chain, part * window))
+        relative = answer / np.diagonal(impulse_response(chain, 0.0))[:, None]
         for i in range(4):
             for j in range(4):
                 if i != j:

@@ -1,4 +1,4 @@
-"""Call the C interface with broken structures; it must answer with a code, and never crash.
+"""Call the C interface with broken structures; it must return an error code and never crash.
 
 python tests/sim/engine/fuzz_interface.py LIBRARY [--count N] [--seed N]
 """
@@ -24,13 +24,13 @@ LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "powe
 CODES = {-1, 0, 1, 2, 3, 4}
 
 
-def spoil(structure, draws):
-    """Overwrite one number of a structure, or of one inside it."""
+def corrupt(structure, draws):
+    """Overwrite one number of a structure or of a nested structure."""
     names = [name for name in structure.dtype.names if name not in POINTERS]
     name = draws.choice(names)
     kind = structure.dtype[name]
     if kind.names:
-        spoil(structure[name], draws)
+        corrupt(structure[name], draws)
     elif kind.base == np.int64:
         structure[name] = draws.choice(STRANGE_COUNTS)
     elif kind.shape:
@@ -40,10 +40,10 @@ def spoil(structure, draws):
 
 
 def call(engine, draws):
-    """Run one scene of which something may be broken; returns its code."""
+    """Run one scene with possibly broken structures and return its code."""
     specimen = gong2025(contact=str(draws.choice(LAWS)))
     scene = scene_of(engine, specimen, Harmonic(draws.uniform(50.0, 500.0), 2e-5))
-    # A law that is spoiled may need either.
+    # A corrupted contact law may need either table.
     scene["collisions"] = collision_structure(engine).ctypes.data
     scene["power_shapes"] = power_structure(engine).ctypes.data
     state, record = engine.new("State"), engine.new("Record")
@@ -52,7 +52,7 @@ def call(engine, draws):
     record["sample_room"], record["impact_times"] = len(samples), times.ctypes.data
     record["impact_room"], record["steps_left"] = len(times), 100_000
     until, tolerance = 0.02, 3e-7
-    # Rooms say how long the arrays are: only they must be true.
+    # Only the array lengths ("rooms") must stay correct.
     rooms = int(record["sample_room"]), int(record["impact_room"])
     for part in draws.choice(["scene", "state", "record", "until", "tolerance"], draws.integers(1, 4)):
         if part == "until":
@@ -60,7 +60,7 @@ def call(engine, draws):
         elif part == "tolerance":
             tolerance = float(draws.choice(STRANGE))
         else:
-            spoil({"scene": scene, "state": state, "record": record}[part], draws)
+            corrupt({"scene": scene, "state": state, "record": record}[part], draws)
     record["sample_room"] = min(int(record["sample_room"]), rooms[0])
     record["impact_room"] = min(int(record["impact_room"]), rooms[1])
     record["steps_left"] = min(int(record["steps_left"]), 100_000) if record["steps_left"] <= 2e9 else -1
@@ -82,7 +82,7 @@ def call(engine, draws):
     readings["metric"], readings["growth"] = np.eye(6), growth.ctypes.data
     readings["impacts"], readings["motions"] = impacts.ctypes.data, motions.ctypes.data
     if draws.random() < 0.5:
-        spoil((tangent, readings)[draws.integers(2)], draws)
+        corrupt((tangent, readings)[draws.integers(2)], draws)
     readings["room"] = min(int(readings["room"]), 8)
     if kind == 1:
         return engine.run(tables, state, until, tolerance, record, tangent)
@@ -91,7 +91,7 @@ def call(engine, draws):
 
 
 def call_on_cubics(engine, draws):
-    """Run a scene on cubics of which something may be broken; returns its code."""
+    """Run a scene with a cubic base motion and possibly broken structures; return its code."""
     specimen = gong2025(contact=str(draws.choice(LAWS)))
     scene = engine.new("CubicScene", interval=draws.choice([1e-5, 3e-4]), fastest=4e3)
     fill_specimen(scene["specimen"], specimen)
@@ -111,7 +111,7 @@ def call_on_cubics(engine, draws):
     sizes = [(view, int(view)) for view in lent_sizes(drive)]
     tolerance = float(draws.choice([3e-7, 3e-7, *STRANGE]))
     for structure in draws.choice([0, 1, 2, 3], draws.integers(4)):
-        spoil((scene, drive, state, record)[structure], draws)
+        corrupt((scene, drive, state, record)[structure], draws)
     for view, true in sizes:
         view[...] = min(int(view), true)
     record["sample_room"] = min(int(record["sample_room"]), len(samples))
@@ -127,7 +127,7 @@ def call_on_cubics(engine, draws):
 
 
 def follow(engine, tables, state, tolerance, draws):
-    """Follow nine motions in a batch of which something may be broken; returns its code."""
+    """Follow nine motions in a batch with possibly broken structures; return its code."""
     states, sections, room = [state.copy() for _ in range(9)], np.zeros((9, 3, 6)), 3
     motions, fit = engine.rows("BatchMotion", 9), collision_fit(engine, gong2025()).copy()
     motions["tables"], motions["periods"] = tables.ctypes.data, draws.integers(1, room + 1, 9)
@@ -136,7 +136,7 @@ def follow(engine, tables, state, tolerance, draws):
     batch = engine.new("Batch", count=9, tolerance=tolerance)
     batch["motions"], batch["fit"] = motions.ctypes.data, fit.ctypes.data
     for _ in range(draws.integers(3)):
-        spoil((batch, fit, motions[4], states[draws.integers(9)])[draws.integers(4)], draws)
+        corrupt((batch, fit, motions[4], states[draws.integers(9)])[draws.integers(4)], draws)
     batch["count"] = min(int(batch["count"]), 9)
     motions["periods"] = np.minimum(motions["periods"], room)
     try:
@@ -146,7 +146,7 @@ def follow(engine, tables, state, tolerance, draws):
 
 
 def lent_sizes(structure):
-    """Views of the sizes of all arrays that a structure lends."""
+    """Yield views of the sizes of all arrays that a structure refers to."""
     for name in structure.dtype.names:
         if structure.dtype[name].names == ("at", "size"):
             yield structure[name]["size"]
@@ -154,17 +154,17 @@ def lent_sizes(structure):
             yield from lent_sizes(structure[name])
 
 
-def call_spoilt(engine, draws):
-    """Call every function with one structure, of which something may be broken; yields their codes."""
+def call_corrupted(engine, draws):
+    """Call every function with a possibly broken structure; yield the codes."""
     for function, structure, _ in calls(engine, draws):
         sizes = [(view, int(view)) for view in lent_sizes(structure)]
         for _ in range(draws.integers(3)):
-            spoil(structure, draws)
+            corrupt(structure, draws)
         if function == "close_loop":
             sizes += [(view, int(view)) for view in lent_sizes(structure.lent["shaker"])]
-            spoil(structure.lent["shaker"], draws)
+            corrupt(structure.lent["shaker"], draws)
         if function.endswith("_loop") and draws.random() < 0.3:
-            spoil(structure.lent["controller"], draws)
+            corrupt(structure.lent["controller"], draws)
         if function.endswith("_chain"):
             if draws.random() < 0.3:
                 lent = structure.lent[
@@ -190,10 +190,10 @@ def main():
     engine, draws = Engine(given.library), np.random.default_rng(given.seed)
     codes = [call(engine, draws) for _ in range(given.count)]
     codes += [call_on_cubics(engine, draws) for _ in range(given.count // 2)]
-    codes += [code for _ in range(given.count // 20) for code in call_spoilt(engine, draws)]
+    codes += [code for _ in range(given.count // 20) for code in call_corrupted(engine, draws)]
     if not set(codes) <= CODES:
         raise EngineError(f"Codes that no outcome has: {set(codes) - CODES}")
-    print({code: codes.count(code) for code in sorted(set(codes))})  # noqa: T201 - what its caller reads
+    print({code: codes.count(code) for code in sorted(set(codes))})  # noqa: T201 - read by the calling test
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A call of every function of the native engine that takes one structure, with random numbers."""
+"""Calls with random numbers of every native function that takes one structure."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ STATES, STEPS, PARAMETERS = 8, 40, 2
 
 
 def calls(engine, draws):
-    """Yield for each function its name, its structure, and the arrays that it fills."""
+    """Yield the name, the structure and the output arrays of each function."""
 
     def normal(*shape, scale=1.0):
         return scale * draws.standard_normal(shape)
@@ -94,7 +94,7 @@ def calls(engine, draws):
 
 
 def shaker_of(engine, draws, drive):
-    """A table with a specimen that strikes its stops, or nearly does, and what a stretch fills."""
+    """Return a shaker with a specimen at or near contact, and its output arrays."""
     specimen = gong2025(contact=str(draws.choice(LAWS)))
     tables, state = cubic_tables(engine, specimen, 1e-5), engine.new("State")
     start_at(engine, tables, specimen, state, [2e-5, 4.4e-5, 0.0, 0.0, draws.uniform(-0.5, 0.5), 0.0], 3e-7)
@@ -114,12 +114,12 @@ def shaker_of(engine, draws, drive):
     shaker["transition"] = np.eye(3, 5)
     shaker["transition"][0, 1], shaker["transition"][1, 4] = 1e-5, 8e-5
     shaker["transition"][1:, 3] = 0.01, 0.1
-    # A few steps need not hold a contact: what is counted of them may be 0.
+    # Within a few steps there may be no contact, so the contact count may be 0.
     return shaker, [array for name, array in moved.items() if name != "begun"]
 
 
 def motion_calls(engine, draws, normal):
-    """Filter, smooth and follow the contacts of a motion that has them in most steps."""
+    """Yield calls that filter, smooth and follow a motion with contacts in most steps."""
     stop = np.array([1e-5, 2e-5, 4.9e9, 1.5, 0.0, 0.3, 476.0, 500.0])
     if draws.random() < 0.5:
         stop[2:5] = 1e8, 1.3, 1e4
@@ -139,7 +139,7 @@ def motion_calls(engine, draws, normal):
         )
         state[3:6] = normal(3, scale=0.3)
         grown[:STATES, :STATES] = noise @ noise.T
-        # Samples are kept only where there are no parameters.
+        # Samples are stored only without parameters.
         shapes = {"states": (8,), "covariances": (8, 8), "jacobians": (8, 8), "innovations": (2,)}
         shapes = {} if parameters else shapes | {"kinds": (), "impulses": ()}
         kept = {name: np.zeros((STEPS, *shape)) for name, shape in shapes.items()}
@@ -176,13 +176,13 @@ def motion_calls(engine, draws, normal):
         states, contacts = normal(STEPS, 8, scale=5e-6), np.zeros((STEPS, 7))
         states[:, 3:6] = normal(STEPS, 3, scale=0.3)
         arrays = {"states": states, "touched": np.ones(STEPS), "acceleration": normal(STEPS + 20, scale=20.0)}
-        arrays |= {"small_flow": flying(2e-5 / 7), "stop": stop, "contacts": contacts}
+        arrays |= {"small_flow": free_flow(2e-5 / 7), "stop": stop, "contacts": contacts}
         work = engine.new("ContactSearch", step=2e-5, small_steps=7, longest=50, **arrays)
         yield "follow_contacts", work, [contacts]
 
 
 def chain_calls(engine, normal):
-    """Start and follow a chain in which every law acts, under a sine and under pieces of a force."""
+    """Yield calls for a chain with every contact law, driven by a sine and by a piecewise force."""
     laws = ("hertz", "power:3+5", "hunt_crossley:0.5", "linear_gap", "linear", "hertz")
     cells, kinds = len(laws) + 4, engine.rows("CellKind", len(laws))
     for kind, law in zip(kinds, laws, strict=True):
@@ -221,8 +221,8 @@ def chain_calls(engine, normal):
         yield "follow_chain", chain, list(filled.values())
 
 
-def flying(step):
-    """Masses that feel nothing but the base, over a step."""
+def free_flow(step):
+    """Return the flow over a step of free masses that only the base acceleration moves."""
     flow = np.eye(STATES, STATES + 2)
     flow[[0, 1, 2], [3, 4, 5]] = step
     flow[3:6, STATES] = -step

@@ -1,4 +1,4 @@
-"""Motions in a batch: against one after the other, strict steps, energy, mirror images, each other."""
+"""Motions computed in a batch match single motions and do not depend on the rest of the batch."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,20 +17,20 @@ SPECIMEN = gong2025()
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class BatchedMotion:
     states: np.ndarray
     impacts: int
     run: NativeRun
 
 
-def followed(specimen, drives, starts, periods, tolerance=STANDARD):
+def follow(specimen, drives, starts, periods, tolerance=STANDARD):
     runs = [NativeRun(specimen, drive, start, tolerance) for drive, start in zip(drives, starts, strict=True)]
     found = follow_batch(runs, periods)
-    return [Followed(each.states, each.impacts, run) for each, run in zip(found, runs, strict=True)]
+    return [BatchedMotion(each.states, each.impacts, run) for each, run in zip(found, runs, strict=True)]
 
 
 def random_scenes(count, seed):
-    """Drives from 60 to 420 Hz and 2 to 50 um, and states that the specimen wanders through under them."""
+    """Return random drives (60 to 420 Hz, 2 to 50 um) and states of their motions without contact."""
     rng = np.random.default_rng(seed)
     drives, starts = [], []
     while len(drives) < count:
@@ -44,15 +44,15 @@ def random_scenes(count, seed):
 
 
 def sections(specimen, drive, start, periods, accuracy):
-    """States once a drive period, one motion after the other, and how often a stop was touched."""
+    """Return the states once per drive period of a single run, and the number of impacts."""
     run = integrate(
         specimen, drive, periods / drive.frequency_hz, accuracy, start, sample_rate_hz=drive.frequency_hz
     )
     return run.states[1:], run.impacts.count
 
 
-def off(found, states):
-    """Differences over a gap's length, and over the gap times 1 kHz for velocities."""
+def scaled_error(found, states):
+    """Return the largest difference of states, scaled by the gap and by the gap times 2 pi 1 kHz."""
     scale = SPECIMEN.gap_m * np.repeat([1.0, 2.0 * math.pi * 1e3], 3)
     return np.abs((found - states) / scale).max(axis=-1)
 
@@ -62,34 +62,34 @@ def test_motions_in_a_batch_are_as_accurate_as_single_motions():
     periods = [max(1, math.ceil(0.01 * drive.frequency_hz)) for drive in drives]
     beside, alone = [], []
     for drive, start, count, found in zip(
-        drives, starts, periods, followed(SPECIMEN, drives, starts, periods), strict=True
+        drives, starts, periods, follow(SPECIMEN, drives, starts, periods), strict=True
     ):
         exact, touches = sections(SPECIMEN, drive, start, count, "reference")
         assert found.impacts == touches
-        # A state within a contact is said as that of the flight after it.
+        # For a state in contact the batch returns the state after the contact.
         is_free = abs(exact[-1, 1] - exact[-1, 2]) < SPECIMEN.gap_m
         if is_free:
-            beside.append(off(found.states[-1], exact[-1]))
-            alone.append(off(sections(SPECIMEN, drive, start, count, "standard")[0][-1], exact[-1]))
+            beside.append(scaled_error(found.states[-1], exact[-1]))
+            alone.append(scaled_error(sections(SPECIMEN, drive, start, count, "standard")[0][-1], exact[-1]))
     assert len(beside) >= 30
     assert np.median(beside) < 1e-7
-    # Of each other's size where the motion magnifies both alike.
+    # Errors in the batch are of the same size as those of single motions.
     assert np.median(np.array(beside) / np.maximum(alone, 1e-9)) < 10.0
 
 
 def test_a_periodic_motion_reaches_the_same_states_repeatedly():
     drive = Harmonic(130.0, 2e-5)
     settled = integrate(SPECIMEN, drive, 400.0 / 130.0, "standard").final_state
-    (found,) = followed(SPECIMEN, [drive], [settled], [1000])
+    (found,) = follow(SPECIMEN, [drive], [settled], [1000])
     alone, touches = sections(SPECIMEN, drive, settled, 1000, "standard")
     assert found.impacts == touches == 2000
-    assert off(found.states, alone).max() < 1e-6
+    assert scaled_error(found.states, alone).max() < 1e-6
 
 
 def test_a_motion_that_ends_in_contact_continues_from_that_state():
     drives, starts = random_scenes(24, 7)
     drives, starts = [drives[0]] * 64, [starts[0] * (1.0 + 1e-3 * k) for k in range(64)]
-    found = followed(SPECIMEN, drives, starts, [12] * 64)
+    found = follow(SPECIMEN, drives, starts, [12] * 64)
     assert not all(each.run.is_in_flight for each in found)
     for each in found:
         np.testing.assert_array_equal(each.states[-1], each.run.motion)
@@ -98,17 +98,17 @@ def test_a_motion_that_ends_in_contact_continues_from_that_state():
     on_stop = next(each.run for each in found if not each.run.is_in_flight)
     exact = integrate(SPECIMEN, drives[0], 1.0 / drives[0].frequency_hz, "reference", on_stop.motion)
     on_stop.advance(13.0 / drives[0].frequency_hz, RunRecord(100))
-    assert off(on_stop.motion, exact.final_state) < 1e-3
+    assert scaled_error(on_stop.motion, exact.final_state) < 1e-3
 
 
 def test_a_motion_does_not_depend_on_its_batch():
     drives, starts = random_scenes(20, 3)
     periods = [1 + 13 * k for k in range(20)]
-    together = followed(SPECIMEN, drives, starts, periods)
+    together = follow(SPECIMEN, drives, starts, periods)
     shuffled = np.random.default_rng(1).permutation(20)
-    again = followed(SPECIMEN, *([each[k] for k in shuffled] for each in (drives, starts, periods)))
+    again = follow(SPECIMEN, *([each[k] for k in shuffled] for each in (drives, starts, periods)))
     for place, k in enumerate(shuffled):
-        (alone,) = followed(SPECIMEN, [drives[k]], [starts[k]], [periods[k]])
+        (alone,) = follow(SPECIMEN, [drives[k]], [starts[k]], [periods[k]])
         for each in (alone, again[place]):
             np.testing.assert_array_equal(each.states, together[k].states)
             np.testing.assert_array_equal(each.run.motion, together[k].run.motion)
@@ -137,15 +137,15 @@ def test_batches_follow_hertz_stops_and_lightly_damped_modes(specimen: Specimen,
 def test_stops_with_unequal_gaps_are_touched_at_their_positions():
     specimen = gong2025(gap_m=(30e-6, 60e-6))
     drives, starts = [Harmonic(200.0 + k, 1e-5) for k in range(8)], [np.zeros(6)] * 8
-    for drive, start, found in zip(drives, starts, followed(specimen, drives, starts, [6] * 8), strict=True):
+    for drive, start, found in zip(drives, starts, follow(specimen, drives, starts, [6] * 8), strict=True):
         alone, touches = sections(specimen, drive, start, 6, "standard")
         assert found.impacts == touches > 0
-        assert off(found.states[-1], alone[-1]) < 1e-4
+        assert scaled_error(found.states[-1], alone[-1]) < 1e-4
 
 
 def test_a_specimen_unsuitable_for_batches_is_refused():
     with pytest.raises(ValueError, match="cannot be simulated in a batch"):
-        followed(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
+        follow(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
 
 
 def test_a_motion_without_periods_is_refused():

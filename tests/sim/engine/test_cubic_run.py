@@ -1,4 +1,4 @@
-"""A base that is cubics on intervals: against the matrix exponential, under symmetry, cut, and refused."""
+"""Runs on a piecewise cubic base: exact without contact, independent of intervals, refused if invalid."""
 
 import numpy as np
 import pytest
@@ -22,14 +22,14 @@ def sine_pieces(frequency_hz, amplitude_m, duration_s, interval_s):
     return np.ascontiguousarray(spline.c[::-1].T)
 
 
-def carried(specimen, pieces, interval_s, accuracy=Accuracy.STANDARD, start=(0.0,) * 6):
+def advance(specimen, pieces, interval_s, accuracy=Accuracy.STANDARD, start=(0.0,) * 6):
     run, record = CubicRun(specimen, interval_s, start, accuracy.tolerance), RunRecord(100_000)
     assert run.advance(np.atleast_2d(pieces), record) is Outcome.REACHED_END
     return run, record
 
 
 def exact_linear(specimen, motion, base, duration_s):
-    """Flight under a cubic base motion by the exponential of motion and powers of time together."""
+    """Return the motion without contact under a cubic base motion, by an augmented matrix exponential."""
     system, entry = state_matrix(specimen)
     stiffness, damping = specimen.stiffnesses[0], specimen.dampings[0]
     force = stiffness * base + damping * np.append(base[1:] * [1.0, 2.0, 3.0], 0.0)
@@ -44,11 +44,11 @@ def exact_linear(specimen, motion, base, duration_s):
 @pytest.mark.parametrize("interval_s", [1e-6, 1e-5, 1.7e-4, 2e-3])
 @pytest.mark.parametrize("contact", ["linear", "hertz", "power:201"])
 def test_an_interval_without_contact_is_exact(interval_s, contact):
-    # Stops of 1 m are never met, and a power law of that reference is nothing.
+    # Stops at 1 m are never reached, and a power law with this reference is negligible.
     specimen = gong2025(contact=contact, gap_m=1.0)
     motion = np.array([3e-5, -2e-5, 1e-5, 0.02, -0.05, 0.03])
     base = np.array([1e-5, 0.01, 5.0 / interval_s**0.5, -1e-6 / interval_s**3])
-    run, record = carried(specimen, base, interval_s, start=motion)
+    run, record = advance(specimen, base, interval_s, start=motion)
     assert record.impacts == 0
     expected = exact_linear(specimen, motion, base, interval_s)
     for part in (slice(0, 3), slice(3, 6)):
@@ -62,7 +62,7 @@ def test_a_motion_does_not_depend_on_the_base_intervals(contact):
     for intervals in (1, 7, 64):
         length = 2e-3 / intervals
         pieces = [[speed * length * index, speed, 0.0, 0.0] for index in range(intervals)]
-        reached.append(carried(specimen, pieces, length, Accuracy.REFERENCE))
+        reached.append(advance(specimen, pieces, length, Accuracy.REFERENCE))
     for run, record in reached[1:]:
         assert record.impacts == reached[0][1].impacts
         assert np.max(np.abs(run.motion - reached[0][0].motion) / UNITS) < 1e-8
@@ -71,7 +71,7 @@ def test_a_motion_does_not_depend_on_the_base_intervals(contact):
 @pytest.mark.parametrize("contact", LAWS)
 def test_a_run_split_between_intervals_equals_the_whole_bit_for_bit(contact):
     specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 40e-6, 0.05, 2e-5)
-    whole, record = carried(specimen, pieces, 2e-5)
+    whole, record = advance(specimen, pieces, 2e-5)
     run, parts = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(100_000)
     for part in np.array_split(pieces, 37):
         run.advance(part, parts)
@@ -82,14 +82,14 @@ def test_a_run_split_between_intervals_equals_the_whole_bit_for_bit(contact):
 @pytest.mark.parametrize("contact", LAWS)
 def test_standard_accuracy_differs_from_reference_within_its_promise(contact):
     specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 20e-6, 0.5, 2e-5)
-    run, _ = carried(specimen, pieces, 2e-5)
-    exact, _ = carried(specimen, pieces, 2e-5, Accuracy.REFERENCE)
+    run, _ = advance(specimen, pieces, 2e-5)
+    exact, _ = advance(specimen, pieces, 2e-5, Accuracy.REFERENCE)
     assert np.max(np.abs(run.motion - exact.motion) / UNITS) < Accuracy.STANDARD.promise
 
 
 def test_a_run_ends_at_the_first_impact_that_cannot_be_stored():
     specimen, pieces = gong2025(), sine_pieces(130.0, 20e-6, 0.2, 2e-5)
-    _, whole = carried(specimen, pieces, 2e-5)
+    _, whole = advance(specimen, pieces, 2e-5)
     run, record = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(5)
     assert run.advance(pieces, record) is Outcome.TOO_MANY_IMPACTS
     np.testing.assert_array_equal(record.impact_times_s, whole.impact_times_s[:5])

@@ -1,4 +1,4 @@
-"""The library of the native engine: found, checked, rebuilt, and the same on every family of processors."""
+"""The library of the native engine: located, checked, rebuilt, and equal on every processor family."""
 
 import importlib.util
 import threading
@@ -40,7 +40,7 @@ def final_motions(engine):
 
 
 def test_batches_give_equal_digits_for_every_register_width(build):
-    families = [each for each in usable_families() if each != "x86_64"]  # which cannot fuse
+    families = [each for each in usable_families() if each != "x86_64"]  # x86_64 has no fused multiply-add
     starts = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 6)) * np.repeat([1.5e-5, 0.05], 3)
     answers = []
     for engine in [Engine(build.compile_engine(family)) for family in families]:
@@ -167,7 +167,7 @@ def test_an_installed_engine_needs_no_sources(tmp_path, monkeypatch):
 
 
 def test_concurrent_first_requests_share_one_collision_table():
-    """Runs point into it: a second one was dropped while it was used, and numbers were wrong."""
+    """Runs refer to the table; a second table was once freed while in use, and results were wrong."""
     engine, threads = Engine(library_path()), 8
     start = threading.Barrier(threads)
 

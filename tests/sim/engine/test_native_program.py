@@ -1,4 +1,4 @@
-"""The engine under the sanitizers of g++, and its C interface with broken structures."""
+"""The engine passes the sanitizers of g++, also with broken structures in its C interface."""
 
 import os
 import shutil
@@ -35,8 +35,8 @@ def output_of(*command, **environment):
 
 
 @pytest.fixture(scope="module")
-def sanitized(tmp_path_factory):
-    """The engine with its program of tests as one library; without optimisation it compiles soonest."""
+def sanitized_library(tmp_path_factory):
+    """Build the engine with its test program as one library, without optimisation to save time."""
     library = tmp_path_factory.mktemp("engine") / "sanitized.so"
     output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "test_engine.cpp", "-o", library)
     return library
@@ -50,14 +50,14 @@ def output_under_sanitizers(*words):
 @needs_gcc
 @pytest.mark.thorough
 @pytest.mark.timeout(600)
-def test_the_native_test_program_passes_under_the_sanitizers(sanitized, tmp_path):
+def test_the_native_test_program_passes_under_the_sanitizers(sanitized_library, tmp_path):
     engine = native_engine()
     shapes = collision_structure(engine).tobytes() + power_structure(engine).tobytes()
     for law in LAWS:
         scene = scene_of(engine, gong2025(contact=law), Harmonic(130.0, 20e-6))
         (tmp_path / law.replace(":", "_")).write_bytes(scene.tobytes() + shapes)
     assert "all checks passed" in output_under_sanitizers(
-        "-c", PROGRAM, sanitized, *sorted(tmp_path.iterdir())
+        "-c", PROGRAM, sanitized_library, *sorted(tmp_path.iterdir())
     )
 
 
@@ -68,5 +68,5 @@ def test_a_broken_structure_returns_an_error_code():
 @needs_gcc
 @pytest.mark.thorough
 @pytest.mark.timeout(600)
-def test_broken_structures_cause_no_undefined_behaviour(sanitized):
-    output_under_sanitizers(FUZZ, sanitized, "--count", 300)
+def test_broken_structures_cause_no_undefined_behaviour(sanitized_library):
+    output_under_sanitizers(FUZZ, sanitized_library, "--count", 300)

@@ -1,4 +1,4 @@
-"""Motions on the native engine: every law against strict steps, and changes that grow without bound."""
+"""Runs of the native engine match strict steps for every law; growing perturbations do not overflow."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What a run observes on its way, against sums over dense samples of the same motion."""
+"""Peaks and spectral lines observed during a run match dense samples of the same motion."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ LAWS = (
 PERIODS, SAMPLES = 6, 120_000
 
 
-def observed(law, tolerance, drive):
-    """A record of whole periods after a transient, and the samples of the same stretch."""
+def observe_run(law, tolerance, drive):
+    """Return the record of whole periods after a transient, with dense samples and their times."""
     begin_s, end_s = 0.02, 0.02 + PERIODS / drive.frequency_hz
     run = NativeRun(gong2025(contact=law), drive, np.zeros(6), tolerance)
     rate_hz = SAMPLES / (end_s - begin_s)
@@ -36,12 +36,12 @@ def observed(law, tolerance, drive):
 @pytest.mark.parametrize("law", LAWS)
 def test_peaks_and_lines_match_the_samples(law, tolerance):
     drive = Harmonic(130.0, 20e-6, 0.7)
-    record, states, time_s = observed(law, tolerance, drive)
+    record, states, time_s = observe_run(law, tolerance, drive)
     assert record.impacts > 10 or law == "linear" or law.startswith("power")
     x, p = states[:, 0], states[:, 1] - states[:, 2]
     against = np.exp(-1j * (2.0 * np.pi * drive.frequency_hz * time_s + drive.phase_rad))
     for values, peak, area in ((x, record.peak_x_m, record.area_x), (p, record.peak_p_m, record.area_p)):
-        # A peak lies between two samples; those within a step of a power law err by a part of the tolerance.
+        # A peak may lie between two samples; samples within a power-law step err within the tolerance.
         assert np.abs(values).max() <= peak * (1.0 + tolerance)
         assert np.abs(values).max() == pytest.approx(peak, rel=5e-5)
         assert abs(area - np.trapezoid(values * against, time_s)) < 3e-8 * abs(area)

@@ -1,4 +1,4 @@
-"""Stops that are springs: flown exactly, whatever the accuracy that was requested."""
+"""Linear stops are integrated exactly at every accuracy level."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ DRIVES = [Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6), Harmonic(311.0, 40e-6, 
 GAPS = [45e-6, (20e-6, 60e-6)]
 
 
-def settled(drive, gap_m, time_s=0.5):
+def settled_run(drive, gap_m, time_s=0.5):
     specimen = gong2025(gap_m=gap_m, contact="linear_gap")
     run = FollowedRun(specimen, drive, Accuracy.QUICK.tolerance, np.zeros(6))
     run.follow(round(time_s * drive.frequency_hz) / drive.frequency_hz)
@@ -19,7 +19,7 @@ def settled(drive, gap_m, time_s=0.5):
 
 
 def growth(run, span_s, start):
-    """How much of a small change of the start is there at the end: the most of eight changes; at least 1."""
+    """Return the largest growth factor of eight small changes of the initial state, at least 1."""
     random, size = np.random.default_rng(1), 1e-9
     end = integrate(run.specimen, run.drive, span_s, Accuracy.REFERENCE, start).final_state
     most = 1.0
@@ -35,10 +35,10 @@ def growth(run, span_s, start):
 @pytest.mark.parametrize("drive", DRIVES, ids=str)
 @pytest.mark.parametrize("level", Accuracy)
 def test_linear_stops_match_the_independent_solution_at_every_level(drive, gap_m, level):
-    run, span_s = settled(drive, gap_m), 3.0 / drive.frequency_hz
+    run, span_s = settled_run(drive, gap_m), 3.0 / drive.frequency_hz
     start = run.state
     truth = independent_state(run.specimen, drive, span_s, start)
     found = integrate(run.specimen, drive, span_s, level, start)
     assert found.impacts.count > 0
-    # The independent solution errs by some 1e-12, here and there, and a chaotic motion magnifies that.
+    # The independent solution errs by some 1e-12, which a chaotic motion amplifies.
     assert state_error(found.final_state, truth) < 1e-11 * growth(run, span_s, start)

@@ -6,7 +6,7 @@ from vibench.sim.exponents.tangent_run import block_mean
 
 
 def autoregression(memory, count, seed):
-    """Values that remember a part of the one before; unit variance of the steps."""
+    """Return an autoregressive series of order 1 with steps of unit variance."""
     steps = np.random.default_rng(seed).standard_normal(count + 200)
     values = np.zeros_like(steps)
     for k in range(1, len(steps)):

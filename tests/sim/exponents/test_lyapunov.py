@@ -1,4 +1,4 @@
-"""Lyapunov exponents of the specimen: closed forms, known states, and errors that mean what they say."""
+"""Lyapunov exponents of the specimen match closed forms and known motions, with correct errors."""
 
 import math
 
@@ -13,7 +13,7 @@ CHAOS = Harmonic(260.0, 5e-6)
 
 
 def slowest_decay(specimen):
-    """Real part of the slowest eigenvalue of the structure, by a polynomial eigenvalue problem of its own."""
+    """Return the real part of the slowest eigenvalue [1/s], computed independently."""
     inverse = np.linalg.inv(specimen.mass_matrix)
     system = np.block(
         [
@@ -32,14 +32,14 @@ def test_the_exponent_without_impacts_is_the_slowest_decay_rate(contact):
     assert found.motion is FinalMotion.QUIET
     assert found.verdict is ExponentVerdict.REGULAR
     assert found.exponent_per_s == pytest.approx(slowest_decay(specimen), rel=1e-9)
-    # The reference's closed form, -time * omega1^2 / 2, and what the run itself measured.
+    # Closed form -damping_time * omega1^2 / 2, and the mean over the run.
     omega = 2.0 * math.pi * specimen.natural_frequencies_hz[0]
     assert found.exponent_per_s == pytest.approx(-3e-5 * omega**2 / 2.0, rel=1e-6)
     assert found.local_exponents_per_s[50:].mean() == pytest.approx(found.exponent_per_s, abs=0.05)
 
 
 def test_exponents_agree_with_the_statements_of_the_paper_on_chaos():
-    # Its section 3.1 and Fig. 10: over 100 per second when colliding at 5 um; near zero or below at 1 um.
+    # Paper, section 3.1 and Fig. 10: above 100 per second with collisions at 5 um; about zero at 1 um.
     colliding = lyapunov_exponent(gong2025(), CHAOS)
     assert colliding.verdict is ExponentVerdict.CHAOTIC
     assert colliding.exponent_per_s > 100.0

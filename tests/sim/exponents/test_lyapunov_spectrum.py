@@ -1,4 +1,4 @@
-"""All six exponents: sums that mechanics fixes, pairs, and agreement with the largest alone."""
+"""All six Lyapunov exponents: their sum, pairs without damping, and the largest exponent."""
 
 import math
 
@@ -17,8 +17,8 @@ CHAOS = Harmonic(260.0, 5e-6)
 LARGE = Harmonic(430.0, 50e-6)
 
 
-def shrinking(specimen):
-    """-tr(M^-1 C)."""
+def damping_trace(specimen):
+    """Return -tr(M^-1 C) [1/s]."""
     return -float(np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix)))
 
 
@@ -28,20 +28,20 @@ def shrinking(specimen):
 def test_the_sum_of_exponents_equals_the_trace_of_the_damping(contact, drive):
     specimen = gong2025(damping_time_s=3e-5, contact=contact)
     found = lyapunov_spectrum(specimen, drive, Accuracy.REFERENCE, duration_s=1.0, settle_s=0.2)
-    assert shrinking(specimen) == pytest.approx(-390.081, abs=1e-3)
-    assert found.sum_per_s == pytest.approx(shrinking(specimen), rel=1e-6)
+    assert damping_trace(specimen) == pytest.approx(-390.081, abs=1e-3)
+    assert found.sum_per_s == pytest.approx(damping_trace(specimen), rel=1e-6)
     assert np.all(np.diff(found.exponents_per_s) <= 0.0)
 
 
 @pytest.mark.parametrize(("accuracy", "allowed"), [(Accuracy.QUICK, 1e-2), (Accuracy.STANDARD, 1e-4)])
 def test_the_sum_of_exponents_is_within_the_error_of_each_accuracy(accuracy, allowed):
     found = lyapunov_spectrum(gong2025(), LARGE, accuracy, duration_s=2.0, settle_s=0.2)
-    assert found.sum_per_s == pytest.approx(shrinking(gong2025()), rel=allowed)
+    assert found.sum_per_s == pytest.approx(damping_trace(gong2025()), rel=allowed)
 
 
 def test_a_lossy_contact_lowers_the_sum_of_exponents():
     lossy = lyapunov_spectrum(gong2025(contact="hunt_crossley:0.5"), CHAOS, duration_s=4.0)
-    assert lossy.sum_per_s < shrinking(gong2025()) - 5.0
+    assert lossy.sum_per_s < damping_trace(gong2025()) - 5.0
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:5", "rigid:1"])

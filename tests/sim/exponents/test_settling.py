@@ -1,4 +1,4 @@
-"""Chaos that dies out is told from chaos that lasts: on made-up runs of every kind, and on the specimen's."""
+"""Transient chaos is distinguished from lasting chaos, on synthetic runs and on the specimen."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_lasting_chaos_is_reported_for_the_whole_run():
     assert found.since == 0
 
 
-def test_a_contact_free_end_begins_after_the_last_impact():
+def test_a_contact_free_final_motion_begins_after_the_last_impact():
     impacts = np.where(np.arange(COUNT) < 250, 3, 0)
     found = settling(a_run(noise(2.0), impacts=impacts, is_quiet=True), np.ones(6))
     assert found.motion is FinalMotion.QUIET
@@ -44,7 +44,7 @@ def test_a_contact_free_end_begins_after_the_last_impact():
 
 
 @pytest.mark.parametrize("cycle", [1, 2, 3, 7])
-def test_a_periodic_end_begins_where_the_section_starts_to_repeat(cycle):
+def test_a_periodic_final_motion_begins_where_the_section_starts_to_repeat(cycle):
     repeated = np.random.default_rng(8).standard_normal((cycle, 6))
     section = CHAOTIC_SECTION.copy()
     section[300:] = repeated[np.arange(100) % cycle]
@@ -90,7 +90,7 @@ def test_no_change_is_found_in_noise_around_zero():
     [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)],
 )
 def test_transient_chaos_is_reported_with_time_and_exponent(drive, source):
-    # Each start lives in chaos for a time of its own; what comes after is one and the same.
+    # The chaotic lifetime depends on the initial state; the final motion does not.
     spread = np.repeat([2e-5, 2e-2], 3)
     starts = [np.random.default_rng(seed).uniform(-1.0, 1.0, 6) * spread for seed in range(14)]
     found = [lyapunov_exponent(gong2025(), drive, Accuracy.QUICK, initial_state=start) for start in starts]

@@ -1,4 +1,4 @@
-"""The derivative of the flow, carried along with a run: against differences of runs, and mechanics."""
+"""The tangent of the flow, computed with a run, matches differences of runs and mechanics."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ SCALES = np.repeat([1e-4, 0.1], 3)
 
 
 def run_with_tangent(specimen, accuracy=Accuracy.REFERENCE, duration_s=DURATION_S, drive=DRIVE):
-    """Derivative of the flow from rest, scaled, with the state and the impacts."""
+    """Return the scaled derivative of the flow from rest, the final state and the number of impacts."""
     run, record = NativeRun(specimen, drive, np.zeros(6), accuracy.tolerance), RunRecord(10_000)
     run.carry(np.eye(6))
     assert run.advance(duration_s, record) is Outcome.REACHED_END
@@ -23,7 +23,7 @@ def run_with_tangent(specimen, accuracy=Accuracy.REFERENCE, duration_s=DURATION_
 
 
 def by_differences(specimen, step, accuracy=Accuracy.REFERENCE):
-    """The same by central differences of whole runs."""
+    """Return the scaled derivative of the flow by central differences of runs."""
     columns = []
     for push in np.diag(step * SCALES):
         ends = [
@@ -48,7 +48,7 @@ def test_finite_differences_converge_to_the_tangent(contact, gap_m):
 
 @pytest.mark.parametrize("contact", ELASTIC)
 def test_phase_space_volume_shrinks_by_the_damping_alone(contact):
-    # Liouville: an elastic force, however stiff, has no part in the divergence of the flow.
+    # Liouville: elastic forces do not contribute to the divergence of the flow.
     specimen = gong2025(contact=contact)
     tangent, _, _ = run_with_tangent(specimen)
     rate = -np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))
@@ -59,7 +59,7 @@ def test_phase_space_volume_shrinks_by_the_damping_alone(contact):
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:7", "rigid:1"])
 def test_the_tangent_without_damping_is_symplectic(contact):
-    # D' J D = J in displacements and momenta; here in displacements and velocities over their scales.
+    # D' J D = J holds for displacements and momenta; here velocities are scaled by the masses.
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     tangent, _, _ = run_with_tangent(specimen)
     masses = np.diag(specimen.masses) / max(specimen.masses)
@@ -87,7 +87,7 @@ def test_a_higher_accuracy_gives_a_tangent_closer_to_the_reference(contact):
     assert standard < 1e-2
     assert quick < 0.1
     if contact == "hertz":
-        # Its collisions are known better than either level asks, so that quick is as good as standard.
+        # Hertz collisions are solved more accurately than requested, so quick is as good as standard.
         assert max(quick, standard) < 2e-4
     else:
         assert standard < 0.2 * quick

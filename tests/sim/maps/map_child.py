@@ -1,4 +1,4 @@
-"""A process that computes a map into a file, says after every commit how much is kept, and may be killed."""
+"""A process for kill tests: it computes a map into a file and prints the number of stored points."""
 
 import sys
 from pathlib import Path
@@ -14,11 +14,11 @@ PLAN = Map(
 
 
 def main(path):
-    def tell(progress):
+    def report(progress):
         sys.stdout.write(f"{progress.done}\n")
         sys.stdout.flush()
 
-    solve_map(PLAN, Path(path), ExistingStudy.RESUME, workers=2, observer=tell)
+    solve_map(PLAN, Path(path), ExistingStudy.RESUME, workers=2, observer=report)
 
 
 if __name__ == "__main__":

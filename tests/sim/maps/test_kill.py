@@ -1,4 +1,4 @@
-"""The promise: a map survives ``kill -9`` at any moment, and ends with the points it would have had."""
+"""A map survives ``kill -9`` at any time and is completed with the same points."""
 
 import random
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.sim.maps import map_child as child
-from tests.sim.study.test_kill import killed
+from tests.sim.study.test_kill import run_and_kill
 from vibench.sim.maps import open_map, solve_map
 from vibench.sim.study import ExistingStudy, PointState
 
@@ -26,7 +26,7 @@ def test_a_killed_and_resumed_map_equals_an_uninterrupted_map(tmp_path, truth, k
     path, luck = tmp_path / "map.h5", random.Random(kills)
     sessions = np.full(child.PLAN.grid.size, -1)
     for session in range(kills):
-        promised = killed(
+        promised = run_and_kill(
             path,
             tmp_path / f"words-{session}",
             luck.randint(1, 60),
@@ -38,7 +38,7 @@ def test_a_killed_and_resumed_map_equals_an_uninterrupted_map(tmp_path, truth, k
         assert np.count_nonzero(is_kept) >= promised
         for name in ("response_i", "motion", "final_state"):
             np.testing.assert_array_equal(kept.arrays[name][is_kept], truth.arrays[name][is_kept])
-        # Each point once: what an earlier session computed still says so.
+        # Points of earlier sessions are not computed again.
         was_kept = sessions >= 0
         np.testing.assert_array_equal(kept.arrays["session"][was_kept], sessions[was_kept])
         sessions[is_kept] = kept.arrays["session"][is_kept]

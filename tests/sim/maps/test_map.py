@@ -1,4 +1,4 @@
-"""A map as it is asked for: what may vary, and one sentence for what may not."""
+"""Map requests: quantities that may vary, estimates, and refusals in one sentence."""
 
 import math
 from dataclasses import replace
@@ -93,7 +93,7 @@ def test_every_quantity_of_a_map_is_set_in_its_scenes():
         damping_time_s=1e-5,
         vy_m_per_s=0.01,
     )
-    # The first that varies lies along the last axis.
+    # The first varied quantity is the last axis.
     assert [axis.name for axis in plan.axes] == ["hertz_stiffness", "start", "k1"]
     scene = plan.scene((1, 0, 2))
     assert scene.specimen.stiffnesses[1] == 900.0
@@ -118,7 +118,7 @@ def test_a_settled_map_point_matches_the_full_prediction(frequency_hz, amplitude
     )
     light, whole = settle_scene(scene), solve_scene(scene)
     assert (light.motion, light.period) == (whole.motion, whole.period)
-    # What is known in closed form ends after whole drive periods in a map, for what goes on from there.
+    # In a map a closed-form motion ends after whole drive periods, so that points can continue from it.
     assert light.final_state == whole.final_state or light.method is Method.CLOSED_FORM
     assert (light.response_i, light.response_ii) == (whole.response_i, whole.response_ii)
     assert whole.error_estimate is not None
@@ -141,11 +141,11 @@ def test_the_contact_energy_matches_the_deepest_penetration():
     depth = np.abs(run.states[:, 1] - run.states[:, 2]).max() - scene.specimen.gap_m
     energy_j = 0.4 * scene.specimen.contact.stiffness * depth**2.5
     assert energy_j > 0.0
-    # The peak lies between two samples: a little above the largest of them.
+    # The peak lies between two samples, slightly above the largest sample.
     assert contact_energy_j(scene.specimen, found) == pytest.approx(energy_j, rel=5e-3)
     rigid = gong2025(contact="rigid:0.8")
     assert contact_energy_j(rigid, found) is None
-    # The largest abs(p) does not tell which of two unlike stops was reached.
+    # The largest abs(p) does not determine which of two unequal stops was reached.
     for gap_m in ((3e-5, 6e-5), (3e-5, float("inf"))):
         unlike = gong2025(gap_m=gap_m)
         assert contact_energy_j(unlike, found) is None
@@ -222,13 +222,13 @@ def test_a_map_along_one_quantity_keeps_one_state_per_drive_period():
         assert np.count_nonzero(np.isfinite(section[place])) == (
             64 if np.isnan(period[place]) else period[place]
         )
-    # What goes up begins where the lower neighbour ended.
+    # An upward chain continues from the lower neighbour.
     assert results.values("continues", start="up").tolist()[1:] == [0.0, 1.0]
     assert results.values("continues", start="down").tolist()[:-1] == [4.0, 5.0]
 
 
 def test_chained_map_points_are_sampled_at_drive_phase_zero():
-    # The lower points touch nothing and are known in closed form; what goes on from them strikes.
+    # The lower points have no contact (closed form); the points that continue from them have impacts.
     plan = Map(frequency_hz=Range(start=84.0, stop=90.0, points=4), amplitude_m=5e-6, chain=("up",))
     phase = solve_map(plan, workers=1).values("drive_phase")
     assert np.allclose(np.exp(1j * phase), 1.0, atol=1e-6)
@@ -236,7 +236,7 @@ def test_chained_map_points_are_sampled_at_drive_phase_zero():
 
 @pytest.mark.parametrize("other", ["x_m", "frequency_hz"])
 def test_random_starts_are_refused_if_the_map_varies_the_start(other):
-    """The same few states in every cell were counted as so many; files that hold such maps still open."""
+    """Every cell would repeat the same few initial states; files with such maps can still be opened."""
     plan = Map(**{other: LEVELS if other == "x_m" else FREQUENCIES, "y_m": LEVELS, "random_starts": 8})
     for asked in (estimate_map, solve_map):
         with pytest.raises(InvalidStudy, match="a range of y_m, which sets"):
@@ -278,7 +278,7 @@ def test_options_fixed_by_an_error_target_of_a_map_are_refused(given, said):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("target", [{"error": 0.01}, {"time_s": 3.0}])
-def test_an_estimate_of_a_map_with_a_target_comes_from_a_pilot(target):
+def test_the_cost_estimate_of_a_map_with_an_error_target_comes_from_a_pilot_run(target):
     plan = Map(frequency_hz=Range(start=250, stop=270, points=9), amplitude_m=50e-6, **target)
     told = estimate_map(plan, 1)
     assert told.work_s > 9 * (0.5 if "error" in target else 2.9)

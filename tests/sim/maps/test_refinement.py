@@ -1,4 +1,4 @@
-"""Which cells a map computes: all that differ from their neighbours, the same ones however it was stopped."""
+"""Map refinement computes all cells that differ from a neighbour, also after interruptions."""
 
 import numpy as np
 import pytest
@@ -14,12 +14,12 @@ def disc(shape, centre, radius):
     return ((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2 < radius**2).astype(np.int64)
 
 
-def refined(codes, coarse=8, lost=None, sizes=None):
-    """Go on until nothing is missing; cells that are ``lost`` after each step are asked for again."""
+def refine(codes, coarse=8, lost=None, sizes=None):
+    """Refine until no cell is missing; ``lost`` selects the cells that are computed in each step."""
     known = np.zeros(codes.shape, dtype=bool)
     sizes = np.full(codes.shape, np.nan) if sizes is None else sizes
     for step in range(10_000):
-        # What is not known is not looked at: it would be believed otherwise.
+        # Unknown cells hold the code 99, so that using one would be detected.
         seen = Seen(known, np.where(known, codes, 99), np.where(known, sizes, np.nan), 0.1)
         plan = plan_refinement(seen, coarse, 1)
         if not len(plan.missing):
@@ -42,7 +42,7 @@ def filled_codes(codes, known, plan):
 
 def test_every_map_cell_is_computed_or_filled_in_once():
     codes = disc((50, 71), (20, 30), 12)
-    known, plan = refined(codes)
+    known, plan = refine(codes)
     filled = np.concatenate([each.cells for each in plan.fillings])
     assert len(np.unique(filled)) == len(filled)
     is_filled = np.zeros(codes.size, dtype=bool)
@@ -62,9 +62,9 @@ def test_every_map_cell_is_computed_or_filled_in_once():
 )
 def test_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, radius, coarse):
     codes = disc(shape, centre, radius)
-    known, plan = refined(codes, coarse)
+    known, plan = refine(codes, coarse)
     is_wrong = filled_codes(codes, known, plan) != codes
-    # A corner of the disc that no lattice point sees: a few cells of a rim, never the inside.
+    # Only a few cells at the rim of the disc may be missed between lattice points.
     assert is_wrong.sum() <= 4
 
 
@@ -72,7 +72,7 @@ def test_a_thin_line_is_refined_once_it_is_found():
     codes = np.zeros((65, 65), dtype=np.int64)
     columns = np.arange(65)
     codes[np.clip(columns // 2 + 16, 0, 64), columns] = 1
-    known, plan = refined(codes, 16)
+    known, plan = refine(codes, 16)
     assert np.array_equal(filled_codes(codes, known, plan), codes)
     assert known.mean() < 0.3
 
@@ -80,7 +80,7 @@ def test_a_thin_line_is_refined_once_it_is_found():
 def test_a_response_jump_within_one_kind_is_found():
     codes = np.zeros((40, 40), dtype=np.int64)
     sizes = np.where(np.indices(codes.shape)[1] > 17, 1.0, 0.0)
-    known, _ = refined(codes, 8, sizes=sizes)
+    known, _ = refine(codes, 8, sizes=sizes)
     assert known[:, 17:19].all()
 
 
@@ -88,19 +88,19 @@ def test_a_response_jump_within_one_kind_is_found():
 def test_a_stopped_map_computes_the_same_cells(seed):
     codes = disc((45, 60), (20, 30), 11) + 2 * disc((45, 60), (35, 50), 6)
     rng = np.random.default_rng(seed)
-    whole, plan = refined(codes)
-    parts, other = refined(codes, lost=lambda _, count: rng.random(count) < 0.6)
+    whole, plan = refine(codes)
+    parts, other = refine(codes, lost=lambda _, count: rng.random(count) < 0.6)
     assert np.array_equal(whole, parts)
     assert np.array_equal(plan.audited, other.audited)
     assert np.array_equal(plan.audited_donors, other.audited_donors)
 
 
 def test_the_audit_finds_wrongly_filled_cells():
-    # Single cells between the points of the lattice: nothing but chance finds them.
+    # Single cells between lattice points are found by chance only.
     rng = np.random.default_rng(5)
     codes = (rng.random((129, 129)) < 0.02).astype(np.int64)
     codes[::16, ::16] = 0
-    _, plan = refined(codes, 16)
+    _, plan = refine(codes, 16)
     filled = np.concatenate([each.cells for each in plan.fillings])
     share = np.count_nonzero(codes.reshape(-1)[filled]) / len(filled)
     assert len(plan.audited) == AUDITED
@@ -127,10 +127,10 @@ def test_share_intervals_hold_for_rare_kinds(rare):
     held, middles = 0, []
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        # A smooth region, and one where two motions are mixed as if by chance.
+        # One region is smooth; in the other two motions are mixed at random.
         codes = disc((193, 193), (96, 96), 60)
         codes[(codes == 0) & (rng.random(codes.shape) < rare)] = 2
-        known, plan = refined(codes, 16)
+        known, plan = refine(codes, 16)
         filled = filled_codes(codes, known, plan).reshape(-1)
         counts = [Count(int(np.count_nonzero(filled == code)), is_final=True) for code in range(3)]
         shares = audit_of(codes[:, None, :], plan).corrected(shares_of(counts), codes.size)
@@ -139,6 +139,6 @@ def test_share_intervals_hold_for_rare_kinds(rare):
         assert sum(share.share for share in shares) == pytest.approx(1.0)
         middles.append([share.share for share in shares] - true)
     assert held >= 18
-    # Not too small on the whole, either.
+    # The mean of the shares is not biased.
     off = np.array(middles)[:, 2]
     assert abs(off.mean()) < 3.0 * off.std() / np.sqrt(len(off))

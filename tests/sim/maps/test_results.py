@@ -1,4 +1,4 @@
-"""Maps computed for real: adaptive beside full, several starts, and basins with their boundary."""
+"""Computed maps: adaptive and full refinement, several starts, and basins with their boundary."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from vibench.sim.maps import Map, Range, kick_stability, solve_map, uncertainty_
 from vibench.sim.scene.shares import wilson_share
 from vibench.sim.study import InvalidStudy, PointState
 
-# Over the edge between no contact and contact.
+# The map covers the boundary between motions with and without contact.
 PLAN = Map(
     frequency_hz=Range(start=90.0, stop=140.0, points=17),
     amplitude_m=Range(start=2e-6, stop=2e-5, points=13, spacing="logarithmic"),
@@ -29,7 +29,7 @@ def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
         np.testing.assert_array_equal(adaptive.values(name)[is_computed], full.values(name)[is_computed])
     whole = full.values("motion") * 64 + np.nan_to_num(full.values("period"))
     here = adaptive.values("motion") * 64 + np.nan_to_num(adaptive.values("period"))
-    # What the audit found is what the full map finds of those cells, and of all filled ones about as many.
+    # The share of wrongly filled cells in the full map is within the interval of the audit.
     wrong = np.count_nonzero(whole != here)
     low, high = adaptive.audit.wrong_share.low, adaptive.audit.wrong_share.high
     assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
@@ -74,7 +74,7 @@ def test_shares_over_common_starts_have_the_uncertainty_of_the_starts(several_st
             assert each.share.high >= of_starts.high - 1e-12
 
 
-def test_a_basin_map_distinguishes_attractors_and_kicks_them():
+def test_a_basin_map_distinguishes_attractors_that_return_after_a_small_kick():
     plan = Map(
         frequency_hz=160.0,
         amplitude_m=4e-6,
@@ -88,7 +88,7 @@ def test_a_basin_map_distinguishes_attractors_and_kicks_them():
     assert len(results.motions) >= 2
     solid = [each for each in results.motions if each.period is not None]
     found = kick_stability(results, (1e-6,), 10)
-    # A motion that attracts comes back from a millionth of a gap.
+    # An attractor returns after a kick of a millionth of the gap.
     assert all(each.returned.share == 1.0 for each in found if results.motions[each.motion] in solid)
 
 
@@ -107,7 +107,7 @@ def test_a_straight_basin_boundary_has_uncertainty_exponent_1():
 
 
 def test_a_basin_boundary_of_known_dimension_has_the_right_exponent():
-    # Stripes whose edges are the points of Cantor's middle-third set: dimension 1 + ln 2 / ln 3.
+    # The stripes end at the points of Cantor's middle-third set: dimension 1 + ln 2 / ln 3.
     place = (np.arange(729) + 0.5) / 729
     label = np.zeros(729, dtype=np.int64)
     for generation in range(1, 7):
@@ -127,7 +127,7 @@ def test_a_random_basin_map_has_no_uncertainty_exponent():
 
 @pytest.mark.thorough
 def test_the_onset_of_impacts_is_refined_and_audited():
-    """Soft stops are touched without a jump of the response, which alone was looked at."""
+    """Contact with soft stops causes no jump of the response, so impacts must be compared too."""
     soft = {
         "hertz_stiffness": 1e6,
         "frequency_hz": Range(start=60, stop=80, points=33),

@@ -1,4 +1,4 @@
-"""Whole runs: against scipy, against each other, and against the laws of mechanics."""
+"""Runs of the specimen match scipy, closed forms and the laws of mechanics."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ PERIODIC = Harmonic(130.0, 20e-6)
 
 
 def energy(specimen, state):
-    """Kinetic, elastic and contact energy [J], the base at rest."""
+    """Return kinetic plus elastic plus contact energy [J] with the base at rest."""
     x, y, z, vx, vy, vz = state.T
     m0, m1, m2 = specimen.masses
     k0, k1, k2 = specimen.stiffnesses

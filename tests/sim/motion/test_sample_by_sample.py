@@ -1,4 +1,4 @@
-"""Following a base sample by sample is the same motion as integrating it."""
+"""Following a sampled base motion sample by sample equals its integration."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from vibench.sim import Accuracy, Sampled, follow_samples, gong2025, integrate
 RATE_HZ = 51_200.0
 
 
-def shaken_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
+def ramped_sine_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
     time_s = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
     ramp = np.clip(time_s / 0.02, 0.0, 1.0)
     return Sampled(amplitude_m * ramp**3 * np.sin(2 * np.pi * frequency_hz * time_s), RATE_HZ)
@@ -16,20 +16,20 @@ def shaken_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
 
 @pytest.mark.parametrize("amplitude_m", [0.0, 1e-7, 2e-6, 2e-5])
 def test_following_a_base_sample_by_sample_equals_integration(amplitude_m):
-    drive = shaken_base(amplitude_m)
+    drive = ramped_sine_base(amplitude_m)
     followed = follow_samples(gong2025(), drive, Accuracy.REFERENCE)
     duration_s = (len(drive.displacement_m) - 1) / RATE_HZ
     whole = integrate(gong2025(), drive, duration_s, Accuracy.REFERENCE, sample_rate_hz=RATE_HZ)
     assert followed.states.shape == (followed.requested, 6)
     assert np.sum(followed.impacts) == whole.impacts.count
-    # Both cut intervals alike but join the pieces in another order; chaos magnifies the rounding.
+    # Both use the same intervals with different rounding, which chaos amplifies.
     near = slice(0, 4000)
     scale = np.array([1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1])
     np.testing.assert_allclose(followed.states[near] / scale, whole.states[near] / scale, atol=1e-9)
 
 
 def test_impacts_are_counted_in_the_interval_in_which_they_begin():
-    drive = shaken_base(2e-6)
+    drive = ramped_sine_base(2e-6)
     followed = follow_samples(gong2025(), drive)
     whole = integrate(gong2025(), drive, (len(drive.displacement_m) - 1) / RATE_HZ)
     first = np.floor(whole.impacts.times_s[:10] * RATE_HZ).astype(int)
@@ -37,7 +37,7 @@ def test_impacts_are_counted_in_the_interval_in_which_they_begin():
 
 
 def test_continuing_from_a_state_equals_the_whole_run():
-    drive = shaken_base(2e-6, seconds=0.05)
+    drive = ramped_sine_base(2e-6, seconds=0.05)
     rest = Sampled(np.zeros(100), RATE_HZ)
     begun = follow_samples(gong2025(), drive)
     decayed = follow_samples(gong2025(), rest, initial_state=begun.states[-1])

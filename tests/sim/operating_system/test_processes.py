@@ -1,4 +1,4 @@
-"""A process is told by more than its number, wherever its start was written down."""
+"""A process is identified by its number and start time, also across containers and computers."""
 
 import os
 import sys

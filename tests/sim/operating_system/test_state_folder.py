@@ -1,4 +1,4 @@
-"""Where state is kept on each system, and how to have it elsewhere."""
+"""The folder for state on each operating system, and the environment variable that changes it."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ from vibench.sim.operating_system import this as _state_folder
 from vibench.sim.operating_system.this import state_folder
 
 
-def test_the_environment_variable_takes_precedence(monkeypatch, tmp_path):
+def test_the_environment_variable_for_the_state_folder_takes_precedence(monkeypatch, tmp_path):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     assert state_folder() == tmp_path
 

@@ -17,19 +17,19 @@ ENOUGH, STEPS = BalanceOptions(), ArcSteps()
 
 
 def oscillator(damping, stiffness=1.0):
-    """x'' + damping x' + stiffness x + F = U."""
+    """Return the oscillator x'' + damping x' + stiffness x + F = U."""
     return LinearStructure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
 
 
 def along_frequency(structure, spring, start, other_hz, options, steps=STEPS):
-    """The branch from where a balance is to another frequency."""
+    """Return the branch from the frequency of a balance to another frequency."""
     ends = sorted((start.frequency_hz, other_hz))
     path = FrequencyPath((start.amplitude_m,))
     return balance_branch_within(structure, spring, start, path, *ends, options, steps)
 
 
-def raised(structure, spring, frequency_hz, weak_m, strong_m, options=ENOUGH, steps=STEPS):
-    """The branch along the level of the drive, from one that hardly bends the response."""
+def level_branch(structure, spring, frequency_hz, weak_m, strong_m, options=ENOUGH, steps=STEPS):
+    """Return the branch over the drive level, from a weak level with nearly linear response."""
     start = balance(structure, spring, frequency_hz, weak_m, options)
     path = AmplitudePath(frequency_hz)
     return balance_branch_within(structure, spring, start, path, weak_m, strong_m, options, steps)
@@ -51,7 +51,7 @@ def test_a_first_order_branch_folds_at_the_closed_form_frequencies():
     assert len(folds) == 2
     for frequency in folds:
         omega = 2.0 * math.pi * frequency
-        # d/d(a^2) of a^2 ((1 - W^2 + 3/4 alpha a^2)^2 + (2 zeta W)^2) = 0, quadratic in a^2.
+        # At a fold d/d(a^2) of a^2 ((1 - W^2 + 3/4 alpha a^2)^2 + (2 zeta W)^2) is zero.
         detuning = 1.0 - omega**2
         squares = np.roots(
             [27.0 / 16.0 * alpha**2, 3.0 * alpha * detuning, detuning**2 + (2 * zeta * omega) ** 2]
@@ -89,34 +89,34 @@ def test_a_linear_branch_has_no_events_and_reaches_its_end():
 
 
 def test_a_harmonic_balance_without_convergence_is_reported_as_such():
-    # Chaos at 260 Hz and 5 um, with no more than 31 harmonics: whatever is found is not called a solution.
+    # The motion at 260 Hz and 5 um is chaotic, so 31 harmonics cannot converge.
     structure, spring = structure_of(gong2025()), spring_of(gong2025())
     found = balance(structure, spring, 260.0, 5e-6, BalanceOptions(fewest=15, most=31))
     assert found.outcome is not BalanceEnd.CONVERGED
 
 
-def test_a_branch_over_amplitude_grazes_where_linear_p_equals_the_gap():
+def test_a_branch_over_amplitude_grazes_where_the_linear_motion_equals_the_gap():
     specimen = gong2025(damping_time_s=3e-5)
     structure, spring = structure_of(specimen), spring_of(specimen)
     options, steps = BalanceOptions(fewest=15, most=15), ArcSteps(most_points=230)
-    branch = raised(structure, spring, 100.0, 0.5e-6, 5e-6, options, steps)
+    branch = level_branch(structure, spring, 100.0, 0.5e-6, 5e-6, options, steps)
     linear = balance(structure, LINEAR, 100.0, 1e-6)
     assert branch.events[0].kind is BifurcationKind.GRAZING
     assert branch.events[0].amplitude_m == pytest.approx(45e-6 / linear.response_ii[3], rel=1e-6)
-    # Near a resonance a stop stiffens the motion away from it: the branch turns back at once.
+    # Contact stiffens the specimen away from its resonance, so the branch folds at once.
     assert branch.events[1].kind is BifurcationKind.FOLD
 
 
 def test_a_branch_over_amplitude_reaches_a_strongly_nonlinear_motion():
     structure, spring = oscillator(0.1), PowerSpring(1.0, ((3, 1.0),))
-    branch = raised(structure, spring, 2.0 / (2 * math.pi), 0.1, 5.0)
+    branch = level_branch(structure, spring, 2.0 / (2 * math.pi), 0.1, 5.0)
     assert branch.end is ArcEnd.REACHED_BOUND
     assert branch.amplitudes_m[-1] == pytest.approx(5.0)
     assert periodic_defect(0.1, 1.0, branch.states[-1], 2.0, 5.0) < 1e-3
 
 
 def periodic_defect(damping, cubic, start, omega, force):
-    """How far one period of an independent integration takes the motion from where it began."""
+    """Return the distance between the states before and after one period, integrated by scipy."""
 
     def rates(time, state):
         x, v = state
@@ -127,10 +127,10 @@ def periodic_defect(damping, cubic, start, omega, force):
 
 
 def test_a_duffing_branch_changes_stability_where_its_symmetry_breaks():
-    # x-double-dot + 0.2 x-dot + x^3 = B sin t with B from 0 to 6.
+    # Oscillator: x'' + 0.2 x' + x^3 = B sin t, with B up to 6.
     structure, spring = oscillator(0.2, 1e-9), PowerSpring(1.0, ((3, 1.0),))
     options = BalanceOptions(fewest=15, tolerance=1e-8)
-    branch = raised(structure, spring, 1.0 / (2 * math.pi), 0.1, 6.0, options, ArcSteps(longest=0.1))
+    branch = level_branch(structure, spring, 1.0 / (2 * math.pi), 0.1, 6.0, options, ArcSteps(longest=0.1))
     broken = [event for event in branch.events if event.kind is BifurcationKind.SYMMETRY_BREAKING]
     assert broken
     before = branch.multipliers[broken[0].index, :2]

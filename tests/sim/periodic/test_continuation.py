@@ -7,7 +7,7 @@ from vibench.sim.periodic.continuation import ArcEnd, ArcSteps, trace
 
 
 class Circle:
-    """u^2 + lambda^2 = 1."""
+    """The circle u^2 + lambda^2 = 1."""
 
     def linearised(self, point):
         u, parameter = point
@@ -15,7 +15,7 @@ class Circle:
 
 
 class Snap:
-    """lambda = u^3 - u: folds at u = -+1/sqrt(3), lambda = +-2/(3 sqrt(3))."""
+    """The curve lambda = u^3 - u, with folds at u = -+1/sqrt(3), lambda = +-2/(3 sqrt(3))."""
 
     def linearised(self, point):
         u, parameter = point
@@ -23,7 +23,7 @@ class Snap:
 
 
 class Kink:
-    """lambda = -|u|: turns back at u = 0 in no distance at all."""
+    """The curve lambda = -|u|, which turns back in a kink at u = 0."""
 
     def linearised(self, point):
         u, parameter = point
@@ -31,7 +31,7 @@ class Kink:
 
 
 class LoopBesideALine:
-    """A flat ellipse, whose ends turn sharply, and a straight branch next to it."""
+    """A flat ellipse with sharp folds at its ends, and a straight branch next to it."""
 
     def linearised(self, point):
         u, parameter = point
@@ -41,7 +41,7 @@ class LoopBesideALine:
 
 
 class Edge:
-    """lambda = u, defined up to u = 1/2 only."""
+    """The line lambda = u, defined up to u = 1/2 only."""
 
     def linearised(self, point):
         u, parameter = point
@@ -49,7 +49,7 @@ class Edge:
 
 
 class Sawtooth:
-    """u = 0 up to lambda = 0, then teeth that are too near for a step and too far for a leap to miss."""
+    """The line u = 0 up to lambda = 0, then teeth narrower than a step of the continuation."""
 
     def linearised(self, point):
         u, parameter = point

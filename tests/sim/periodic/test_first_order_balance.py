@@ -12,7 +12,7 @@ FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 
 
 def duffing(damping_ratio):
-    """x'' + 2 zeta x' + x = U - F, one mass."""
+    """Return the one-mass oscillator x'' + 2 zeta x' + x = U - F."""
     one = np.array([[1.0]])
     return LinearStructure(one, 2.0 * damping_ratio * one, one, np.ones(1), np.ones(1), np.zeros(1))
 
@@ -32,7 +32,7 @@ def test_first_order_balance_refuses_an_even_power():
 @pytest.mark.parametrize("amplitude_m", [1e-6, 5e-6, 50e-6])
 def test_every_first_order_state_satisfies_equation_5_of_the_paper(frequency_hz, amplitude_m):
     specimen, omega = gong2025(), 2.0 * math.pi * frequency_hz
-    # The paper's equation 5 in its coordinates (x, p, z), with displacements A cos + B sin.
+    # Equation 5 of the paper in coordinates (x, p, z), with displacements A cos + B sin.
     m0, m1, m2 = specimen.masses
     k0, k1, k2 = specimen.stiffnesses
     c0, c1, c2 = specimen.dampings
@@ -66,7 +66,7 @@ def test_a_weak_drive_gives_the_linear_response(exponent):
 
 @pytest.mark.parametrize("exponent", [3, 5, 29, 201])
 def test_a_huge_drive_gives_the_response_of_the_joined_masses(exponent):
-    # p grows only as the n-th root of the force, so x approaches that of the two-mass specimen.
+    # p grows as the n-th root of the force, so x approaches the response of the joined masses.
     specimen, spring = gong2025(), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
     states = first_order_states(structure_of(specimen), spring, 300.0, 10.0)
     join = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
@@ -86,7 +86,7 @@ def test_the_duffing_resonance_lies_on_its_backbone():
     states = first_order_states(
         duffing(zeta), PowerSpring(1.0, ((3, alpha),)), omega / (2 * math.pi), 2 * zeta * omega * amplitude
     )
-    assert states[-1].relative == pytest.approx(-amplitude, rel=1e-12)  # sin drive, then a quarter turn
+    assert states[-1].relative == pytest.approx(-amplitude, rel=1e-12)  # quarter period behind the sine drive
 
 
 def test_slopes_of_the_condensed_model_match_differences_over_frequency():

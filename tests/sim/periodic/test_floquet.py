@@ -51,7 +51,7 @@ def test_perturbations_match_an_independent_integrator(spring):
         system = np.array([[0.0, 1.0], [-stiff, -0.05]])
         return (system @ flat.reshape(2, 2)).ravel()
 
-    # In stretches between the stops' crossings, where the stiffness jumps.
+    # Integrate between contact begins and ends, where the stiffness jumps.
     edges = [0.0, *crossings(spring, motion, 2.0 * math.pi), 2.0 * math.pi]
     state = np.eye(2).ravel()
     for start, stop in pairwise(edges):
@@ -60,7 +60,7 @@ def test_perturbations_match_an_independent_integrator(spring):
     np.testing.assert_allclose(transition(structure, spring, motion), state.reshape(2, 2), atol=5e-6)
 
 
-def test_the_transition_over_a_mirrored_period_is_its_half_period_squared():
+def test_the_transition_over_a_mirrored_period_is_the_square_over_half_a_period():
     structure, spring = oscillator(), PowerSpring(0.5, ((5, 0.4),))
     motion = Motion(0.2, np.array([1, 3]), np.array([1.0 - 0.2j, 0.1j]))
     half = transition(structure, spring, motion, math.pi)
@@ -68,7 +68,7 @@ def test_the_transition_over_a_mirrored_period_is_its_half_period_squared():
 
 
 def test_the_volume_of_perturbations_shrinks_by_damping_only():
-    # Liouville: det = exp(-tr(M^-1 C) T), whatever the contact does.
+    # Liouville: det = exp(-tr(M^-1 C) T), independent of the contact.
     specimen = gong2025(damping_time_s=3e-5)
     motion = Motion(130.0, np.array([1, 3]), np.array([50e-6 + 0j, 5e-6j]))
     monodromy = transition(structure_of(specimen), spring_of(specimen), motion)

@@ -33,7 +33,7 @@ SAMPLES = 16384
 
 @pytest.fixture(scope="module", params=[(100.0, 5e-6), (130.0, 20e-6)])
 def exact_orbit(request):
-    """A periodic impacting motion of the exact engine: specimen, drive, harmonics of x and of p."""
+    """A periodic motion with impacts by integration: specimen, drive, harmonics of x and p."""
     frequency, amplitude = request.param
     specimen, drive = gong2025(damping_time_s=3e-5), Harmonic(frequency, amplitude)
     settled = integrate(specimen, drive, SETTLED_S, Accuracy.REFERENCE)
@@ -51,7 +51,7 @@ def exact_orbit(request):
     return specimen, drive, phasors_of(x), phasors_of(p)
 
 
-def balanced(orbit, highest):
+def balance_of(orbit, highest):
     specimen, drive, _, p = orbit
     options = BalanceOptions(fewest=highest, most=highest)
     start = Guess(np.arange(2000), p[:2000])
@@ -63,24 +63,24 @@ def balanced(orbit, highest):
 @pytest.mark.parametrize(("highest", "error"), [(101, 3e-4), (201, 2e-5), (401, 3e-6)])
 def test_harmonic_balance_of_contact_converges_to_the_exact_orbit(exact_orbit, highest, error):
     _, drive, x, p = exact_orbit
-    found = balanced(exact_orbit, highest)
+    found = balance_of(exact_orbit, highest)
     assert found.outcome is not BalanceEnd.NO_SOLUTION
     assert found.response_ii[0] == pytest.approx(abs(x[1]) / drive.amplitude_m, rel=error)
-    # The estimate of its own error neither hides the true one nor exaggerates it by orders.
+    # The estimated error is within a factor of 10 below and 100 above the true error.
     true_error = abs(found.response_ii[3] * drive.amplitude_m / abs(p[1]) - 1.0)
     assert 0.1 * true_error < found.left_out < 100.0 * true_error
 
 
 def test_the_largest_displacement_matches_the_exact_orbit(exact_orbit):
     _, drive, _, p = exact_orbit
-    found = balanced(exact_orbit, 401)
+    found = balance_of(exact_orbit, 401)
     largest = np.abs(waveform(p, np.arange(len(p)), SAMPLES)).max()
     assert found.response_i[3] == pytest.approx(largest / drive.amplitude_m, rel=1e-5)
 
 
 def test_drive_power_equals_damping_power(exact_orbit):
     specimen, drive, _, _ = exact_orbit
-    found = balanced(exact_orbit, 401)
+    found = balance_of(exact_orbit, 401)
     omega = 2.0 * math.pi * drive.frequency_hz
     base = np.where(found.harmonics == 1, -1j * drive.amplitude_m, 0.0)
     x, y, z = found.displacements.T
@@ -91,16 +91,16 @@ def test_drive_power_equals_damping_power(exact_orbit):
     )
     k0, c0 = specimen.stiffnesses[0], specimen.dampings[0]
     given = 0.5 * np.sum(((k0 + 1j * speed * c0) * (base - x) * np.conj(1j * speed * base)).real)
-    # The stops give back what they take, up to the quadrature of their force.
+    # The stops are elastic, up to the quadrature of their force.
     assert given == pytest.approx(taken, rel=5e-4)
 
 
 def test_too_few_harmonics_are_reported(exact_orbit):
-    few = balanced(exact_orbit, 21)
+    few = balance_of(exact_orbit, 21)
     assert few.outcome is BalanceEnd.NO_SOLUTION
-    more = balanced(exact_orbit, 101)
+    more = balance_of(exact_orbit, 101)
     assert more.outcome is BalanceEnd.TOO_FEW_HARMONICS
-    assert balanced(exact_orbit, 401).outcome is BalanceEnd.CONVERGED
+    assert balance_of(exact_orbit, 401).outcome is BalanceEnd.CONVERGED
 
 
 @pytest.mark.parametrize("kept", list(HarmonicSet))
@@ -174,7 +174,7 @@ def test_odd_harmonics_are_refused_for_unequal_stops():
 
 
 def two_masses(damping_time):
-    """Two unit masses and springs, the first free: a spring force on the second, which is also driven."""
+    """Return two unit masses on springs; the second has the nonlinear spring force and the drive."""
     stiffness = np.array([[1.0, -1.0], [-1.0, 2.0]])
     push = np.array([0.0, 1.0])
     return LinearStructure(np.eye(2), damping_time * stiffness, stiffness, push, push, np.zeros(2))

@@ -21,28 +21,28 @@ STEPS = ArcSteps(first=0.02, longest=0.3, shortest=1e-7, tolerance=1e-9, most_po
 
 
 @pytest.fixture(scope="module")
-def upward():
-    """The mirrored motion at 100 Hz and 5 um, followed up to 112 Hz."""
+def upward_branch():
+    """The branch of the mirrored motion at 5 um from 100 to 112 Hz."""
     orbit = periodic_orbit(SPECIMEN, Harmonic(100.0, 5e-6), OrbitShape.MIRRORED)
     return periodic_branch(orbit, Parameter.FREQUENCY, 112.0, STEPS)
 
 
-def test_a_branch_of_orbits_ends_at_the_requested_value(upward):
-    assert upward.end is ArcEnd.REACHED_BOUND
-    assert upward.frequencies_hz[[0, -1]] == pytest.approx([100.0, 112.0])
-    assert upward.response_ii.shape == (len(upward.frequencies_hz), 4)
+def test_a_branch_of_orbits_ends_at_the_requested_value(upward_branch):
+    assert upward_branch.end is ArcEnd.REACHED_BOUND
+    assert upward_branch.frequencies_hz[[0, -1]] == pytest.approx([100.0, 112.0])
+    assert upward_branch.response_ii.shape == (len(upward_branch.frequencies_hz), 4)
 
 
 def test_a_symmetric_branch_does_not_end_at_its_mirror_image():
-    """What lies between it and its mirror image is rounding, whose sign says nothing."""
+    """An orbit and its mirror image differ by rounding only, whose sign has no meaning."""
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
     branch = periodic_branch(orbit, Parameter.FREQUENCY, 130.2)
     assert branch.end is ArcEnd.REACHED_BOUND
     assert branch.events == ()
 
 
-def test_a_complex_pair_is_on_the_unit_circle_at_a_neimark_sacker_point(upward):
-    points = [event for event in upward.events if event.kind is BifurcationKind.NEIMARK_SACKER]
+def test_a_complex_pair_is_on_the_unit_circle_at_a_neimark_sacker_point(upward_branch):
+    points = [event for event in upward_branch.events if event.kind is BifurcationKind.NEIMARK_SACKER]
     assert points
     for event in points:
         orbit = periodic_orbit(SPECIMEN, Harmonic(event.frequency_hz, 5e-6), start=event.state)
@@ -51,11 +51,11 @@ def test_a_complex_pair_is_on_the_unit_circle_at_a_neimark_sacker_point(upward):
         assert np.abs(orbit.floquet_multipliers[on_circle].imag).min() > 0.1
 
 
-def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward):
+def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward_branch):
     for is_stable in (True, False):
-        place = int(np.flatnonzero(upward.is_stable == is_stable)[-1])
-        drive = Harmonic(float(upward.frequencies_hz[place]), 5e-6)
-        start, scales = upward.states[place], state_scales(SPECIMEN, drive)
+        place = int(np.flatnonzero(upward_branch.is_stable == is_stable)[-1])
+        drive = Harmonic(float(upward_branch.frequencies_hz[place]), 5e-6)
+        start, scales = upward_branch.states[place], state_scales(SPECIMEN, drive)
         push = 1e-7 * scales
         periods = 60 / drive.frequency_hz
         ends = [
@@ -63,13 +63,13 @@ def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward):
             for s in (start, start + push)
         ]
         growth = np.abs((ends[1] - ends[0]) / scales).max() / 1e-7
-        expected = abs(upward.multipliers[place, 0]) ** 60
+        expected = abs(upward_branch.multipliers[place, 0]) ** 60
         assert (growth < 1.0) == is_stable
         assert 0.01 * expected < growth < 100.0 * expected
 
 
 def test_a_branch_leaves_the_stops_at_linear_grazing():
-    # Under a weak drive at 60 Hz, raised until p meets the gap.
+    # A weak drive at 60 Hz is raised until p reaches the gap.
     gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])
     orbit = periodic_orbit(SPECIMEN, Harmonic(60.0, 0.9 * gap_amplitude), OrbitShape.MIRRORED)
     branch = periodic_branch(
@@ -83,7 +83,7 @@ def test_a_branch_leaves_the_stops_at_linear_grazing():
 
 @pytest.mark.thorough
 def test_an_isolated_branch_closes_beside_another_branch():
-    """At 94.188 Hz, where it turns back, the motion of one period lies beside it along the same tangent."""
+    """At its fold at 94.188 Hz the branch of period one is near and has the same tangent."""
     start = [9.918125e-07, -1.045327e-05, -2.993997e-06, 7.055605e-03, 2.760657e-02, 1.403336e-02]
     orbit = periodic_orbit(gong2025(), Harmonic(96.0, 5e-6), OrbitShape.MIRRORED, 3, start)
     branch = periodic_branch_within(orbit, FrequencyPath((5e-6,)), 88.0, 100.0)

@@ -1,4 +1,4 @@
-"""The period map's derivative: exact, against differences of the map, up to a grazing contact."""
+"""The derivative of the period map matches differences, and closed forms near grazing."""
 
 import math
 
@@ -15,7 +15,7 @@ OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0,
 
 
 def by_differences(mapping, state, drive, step=1e-5):
-    """Fourth-order central differences of the map, over the state's scales."""
+    """Return the scaled derivative of the map by fourth-order central differences."""
     scales = state_scales(mapping.specimen, drive)
     columns = []
     for push in np.diag(step * scales):
@@ -45,7 +45,7 @@ def test_the_derivative_over_two_periods_is_the_product_of_single_ones():
 
 @pytest.mark.parametrize(("contact", "power"), [("hertz", 1.0), ("linear_gap", 0.5)])
 def test_the_map_derivative_past_grazing_changes_with_the_power_of_the_law(contact, power):
-    # The contact lasts as the square root of its depth d; its stiffness is d^0.5 (Hertz) or constant.
+    # The duration of a contact of depth d is as d^0.5, its stiffness as d^0.5 (Hertz) or constant.
     specimen = gong2025(contact=contact)
     motion = base_transmissibility(specimen, DRIVE.frequency_hz)[0]
     grazing = specimen.gap_m / abs(motion[3])

@@ -1,4 +1,4 @@
-"""A phase resonance along the level: against the motion itself, and against the motion without contacts."""
+"""Phase resonance branches over the drive level match integrated motions and linear quadrature."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from vibench.sim.specimen.modes import base_transmissibility
 
 
 def hardening():
-    """The paper's specimen with k3 p^3 in the place of stops, a tenth of k1 p at 100 um."""
+    """Return the paper's specimen with a force k3 p^3 instead of stops, 10 % of k1 p at 100 um."""
     specimen = gong2025()
     return replace(specimen, contact=PowerLaw(100e-6, ((3, 0.1 * specimen.stiffnesses[1] * 100e-6),)))
 
@@ -47,7 +47,7 @@ def test_a_hardening_mode_is_periodic_with_90_degrees_lag():
         run = integrate(specimen, drive, period_s, "reference", branch.states[k], 512 * drive.frequency_hz)
         assert np.abs(run.final_state[:3] - branch.states[k, :3]).max() < 1e-12
         against = run.states[:512, 0] - drive.amplitude_m * np.sin(2 * np.pi * np.arange(512) / 512)
-        # Of a motion -cos, a quarter of a period behind the sine of the base, the coefficient is negative.
+        # A motion -cos lags the base sine by a quarter period; its cosine coefficient is negative.
         coefficient = 2 * np.mean(against * np.exp(-2j * np.pi * np.arange(512) / 512))
         assert coefficient.real < 0
         assert abs(coefficient.imag) < 1e-6 * abs(coefficient.real)
@@ -61,14 +61,14 @@ def test_a_hardening_mode_is_periodic_with_90_degrees_lag():
         ((92.0, 97.0), (2e-7, 1e-7), "ascending"),
     ],
 )
-def test_a_start_without_phase_resonance_is_refused(band_hz, levels_m, said):
+def test_a_band_without_phase_resonance_is_refused(band_hz, levels_m, said):
     with pytest.raises(ValueError, match=said):
         phase_resonance_branch(gong2025(), band_hz, levels_m)
 
 
 @pytest.mark.parametrize("low_m", [0.1e-6, 0.3e-6])
 def test_a_failed_newton_iteration_is_refused(low_m):
-    """Its last guess was a "motion" at 17 Hz in a band of 92 to 97."""
+    """Its last iterate at 17 Hz was once returned as a motion in a band of 92 to 97 Hz."""
     with pytest.raises(ValueError, match="No motion with this phase is found"):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))
 

@@ -27,7 +27,7 @@ def test_the_known_periodic_state_is_found(shape):
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(100.0, 5e-6), (130.0, 20e-6)])
 def test_the_product_of_multipliers_follows_from_damping(frequency_hz, amplitude_m):
-    # Liouville's theorem: the contact, which has no loss, cannot change the volume.
+    # Liouville's theorem: an elastic contact does not change the phase-space volume.
     orbit = periodic_orbit(SPECIMEN, Harmonic(frequency_hz, amplitude_m), OrbitShape.MIRRORED)
     product = np.prod(orbit.floquet_multipliers)
     assert np.log(product).real == pytest.approx(-TRACE / frequency_hz, rel=1e-6)
@@ -63,7 +63,7 @@ def test_the_map_slopes_match_a_linear_flow():
     ]
     derivative = mapping.derivative(np.zeros(6), drive)
     np.testing.assert_allclose(derivative, np.array(columns).T, atol=1e-9)
-    # From rest the response is proportional to the drive: d image / d ln A0 is the image itself.
+    # From rest the image is proportional to A0, so d image / d ln A0 equals the image.
     slope = mapping.amplitude_slope(np.zeros(6), drive)
     np.testing.assert_allclose(slope, origin / scales, atol=1e-9 * np.abs(origin / scales).max())
 

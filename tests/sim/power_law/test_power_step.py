@@ -1,4 +1,4 @@
-"""The long steps of a power law: against linear motion, and what is seen within them."""
+"""Long steps of a power law match linear motion and keep their accuracy with soft springs."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ def test_a_negligible_law_gives_the_linear_motion():
 
 
 def test_very_soft_springs_do_not_reduce_accuracy():
-    # m1 and m2 on next to nothing: the modes turn a million times more slowly than the law does.
+    # m1 and m2 have very soft springs: their modes are a million times slower than the power law.
     soft = replace(
         gong2025(damping_time_s=0.0), stiffnesses=(1e-6, 1e-6, 1e-6), contact=PowerLaw(46e-6, ((3, 5.0),))
     )

@@ -1,4 +1,4 @@
-"""Rigid stops in time: closed forms of bouncing and sticking, mechanics, an event-driven oracle."""
+"""Runs with rigid stops match closed forms of bouncing and sticking and an event-driven integrator."""
 
 import math
 from dataclasses import replace
@@ -40,10 +40,10 @@ def relative(states):
 
 
 class Oracle:
-    """The equations as written, by scipy's DOP853 with events, restarted at every impact and release."""
+    """Reference solution by scipy's DOP853 with events, restarted at every impact and release."""
 
     CHATTER_ENDS = 2e-18
-    """Height of a bounce [m]: forty roundings of y and z. What flies lower is missed, or not."""
+    """Lowest resolved bounce height [m]: forty rounding errors of y and z."""
 
     def __init__(self, specimen, drive):
         self.s, self.drive, self.rho = specimen, drive, specimen.contact.restitution
@@ -73,7 +73,7 @@ class Oracle:
         t, state, self.side = 0.0, np.array(start, dtype=float), 0.0
         step = 1e-4
         while t < duration_s:
-            # The flight after a bounce is short, and over within a few of its steps.
+            # The flight after a bounce is short, so its steps must be short too.
             until_s = min(t + 50.0 * step, duration_s)
             if self.side:
                 events = [lambda t, s: -self.press(s, self.side)]
@@ -126,14 +126,14 @@ def test_rigid_stop_motion_agrees_with_an_event_driven_integrator(restitution, d
     ours = integrate(specimen, drive, 0.02, Accuracy.REFERENCE)
     assert ours.outcome is Outcome.REACHED_END
     assert ours.impacts.count > 5
-    # Where chatter is cut off is each one's own choice.
+    # The two integrators end chatter at different bounces, so only nearest impacts are compared.
     nearest = np.abs(ours.impacts.times_s[:, None] - np.asarray(oracle.times)).min(axis=1)
     assert nearest.max() < 1e-9
     assert distance(ours.final_state, theirs) < 1e-9
 
 
-def accelerated(restitution):
-    """A light m1 in a heavy frame whose base is pulled away evenly: for m1 the frame has gravity."""
+def falling_ball(restitution):
+    """Return a light m1 in a heavy, constantly accelerated frame, in which m1 feels gravity."""
     specimen = Specimen(
         masses=(1.0, 1e-13, 1.0),
         stiffnesses=(1e5, 1e-18, 1e5),
@@ -149,15 +149,15 @@ def accelerated(restitution):
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8, 0.95, 1.0])
-def test_a_bouncing_ball_strikes_at_the_times_of_its_closed_form_and_comes_to_rest(restitution):
-    specimen, base, gravity, start = accelerated(restitution)
+def test_a_bouncing_ball_impacts_at_the_closed_form_times_and_comes_to_rest(restitution):
+    specimen, base, gravity, start = falling_ball(restitution)
     run = integrate(specimen, base, 0.38, Accuracy.REFERENCE, start, sample_rate_hz=1e3)
     times = run.impacts.times_s
     falls = math.sqrt(2.0 * specimen.gap_m / gravity)
     hops = 2.0 * falls * restitution ** np.arange(1, len(times))
     assert run.outcome is Outcome.REACHED_END
     expected = falls + np.concatenate([[0.0], np.cumsum(hops)])
-    # A gap of 1e-12 of the whole, and the rounding of where the frame has got to, count as closed.
+    # The tolerance covers a residual gap of 1e-12 and the rounding of the frame position.
     speeds = gravity * falls * restitution ** np.arange(len(times))
     assert np.all(np.abs(times - expected) < 1e-9 + 4e-15 / speeds)
     p, rate = relative(run.states)
@@ -170,12 +170,12 @@ def test_a_bouncing_ball_strikes_at_the_times_of_its_closed_form_and_comes_to_re
     assert np.all(rate[held] == 0.0)
     if rests < 0.38:
         assert held.sum() > 1
-        # What is left out of the infinite series is a part in 10^5 of the first speed at most.
+        # The infinite series of bounces is cut off at 1e-5 of the first speed.
         assert times[-1] > rests - 1e-5 * falls / (1.0 - restitution)
 
 
 def held_stretch(run, gap_m):
-    """First and last sample of the longest stretch in which m1 is held, first and last as indices."""
+    """Return first and last index of the longest interval in which m1 stays on a stop."""
     p, rate = relative(run.states)
     held = (np.abs(np.abs(p) - gap_m) < 1e-15) & (rate == 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]])))
@@ -185,7 +185,7 @@ def held_stretch(run, gap_m):
 
 
 def bound_motion(specimen, drive, state, begin_s, end_s):
-    """x, z, vx, vz of the two bodies, by the matrix exponential of motion and drive together."""
+    """Return x, z, vx, vz of m0 and the joined m1 and m2, by an augmented matrix exponential."""
     (m0, m1, m2), (k0, _, k2), (c0, _, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
     omega, pair = 2.0 * math.pi * drive.frequency_hz, m1 + m2
     system = np.zeros((6, 6))
@@ -222,7 +222,7 @@ def test_m1_is_released_when_the_contact_force_vanishes():
 
 
 def bound_response(specimen, frequency_hz):
-    """abs(x) over the base displacement with m1 and m2 as one body."""
+    """Return abs(x / U) with m1 and m2 as one body."""
     (m0, m1, m2), (k0, _, k2), (c0, _, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
     s = 2j * math.pi * frequency_hz
     link = k2 + c2 * s
@@ -249,7 +249,7 @@ def test_stiff_contacts_converge_to_rigid_stops_as_their_contact_time():
         run = integrate(specimen, BOUNCING, 0.01, Accuracy.REFERENCE)
         assert run.impacts.count == rigid_end.impacts.count == 3
         errors.append(distance(run.final_state, rigid_end.final_state))
-    # A Hertz contact lasts as long as stiffness^(-2/5).
+    # The duration of a Hertz contact is proportional to stiffness^(-2/5).
     rates = -np.diff(np.log10(errors)) / 2.0
     assert errors[-1] < 1e-4
     np.testing.assert_allclose(rates, 0.4, atol=0.03)
@@ -259,7 +259,7 @@ def test_stiff_contacts_converge_to_rigid_stops_as_their_contact_time():
 def test_a_stiff_lossy_contact_matches_a_rigid_stop_with_its_restitution(loss):
     speed, faint = 0.3, (1e-2, 2e-2, 3e-2)
     specimen = Specimen((1.0, 2.1e-3, 2.0e-3), faint, (0.0, 0.0, 0.0), 45e-6, HuntCrossley(1e17, loss))
-    # r - ln(1 + loss r) / loss changes by as much on the way out as on the way in (Newton's iteration).
+    # r - ln(1 + loss r) / loss changes equally during approach and rebound (solved by Newton).
     held = loss * speed - math.log1p(loss * speed)
     after = speed
     for _ in range(60):
@@ -269,18 +269,18 @@ def test_a_stiff_lossy_contact_matches_a_rigid_stop_with_its_restitution(loss):
     soft_run, hard_run = (integrate(one, STILL, 1e-4, Accuracy.REFERENCE, start) for one in (specimen, hard))
     assert soft_run.impacts.count == hard_run.impacts.count == 1
     np.testing.assert_allclose(soft_run.final_state[4:], hard_run.final_state[4:], atol=1e-6 * speed)
-    # In the meantime the soft contact lasts a microsecond.
+    # The tolerance covers the 1 us duration of the soft contact.
     assert np.abs(soft_run.final_state[:3] - hard_run.final_state[:3]).max() < 1e-6 * speed
 
 
 def hard_oscillator(omega, restitution):
-    """x'' + x = cos(omega t), x <= 0: m1 on its spring, beside a frame 1e12 times as heavy; and its start."""
+    """Return x'' + x = cos(omega t), x <= 0, as m1 in a frame 1e12 times as heavy; drive and start."""
     specimen = Specimen(
         (1.0, 1e-12, 1.0), (80.0, 1e-12, 50.0), (0.0,) * 3, 1e-13, RigidStops(restitution), math.inf
     )
     s2 = omega**2
     z_per_base = 80.0 * 50.0 / ((80.0 + 50.0 - s2) * (50.0 - s2) - 50.0**2)
-    # z = Z sin(omega t + phase), -z'' = omega^2 Z sin: a cosine of unit size at phase pi/2.
+    # z = Z sin(omega t + phase): -z'' = omega^2 Z sin(...) is cos(omega t) at phase pi/2.
     z = 1.0 / s2
     drive = Harmonic(
         omega / (2.0 * math.pi), abs(z / z_per_base), math.pi / 2 if z_per_base > 0 else -math.pi / 2
@@ -290,7 +290,7 @@ def hard_oscillator(omega, restitution):
 
 
 def hard_impact_times(omega, restitution, duration):
-    """Impacts of the same, from its sine and cosine: looked for on a grid, refined by bisection."""
+    """Return the impact times of this oscillator in closed form, bracketed on a grid and bisected."""
     t, x, v, times = 0.0, -0.05, 0.0, []
     gain = 1.0 / (1.0 - omega**2)
     while True:
@@ -327,11 +327,11 @@ def test_the_hard_impact_oscillator_has_the_known_impact_rate_in_chaos():
     specimen, drive, start = hard_oscillator(2.8, 0.8)
     run = integrate(specimen, drive, 20_000.0, initial_state=start)
     assert run.outcome is Outcome.REACHED_END
-    # 0.4711 per unit of time: a separate program's closed-form flow over 1e6.
+    # Reference: 0.4711 per unit of time, by a separate program over 1e6 units.
     assert run.impacts.count / 20_000.0 == pytest.approx(0.4711, abs=0.002)
 
 
-def test_accuracy_has_no_effect_without_chatter():
+def test_the_accuracy_level_has_no_effect_without_chatter():
     finals = [integrate(rigid(0.8), BOUNCING, 2.0, level).final_state for level in Accuracy]
     np.testing.assert_array_equal(finals[0], finals[2])
     np.testing.assert_array_equal(finals[1], finals[2])

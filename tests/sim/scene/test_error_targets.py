@@ -1,4 +1,4 @@
-"""A sample of the campaign on requested errors: `benchmarks/error_targets.py` has the whole."""
+"""Scenes with error targets: a sample of the campaign in `benchmarks/error_targets.py`."""
 
 import runpy
 import sys

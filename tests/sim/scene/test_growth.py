@@ -1,4 +1,4 @@
-"""How much a small change grows over a long time, in which it becomes larger than any number."""
+"""The growth of a perturbation over a long time is computed without overflow."""
 
 import numpy as np
 import pytest

@@ -31,7 +31,7 @@ def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
         if run >= 30:
             held.append(expected.time_s / expected.factor <= taken_s <= expected.time_s * expected.factor)
         ledger.learn(KIND, planned_s, taken_s)
-    # 19 of 20 are meant, more where the scatter is less than the least factor.
+    # The intended coverage is 95 %, higher if the scatter is below the smallest factor.
     assert np.mean(held) > 0.91
     assert np.mean(held) < 0.985 or scatter < 0.2
 
@@ -85,7 +85,7 @@ def test_invalid_times_are_not_learnt(ledger):
     assert ledger.expected(KIND, 1.0).runs == 0
 
 
-def test_unused_kinds_follow_a_slower_machine(ledger):
+def test_costs_of_unused_kinds_of_run_follow_a_slower_machine(ledger):
     random = np.random.default_rng(8)
     kinds = [f"method {number}/law" for number in range(6)]
     for run in range(60):

@@ -31,7 +31,7 @@ def test_a_transient_within_the_window_is_integrated():
         assert "has not decayed" in plan.explain()
 
 
-def test_a_contact_force_at_every_p_is_always_integrated():
+def test_a_contact_law_with_a_force_at_every_displacement_is_always_integrated():
     assert plan_scene(Scene(gong2025(contact="power:7"), QUIET)).method is Method.POLYNOMIAL
 
 

@@ -1,4 +1,4 @@
-"""The closed forms of quantiles agree with scipy.special."""
+"""Closed forms of quantiles agree with scipy.special."""
 
 import pytest
 from scipy.special import chdtri, ndtri, stdtrit

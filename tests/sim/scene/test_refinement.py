@@ -1,4 +1,4 @@
-"""Answers to a target: the requested error or time, with errors that hold."""
+"""Predictions with an error or time target reach it and have correct error bounds."""
 
 from dataclasses import replace
 
@@ -26,14 +26,14 @@ LAWS = ("hertz", "linear_gap", "power:3", "power:47", "rigid:0.8", "hunt_crossle
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
-def asked(contact="hertz", frequency_hz=130.0, amplitude_m=20e-6, damping_s=2e-5, **target):
+def target_scene(contact="hertz", frequency_hz=130.0, amplitude_m=20e-6, damping_s=2e-5, **target):
     return Scene(
         gong2025(damping_s, contact=contact), Harmonic(frequency_hz, amplitude_m), target=Target(**target)
     )
 
 
-def off(found, truth):
-    """How many stated errors each response is away from the truth."""
+def errors_off(found, truth):
+    """Return the deviation of each response from the truth, in units of its stated error."""
     answers, errors, true = (
         np.array([getattr(each, f"{name}{end}") for name in NAMES])
         for each, end in ((found, ""), (found, "_error"), (truth, ""))
@@ -44,8 +44,8 @@ def off(found, truth):
 
 @pytest.mark.parametrize("contact", LAWS)
 def test_a_periodic_motion_is_within_its_stated_error(contact):
-    scene = asked(contact, 100.0 if contact.startswith("power") else 130.0, 5e-6, error=1e-6)
-    scene = scene if contact.startswith("power") else asked(contact, error=1e-6)
+    scene = target_scene(contact, 100.0 if contact.startswith("power") else 130.0, 5e-6, error=1e-6)
+    scene = scene if contact.startswith("power") else target_scene(contact, error=1e-6)
     found = solve_scene(scene)
     truth = solve_scene(
         Scene(scene.specimen, scene.drive, accuracy=Accuracy.REFERENCE, duration=FixedDuration(30.0, 1.0))
@@ -54,28 +54,28 @@ def test_a_periodic_motion_is_within_its_stated_error(contact):
     assert found.period == truth.period
     assert found.target.is_met
     assert found.error_estimate < 1e-8
-    assert np.all(off(found, truth) <= 1.0)
+    assert np.all(errors_off(found, truth) <= 1.0)
 
 
-def test_a_small_error_costs_a_periodic_motion_no_more_than_a_large_one():
-    rough, fine = (solve_scene(asked(error=error)) for error in (1e-2, 1e-6))
+def test_a_periodic_motion_costs_the_same_for_a_small_and_a_large_error():
+    rough, fine = (solve_scene(target_scene(error=error)) for error in (1e-2, 1e-6))
     assert rough.response_i == fine.response_i
     assert rough.duration_s == fine.duration_s
 
 
 def test_a_mean_over_starts_reaches_one_percent():
-    found = solve_scene(asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
+    found = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
     assert found.memory is StartMemory.LOST
     assert found.target.is_met
     assert found.error_estimate <= 0.01
     assert found.target.starts > 8
     assert "mean of" in found.ended
-    again = solve_scene(asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
+    again = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
     assert again.response_ii == found.response_ii
 
 
 def test_the_error_of_a_mean_over_starts_includes_the_error_of_the_runs():
-    """The motion hardly depends on the start: its starts scatter by less than the tolerance of a run."""
+    """The responses from different initial states scatter by less than the tolerance of a run."""
     specimen = gong2025(8.1e-6, 5.965e-6, "power:3")
     drive = Harmonic(125.89780847473365, 2.120822403280049e-05)
     found = solve_scene(Scene(specimen, drive, target=Target(error=1e-4, time_s=10.0)))
@@ -83,7 +83,7 @@ def test_the_error_of_a_mean_over_starts_includes_the_error_of_the_runs():
     assert (found.motion, found.period) == (MotionKind.PERIODIC, 2)
     duration = FixedDuration(found.duration_s, found.window_s)
     truth = solve_scene(Scene(specimen, drive, accuracy=Accuracy.REFERENCE, duration=duration, budget_s=0.0))
-    assert np.all(off(found, truth) <= 1.0)
+    assert np.all(errors_off(found, truth) <= 1.0)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_only_growing_perturbations_make_a_mean_over_starts_chaotic(
 
 
 def test_predictions_improve_until_the_requested_time_is_over():
-    answers = list(refine_scene(asked(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
+    answers = list(refine_scene(target_scene(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
     reports = [each.target for each in answers]
     assert len(answers) > 1
     assert reports[0].time_s < reports[-1].time_s
@@ -116,31 +116,31 @@ def test_predictions_improve_until_the_requested_time_is_over():
 
 
 def test_a_motion_that_never_settles_is_predicted_for_a_stated_window():
-    scene = asked(frequency_hz=101.0, amplitude_m=1e-6, damping_s=0.0, error=1e-6)
+    scene = target_scene(frequency_hz=101.0, amplitude_m=1e-6, damping_s=0.0, error=1e-6)
     found = solve_scene(scene)
     named = FixedDuration(found.duration_s, found.window_s)
     truth = solve_scene(Scene(scene.specimen, scene.drive, accuracy=Accuracy.REFERENCE, duration=named))
     assert found.motion is MotionKind.UNDECIDED
     assert found.target.is_met
-    assert np.all(off(found, truth) <= 1.0)
+    assert np.all(errors_off(found, truth) <= 1.0)
 
 
 def test_a_motion_without_contact_is_predicted_in_closed_form():
-    found = solve_scene(asked(amplitude_m=1e-6, error=0.1))
+    found = solve_scene(target_scene(amplitude_m=1e-6, error=0.1))
     assert found.method is Method.CLOSED_FORM
     assert found.target.is_met
 
 
 def test_an_error_below_rounding_is_reported_as_unreachable():
-    report = solve_scene(asked(error=1e-15)).target
+    report = solve_scene(target_scene(error=1e-15)).target
     assert not report.is_met
     assert report.needed_s is None
     assert report.text.endswith("is not known")
 
 
 def test_the_error_of_a_prediction_in_a_transient_includes_the_transient():
-    soon = solve_scene(asked(time_s=1e-6))
-    settled = solve_scene(asked(error=1e-6))
+    soon = solve_scene(target_scene(time_s=1e-6))
+    settled = solve_scene(target_scene(error=1e-6))
     assert soon.error_estimate > abs(soon.response_i / settled.response_i - 1.0) > 1e-3
     assert soon.error_estimate > abs(soon.relative_ii / settled.relative_ii - 1.0)
 
@@ -162,7 +162,7 @@ def test_a_computing_time_shorter_than_one_drive_period_is_refused():
 )
 def test_options_fixed_by_an_error_target_are_refused(given, named):
     with pytest.raises(ValueError, match=named):
-        replace(asked(error=0.1), **given)
+        replace(target_scene(error=0.1), **given)
 
 
 @pytest.mark.parametrize("given", [{}, {"error": 0.0}, {"error": 1.1}, {"time_s": 0.0}, {"time_s": np.inf}])
@@ -172,7 +172,7 @@ def test_a_target_without_a_valid_error_or_time_is_refused(given):
 
 
 def test_a_window_length_may_be_given_with_a_target():
-    scene = asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.05)
+    scene = target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.05)
     found = solve_scene(replace(scene, duration=AutomaticDuration(window_s=1.0)))
     assert found.window_s == pytest.approx(1.0)
 

@@ -11,7 +11,7 @@ COUNT = longest_section(FORGETTING)
 
 
 def section_of(values):
-    """States whose x follows ``values`` and whose velocities are in step with it."""
+    """Return section states with x proportional to ``values`` and velocities in proportion to x."""
     values = np.asarray(values, dtype=float)
     return np.outer(values, [1.0, 0.5, 0.2, OMEGA, 0.1 * OMEGA, 0.0]) * 1e-6
 
@@ -23,7 +23,7 @@ def test_a_repeating_section_has_its_shortest_period(period):
     assert found == Repetition(period, 0.0)
 
 
-def test_a_decay_counts_as_settled_when_its_remainder_is_small():
+def test_a_decaying_motion_counts_as_settled_if_its_remaining_transient_is_small():
     steps = np.arange(COUNT)
     slow = 1.0 + 1e-3 * np.exp(-steps / (3.0 * FORGETTING))
     assert repetition(section_of(slow), OMEGA, FORGETTING, SHARP) is None

@@ -1,4 +1,4 @@
-"""When two starts came to the same motion: by period and responses, or within the scatter of chaos."""
+"""Initial states lead to the same motion if period and responses agree, or within the scatter of chaos."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ GREW = {TORUS: (0.1, -0.1, 0.0, 0.1), CHAOS: (6.0, 5.0, 4.0, 7.0), OPEN: (0.5, 0
 WATCHED_S, FORGETTING_S = 4.0, 0.5
 
 
-def reached(kind, period=None, factor=1.0, scatter=None, grew=None):
+def reached_motion(kind, period=None, factor=1.0, scatter=None, grew=None):
     drawn = None if scatter is None else WindowScatter(scatter, 10)
     grew = GREW.get(kind, ()) if grew is None else grew
     growth = Growth(np.array(grew), WATCHED_S if grew else 0.0)
@@ -38,18 +38,18 @@ def reached(kind, period=None, factor=1.0, scatter=None, grew=None):
 @pytest.mark.parametrize(
     ("one", "other", "same"),
     [
-        (reached(PERIODIC, 1), reached(PERIODIC, 1, 1.0005), True),
-        (reached(PERIODIC, 1), reached(PERIODIC, 1, 1.002), False),
-        (reached(PERIODIC, 1), reached(PERIODIC, 2), False),
-        (reached(PERIODIC, 3), reached(CHAOS, None, 1.0002, 0.01), True),
-        (reached(PERIODIC, 3), reached(CHAOS, None, 1.05, 0.05), False),
-        (reached(TORUS, None, 1.0, 1e-6), reached(OPEN, None, 1.0001, 1e-6), True),
-        (reached(CHAOS, None, 1.0, 0.02), reached(CHAOS, None, 1.08, 0.02), True),
-        (reached(CHAOS, None, 1.0, 0.02), reached(OPEN, None, 1.03, 0.02), True),
-        (reached(CHAOS, None, 1.0, 0.02), reached(TORUS, None, 1.03, 0.02), True),
-        (reached(CHAOS, None, 1.0, 0.02), reached(TORUS, None, 1.03, 1e-6), False),
-        (reached(CHAOS, None, 1.0, 0.02), reached(OPEN, None, 1.03), False),
-        (reached(CHAOS, None, 1.0, 0.02), reached(CHAOS, None, 1.5, 0.02), False),
+        (reached_motion(PERIODIC, 1), reached_motion(PERIODIC, 1, 1.0005), True),
+        (reached_motion(PERIODIC, 1), reached_motion(PERIODIC, 1, 1.002), False),
+        (reached_motion(PERIODIC, 1), reached_motion(PERIODIC, 2), False),
+        (reached_motion(PERIODIC, 3), reached_motion(CHAOS, None, 1.0002, 0.01), True),
+        (reached_motion(PERIODIC, 3), reached_motion(CHAOS, None, 1.05, 0.05), False),
+        (reached_motion(TORUS, None, 1.0, 1e-6), reached_motion(OPEN, None, 1.0001, 1e-6), True),
+        (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(CHAOS, None, 1.08, 0.02), True),
+        (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(OPEN, None, 1.03, 0.02), True),
+        (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(TORUS, None, 1.03, 0.02), True),
+        (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(TORUS, None, 1.03, 1e-6), False),
+        (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(OPEN, None, 1.03), False),
+        (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(CHAOS, None, 1.5, 0.02), False),
     ],
 )
 def test_equal_motions_of_two_starts_are_recognised(one, other, same):
@@ -58,23 +58,23 @@ def test_equal_motions_of_two_starts_are_recognised(one, other, same):
 
 
 def test_a_motion_is_reported_from_the_start_with_the_smallest_error():
-    (motion,) = motions_among([reached(OPEN, None, 1.0, 1e-6), reached(TORUS, None, 1.0, 1e-6)])
+    (motion,) = motions_among([reached_motion(OPEN, None, 1.0, 1e-6), reached_motion(TORUS, None, 1.0, 1e-6)])
     assert kind_among(motion, FORGETTING_S) is TORUS
 
 
 def test_weak_chaos_is_classified_by_the_majority_of_starts():
-    starts = [reached(TORUS, None, 1.0, 0.01), reached(OPEN, None, 1.01, 0.01)]
-    starts += [reached(CHAOS, None, factor, 0.01) for factor in (0.99, 1.0, 1.01)]
+    starts = [reached_motion(TORUS, None, 1.0, 0.01), reached_motion(OPEN, None, 1.01, 0.01)]
+    starts += [reached_motion(CHAOS, None, factor, 0.01) for factor in (0.99, 1.0, 1.01)]
     (motion,) = motions_among(starts)
     assert kind_among(motion, FORGETTING_S) is CHAOS
     assert len(motion) == 5
 
 
 def test_intermittent_chaos_is_not_classified_as_a_torus():
-    """Hertz, 83.697 Hz, 11.59 um, gaps 42.18 and 14.47 um: 5 of 15 starts were calm for 4 s, 1 chaotic."""
-    calm = [reached(TORUS, None, factor, 0.01) for factor in (0.99, 1.0, 1.0, 1.01, 1.0)]
-    burst = reached(CHAOS, None, 1.0, 0.01, grew=(0.0, 13.8, 14.4, -1.0))
-    late = reached(OPEN, None, 1.0, 0.01, grew=(0.1, -1.1, 3.3, 22.1))
+    """Example: Hertz, 83.697 Hz, 11.59 um, gaps 42.18 and 14.47 um; 5 of 15 runs were calm for 4 s."""
+    calm = [reached_motion(TORUS, None, factor, 0.01) for factor in (0.99, 1.0, 1.0, 1.01, 1.0)]
+    burst = reached_motion(CHAOS, None, 1.0, 0.01, grew=(0.0, 13.8, 14.4, -1.0))
+    late = reached_motion(OPEN, None, 1.0, 0.01, grew=(0.1, -1.1, 3.3, 22.1))
     for starts, kind in (
         ([*calm, burst], CHAOS),
         ([*calm, late], OPEN),
@@ -94,7 +94,7 @@ def test_intermittent_chaos_is_not_classified_as_a_torus():
     ],
 )
 def test_one_of_several_chaotic_motions_may_turn_into_another(kinds, final):
-    """Of 400 starts followed for 300 s, 2 % were left where nine of sixteen were after a minute."""
+    """Of 400 runs over 300 s, 2 % ended in a chaotic motion that nine of sixteen had after a minute."""
     counts = counts_of(kinds, range(1, len(kinds) + 1))
     assert tuple(each.is_final for each in counts) == final
     assert [each.trials for each in counts] == list(range(1, len(kinds) + 1))
@@ -102,6 +102,6 @@ def test_one_of_several_chaotic_motions_may_turn_into_another(kinds, final):
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_merged_starts_have_the_larger_uncertainty(order):
-    calm, burst = reached(TORUS, None, 1.0, 0.001), reached(CHAOS, None, 1.0, 0.02)
+    calm, burst = reached_motion(TORUS, None, 1.0, 0.001), reached_motion(CHAOS, None, 1.0, 0.02)
     errors = {id(calm): 1e-6, id(burst): 0.04}
     assert _error([calm, burst][::order], lambda each: errors[id(each)]) == 0.04

@@ -14,7 +14,7 @@ def test_the_closed_form_bootstrap_of_a_maximum_matches_random_draws():
 
 
 def test_the_scatter_of_a_gumbel_maximum_is_found():
-    """The largest of n Gumbel values is Gumbel of the same width, ln n widths further out."""
+    """The maximum of n Gumbel values has a Gumbel distribution shifted by ln n widths."""
     random = np.random.default_rng(4)
     width, blocks, many = 0.2, 5, 4000
     truth = width * np.pi / np.sqrt(6.0) / (5.0 + width * (np.log(blocks) + np.euler_gamma))
@@ -28,7 +28,7 @@ def test_too_few_blocks_give_no_scatter():
 
 @pytest.mark.parametrize("blocks", [1, 5, 10])
 def test_two_windows_differ_by_at_most_the_stated_error_in_95_percent(blocks):
-    """Normal extremes, where one block is a window; with more, what is said errs on the large side."""
+    """Coverage is 95 % for one block per window; with more blocks the stated error is conservative."""
     random = np.random.default_rng(6)
     inside = 0
     for _ in range(2000):

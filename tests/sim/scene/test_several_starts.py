@@ -1,5 +1,5 @@
-"""With sensitive dependence on the start, an answer lists the motions of other starts, and distinguishes
-lasting chaos from chaos that dies out."""
+"""With sensitive dependence on the initial state, a prediction lists the motions from other states and
+distinguishes lasting from transient chaos."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ SHORT_CHAOS = scene("hertz", 242.0, 5e-6, damping_time_s=3e-5)
 
 
 @pytest.fixture(scope="module")
-def lottery():
+def several_attractors():
     return solve_scene(LOTTERY)
 
 
@@ -46,7 +46,7 @@ def short_chaos():
     return solve_scene(SHORT_CHAOS)
 
 
-def test_start_dependence_is_excluded_without_further_starts():
+def test_start_dependence_is_excluded_without_further_initial_states():
     found = solve_scene(scene("hertz", 130.0, 20e-6))
     assert (found.memory, found.ensemble, found.is_one_of_several) == (StartMemory.KEPT, None, False)
     assert solve_scene(scene("hertz", 200.0, 1e-6)).memory is StartMemory.KEPT
@@ -60,22 +60,22 @@ def test_start_dependence_without_a_budget_is_known_only_for_chaos():
     assert chaos.motion is MotionKind.CHAOTIC_SO_FAR
 
 
-def test_several_attractors_are_reported_with_their_shares(lottery):
-    assert lottery.memory is StartMemory.LOST
-    assert lottery.is_one_of_several
-    ensemble = lottery.ensemble
+def test_several_attractors_are_reported_with_their_shares(several_attractors):
+    assert several_attractors.memory is StartMemory.LOST
+    assert several_attractors.is_one_of_several
+    ensemble = several_attractors.ensemble
     assert sum(motion.starts for motion in ensemble.motions) == ensemble.starts >= 8
     assert sum(motion.share.share for motion in ensemble.motions) == pytest.approx(1.0)
     for motion in ensemble.motions:
         assert motion.share.low <= motion.share.share <= motion.share.high
     asked = ensemble.motions[ensemble.requested_motion]
-    assert (asked.motion, asked.period) == (lottery.motion, lottery.period)
-    assert asked.response_i == pytest.approx(lottery.response_i, rel=0.3)
+    assert (asked.motion, asked.period) == (several_attractors.motion, several_attractors.period)
+    assert asked.response_i == pytest.approx(several_attractors.response_i, rel=0.3)
 
 
-def test_each_reported_attractor_is_reached_by_a_start(lottery):
-    """Another draw of pushes, each followed for long, comes to nothing that was not named or allowed for."""
-    ensemble = lottery.ensemble
+def test_other_initial_states_reach_reported_attractors(several_attractors):
+    """Three other random initial states reach at most one attractor that was not reported."""
+    ensemble = several_attractors.ensemble
     known = [motion.response_i for motion in ensemble.motions]
     scale = 1e-6 * 98e-6 * np.repeat([1.0, 2.0 * np.pi * 475.2], 3)
     starts = np.random.default_rng(77).uniform(-1.0, 1.0, (3, 6)) * scale
@@ -88,15 +88,15 @@ def test_each_reported_attractor_is_reached_by_a_start(lottery):
 
 
 def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
-    """5.22 after twelve seconds; in the end, 4.47."""
+    """Response I is 5.22 after 12 s and finally 4.47."""
     assert (short_chaos.motion, short_chaos.period) == (MotionKind.PERIODIC, 1)
     assert short_chaos.response_i == pytest.approx(4.47, abs=0.01)
     assert short_chaos.memory is StartMemory.LOST
     escape = short_chaos.ensemble.escape
     settled = sum(each.starts for each in short_chaos.ensemble.motions if each.motion is MotionKind.PERIODIC)
-    # A start that comes to the motion at once has not escaped from chaos: how many do hangs on the draw.
+    # A run that reaches the motion at once does not count as an escape from chaos.
     assert short_chaos.ensemble.starts // 2 <= escape.escapes <= settled
-    # 59 s over 112 starts; of eight lifetimes the mean is a quarter or four times of it once in 100,000.
+    # Reference: 59 s over 112 runs; a mean of eight lifetimes is within a factor of four of it.
     assert 15.0 < 1.0 / escape.rate_per_s < 240.0
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
@@ -117,7 +117,7 @@ def test_lasting_chaos_has_a_lower_bound_of_lifetime():
     assert found.ensemble.escape.lifetime_above_s > 300.0
     assert "mean lifetime above" in found.ended
     (only,) = found.ensemble.motions
-    # Wilson's bound where all agree: what so few starts cannot exclude.
+    # Wilson's bound if all runs agree.
     starts = found.ensemble.starts
     assert only.share.low == pytest.approx(starts / (starts + 1.96**2), abs=1e-3)
     assert not found.is_one_of_several
@@ -131,7 +131,7 @@ def test_a_start_dependent_run_of_fixed_length_gets_an_ensemble():
         assert found.motion is MotionKind.CHAOTIC_SO_FAR
 
 
-def test_the_scatter_over_starts_matches_their_responses():
+def test_the_scatter_over_initial_states_matches_their_responses():
     observe = (Observable.RESPONSE, Observable.SCATTER)
     periodic = solve_scene(scene("hertz", 130.0, 20e-6, observe=observe, duration=FixedDuration(4.0, 1.0)))
     assert periodic.scatter < 1e-5
@@ -152,15 +152,15 @@ def test_a_larger_budget_follows_more_starts(short_chaos):
         replace(SHORT_CHAOS, budget_s=-1.0)
 
 
-def test_a_prediction_as_json_lists_every_motion(lottery):
-    said = lottery.to_dict()["ensemble"]
+def test_a_prediction_as_json_lists_every_motion(several_attractors):
+    said = several_attractors.to_dict()["ensemble"]
     assert set(said) - {"asked"} == set(Ensemble.__dataclass_fields__) - {"requested_motion"}
-    assert said["motions"][0]["share"]["share"] == lottery.ensemble.motions[0].share.share
-    assert said["motions"][said["asked"]]["motion"] == str(lottery.motion)
+    assert said["motions"][0]["share"]["share"] == several_attractors.ensemble.motions[0].share.share
+    assert said["motions"][said["asked"]]["motion"] == str(several_attractors.motion)
 
 
-def test_number_and_seed_of_random_starts_can_be_chosen():
-    """The same motions, in shares that the other draw's intervals hold."""
+def test_number_and_seed_of_random_initial_states_can_be_chosen():
+    """Other numbers and seeds of random initial states give the same motions."""
     fast = scene("linear_gap", 562.8, 20e-6)
     many = solve_ensemble(fast, starts=24, seed=5)
     assert many.starts == 24
@@ -173,8 +173,8 @@ def test_number_and_seed_of_random_starts_can_be_chosen():
 
 
 @pytest.mark.slow
-def test_many_settling_starts_do_not_count_as_lasting_chaos():
-    """Nearly undamped: each takes over 100 s, so that all together soon count more than chaos needs to."""
+def test_many_slowly_settling_runs_do_not_count_as_lasting_chaos():
+    """Nearly undamped runs take over 100 s each to settle, so their total time exceeds that for chaos."""
     settling = Scene(
         gong2025(1.27e-7, 27.83e-6, "power:3"), Harmonic(380.64, 9.778e-6), duration=AutomaticDuration()
     )

@@ -1,4 +1,4 @@
-"""Intervals of shares and of escape rates hold as often as they say, and agree with known formulas."""
+"""Intervals of shares and escape rates have their stated coverage and agree with known formulas."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_share_intervals_allow_unfinished_starts_to_reach_any_motion():
 
 
 def test_escape_rate_intervals_hold_for_censored_lifetimes():
-    """Exponential lifetimes of 20 s, each followed for 15 s at most."""
+    """Lifetimes are exponential with a mean of 20 s, each observed for at most 15 s."""
     random, held = np.random.default_rng(12), 0
     for _ in range(2000):
         lives = random.exponential(20.0, 16)

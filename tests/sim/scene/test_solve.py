@@ -79,22 +79,22 @@ def test_periodic_motions_match_the_reference_within_their_error(
 
 
 @pytest.fixture
-def followed_s(monkeypatch):
+def integrated_s(monkeypatch):
     lengths, follow = [], FollowedRun.follow
 
-    def counted(run, *options, **more):
+    def follow_and_count(run, *options, **more):
         stretch = follow(run, *options, **more)
         lengths.append(stretch.length_s)
         return stretch
 
-    monkeypatch.setattr(FollowedRun, "follow", counted)
+    monkeypatch.setattr(FollowedRun, "follow", follow_and_count)
     return lengths
 
 
-def test_whole_cycles_of_a_periodic_motion_are_skipped(followed_s):
+def test_whole_cycles_of_a_periodic_motion_are_skipped(integrated_s):
     specimen, drive = gong2025(), Harmonic(130.0, 20e-6)
     found = solve_scene(Scene(specimen, drive, duration=FixedDuration(30.0, 5.0)))
-    assert sum(followed_s) < 22.0
+    assert sum(integrated_s) < 22.0
     whole = steady_response(specimen, drive)
     assert found.response_i == pytest.approx(whole.response_i, rel=1e-9)
     assert found.response_ii == pytest.approx(whole.response_ii, rel=1e-9)
@@ -102,9 +102,9 @@ def test_whole_cycles_of_a_periodic_motion_are_skipped(followed_s):
     assert found.duration_s == pytest.approx(30.0)
 
 
-def test_no_part_of_chaos_is_skipped(followed_s):
+def test_no_part_of_chaos_is_skipped(integrated_s):
     solve_scene(Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(30.0, 5.0)))
-    assert sum(followed_s) >= 30.0
+    assert sum(integrated_s) >= 30.0
 
 
 def test_perturbations_are_followed_where_chaos_is_uncertain(monkeypatch):
@@ -126,8 +126,8 @@ def test_perturbations_are_followed_where_chaos_is_uncertain(monkeypatch):
     assert all(has for start_s, has in carried[:12] if start_s >= 9.0 - 1e-9)
 
 
-def test_chaotic_runs_from_other_starts_are_within_the_stated_error():
-    """19 in 20 should, and were the measured 9 in 10 true, 8 of 20 outside were one chance in 2400."""
+def test_chaotic_runs_from_other_initial_states_are_within_the_stated_error():
+    """With 90 % coverage, 8 of 20 runs outside the stated error have a probability of 1/2400."""
     duration = FixedDuration(12.0, 4.0)
     found = solve_scene(replace(CHAOS, duration=duration))
     starts = np.random.default_rng(8).uniform(-1e-9, 1e-9, (20, 6))
@@ -194,7 +194,7 @@ def test_the_lyapunov_exponent_matches_the_final_motion():
 
 
 def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent():
-    """Each start is another realisation; on every computer some of these end during or after the window."""
+    """Each initial state is another realisation; on every computer some end in or after the window."""
     observe = (Observable.RESPONSE, Observable.LYAPUNOV)
     cubic = gong2025(6.483827302321825e-6, 27.07246318911318e-6, "power:3")
     linear = gong2025(30.90384489081641e-6, 13.596217218777594e-6, "linear_gap:1e6")
@@ -215,7 +215,7 @@ def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent
 
 
 def test_a_diverging_motion_has_an_outcome_and_no_response():
-    """A start so far out that the force is more than numbers can hold."""
+    """The initial state is so far out that the contact force overflows."""
     begins_far = Given((0.0, 1e300, -1e300, 0.0, 0.0, 0.0))
     scene = scene_of("power:7", 130.0, 20e-6, start=begins_far, duration=FixedDuration(0.1, 0.05))
     found = solve_scene(scene)
@@ -224,8 +224,8 @@ def test_a_diverging_motion_has_an_outcome_and_no_response():
     assert found.error_estimate is None
 
 
-def heavy_on_light():
-    """A specimen without damping or stops whose fastest mode is far faster than a slow drive."""
+def stiff_specimen():
+    """Return an undamped specimen without stops whose fastest mode is much faster than the drive."""
     masses = (0.0058, 2.1, 2000.0)
     stiffnesses = tuple(
         k * mass / own for k, mass, own in zip(gong2025().stiffnesses, masses, gong2025().masses, strict=True)
@@ -235,7 +235,7 @@ def heavy_on_light():
 
 @pytest.mark.thorough
 def test_exchange_of_displacement_and_velocity_is_not_taken_for_growth():
-    slow = Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
+    slow = Scene(stiff_specimen(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
     found = solve_scene(slow)
     assert found.memory is StartMemory.KEPT
     assert found.motion is MotionKind.QUASI_PERIODIC
@@ -243,7 +243,7 @@ def test_exchange_of_displacement_and_velocity_is_not_taken_for_growth():
 
 def test_a_scene_with_too_many_steps_ends_with_an_explanation(monkeypatch):
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 10_000_000)
-    found = solve_scene(Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
+    found = solve_scene(Scene(stiff_specimen(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
     assert found.outcome is Outcome.TOO_LONG
     assert "run shorter" in found.ended
     assert found.response_i is None
@@ -251,7 +251,7 @@ def test_a_scene_with_too_many_steps_ends_with_an_explanation(monkeypatch):
 
 
 def test_perturbations_count_towards_the_step_limit_of_a_run(monkeypatch):
-    """A step with small changes takes four times as long, and images of a period had no limit together."""
+    """A step with perturbations counts four times, and period maps share the limit of their run."""
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 100_000)
     plain, tangent, mapped = (
         FollowedRun(gong2025(), Harmonic(130.0, 1e-6), 1e-6, np.zeros(6)) for _ in range(3)
@@ -271,7 +271,7 @@ def test_perturbations_count_towards_the_step_limit_of_a_run(monkeypatch):
     [("linear", 1e-6, 400.0, 3000), ("linear", 2e-6, 600.0, 3000), ("hertz", 2e-5, 380.0, 300)],
 )
 def test_a_slowly_decaying_motion_is_undecided(contact, damping_time_s, frequency_hz, periods):
-    """Neither repeating nor growing, it was called quasi-periodic, with a response half too large."""
+    """Such a motion was once classified as quasi-periodic, with a response 50 % too large."""
     specimen = gong2025(contact=contact, damping_time_s=damping_time_s)
     length = AutomaticDuration(window_s=200 / frequency_hz, longest_s=periods / frequency_hz)
     answer = solve_scene(Scene(specimen, Harmonic(frequency_hz, 1e-6), duration=length, budget_s=0.0))
@@ -281,8 +281,8 @@ def test_a_slowly_decaying_motion_is_undecided(contact, damping_time_s, frequenc
 @pytest.mark.parametrize(
     ("frequency_hz", "amplitude_m", "damping_time_s"),
     [
-        (119.88743, 20e-6, 3e-5),  # spirals into a torus for minutes
-        (111.9871, 22.993e-6, 3.882e-5),  # peaks repeat in each part of the window, lines do not
+        (119.88743, 20e-6, 3e-5),  # approaches a torus for minutes
+        (111.9871, 22.993e-6, 3.882e-5),  # peaks repeat in each part of the window, spectral lines do not
         (118.43285, 30.028e-6, 4.588e-5),
     ],
 )
@@ -306,7 +306,7 @@ def test_a_window_of_too_many_drive_periods_is_refused():
 
 
 def test_a_perturbation_that_shrinks_to_zero_is_handled():
-    """It shrinks below the smallest number in a gap of 1e-300 m: "math domain error" was the answer."""
+    """With a gap of 1e-300 m the perturbation underflows, which once raised "math domain error"."""
     tiny = Scene(
         gong2025(gap_m=1e-300, contact="power:5"), Harmonic(260.0, 5e-6), duration=FixedDuration(0.5, 0.2)
     )

@@ -1,4 +1,4 @@
-"""Closed forms of table and specimen under sines, against the motion followed in time and its equations."""
+"""Closed forms of table and specimen driven by sines match time simulation."""
 
 import math
 
@@ -32,13 +32,13 @@ def random_specimen(rng):
     return Specimen(tuple(masses), tuple(springs), dampings, rng.uniform(1e-5, 6e-5), gong2025().contact)
 
 
-def followed(specimen, frequency_hz, volts):
-    """Fundamentals of the base's acceleration and of m0's velocity, and the impacts of the last half."""
+def simulate(specimen, frequency_hz, volts):
+    """Return the fundamentals of base acceleration and m0 velocity, and the number of impacts."""
     shaken = LoadedShaker(AMPLIFIER, TABLE, specimen, 1 / RATE_HZ)
     middle_s = (np.arange(round(3.0 * RATE_HZ)) + 0.5) / RATE_HZ
     motion = shaken.move(volts * np.sin(2 * np.pi * frequency_hz * middle_s))
     kept = round(1.5 * RATE_HZ)
-    # Peak phasors against the sine of the drive, weighted so that ends do not leak.
+    # Phasors relative to the sine drive, with a Hann window against leakage.
     turn = 2j * np.exp(-2j * np.pi * frequency_hz * middle_s[-kept:]) * 2 * np.hanning(kept) / kept
     return motion.base_acceleration[-kept:] @ turn, motion.m0_velocity[-kept:] @ turn, shaken.impacts
 
@@ -49,7 +49,7 @@ def test_the_closed_form_without_contact_equals_the_integration(seed):
     specimen, frequency_hz = random_specimen(rng), rng.uniform(40.0, 600.0)
     linear = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
     volts = 0.02 * specimen.gap_m / abs(linear.per_volt[0, P])
-    base, m0, impacts = followed(specimen, frequency_hz, volts)
+    base, m0, impacts = simulate(specimen, frequency_hz, volts)
     moved = linear.under(volts, specimen.gap_m)[0]
     s = 2j * math.pi * frequency_hz
     assert impacts == 0
@@ -64,7 +64,7 @@ def test_the_closed_form_predicts_the_loaded_base_better_than_a_bare_table():
         specimen, frequency_hz = random_specimen(rng), rng.uniform(60.0, 550.0)
         with_it, bare = (linear_motion(AMPLIFIER, TABLE, each, frequency_hz) for each in (specimen, None))
         volts = rng.uniform(2.0, 8.0) * specimen.gap_m / abs(with_it.per_volt[0, P])
-        base, _, impacts = followed(specimen, frequency_hz, volts)
+        base, _, impacts = simulate(specimen, frequency_hz, volts)
         assert impacts > 0
         modelled = [abs(each.under(volts, specimen.gap_m)[0, BASE]) for each in (with_it, bare)]
         off_db.append(20 * np.log10((2 * math.pi * frequency_hz) ** 2 * np.array(modelled) / abs(base)))
@@ -108,7 +108,7 @@ def test_the_computed_voltage_gives_the_requested_base_motion(frequency_hz, base
 
 
 @given(st.floats(20.0, 600.0), st.floats(1e-3, 10.0))
-def test_p_is_limited_to_the_gap(frequency_hz, volts):
+def test_the_closed_form_limits_the_relative_displacement_to_the_gap(frequency_hz, volts):
     specimen = gong2025()
     motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
     moved = motion.under(volts, specimen.gap_m)[0]

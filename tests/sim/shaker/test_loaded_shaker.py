@@ -1,4 +1,4 @@
-"""Amplifier, shaker and specimen together: closed forms, energy, limits, the coil's voltage as drive."""
+"""Amplifier, shaker and specimen: closed forms, energy, limits, and replay of the coil voltage."""
 
 from dataclasses import replace
 
@@ -27,26 +27,26 @@ LINES_HZ = np.array([30, 94, 150, 201, 266, 310, 436, 500, 777])
 COLUMN = {name: number for number, name in enumerate(MOTION_COLUMNS)}
 
 
-def shaken(specimen=None, amplifier=AMPLIFIER, start=(0.0,) * 6):
+def loaded_shaker(specimen=None, amplifier=AMPLIFIER, start=(0.0,) * 6):
     return LoadedShaker(amplifier, SHAKER, specimen or gong2025(), STEP_S, start)
 
 
 def tones(amplitude_v, frequencies_hz, seconds=1):
-    """Means over the steps of sines of equal amplitude, a whole number of periods in a second."""
+    """Return means over each step of a sum of sines with whole periods per second."""
     edges_s = np.arange(seconds * SECOND + 1) * STEP_S
     phases = 2 * np.pi * np.asarray(frequencies_hz, dtype=float)[:, None] * edges_s
     rates = 2 * np.pi * np.asarray(frequencies_hz, dtype=float)[:, None] * STEP_S
     return amplitude_v * np.sum(-np.diff(np.cos(phases + np.arange(len(phases))[:, None])) / rates, axis=0)
 
 
-def settled(table, drive, seconds):
+def settle(table, drive, seconds):
     for _ in range(seconds):
         table.move(drive, np.zeros(len(drive)))
     return table.move(drive, np.zeros(len(drive)), len(drive))
 
 
 def stroke_per_volt(frequency_hz, specimen=None):
-    """Table displacement and m0's per volt at the input, the specimen's push included: the closed form."""
+    """Return displacement of table and m0 per input volt [m/V], in closed form with the specimen."""
     s = 2j * np.pi * frequency_hz
     dynamic = (
         SHAKER.suspension_stiffness_n_per_m
@@ -59,36 +59,36 @@ def stroke_per_volt(frequency_hz, specimen=None):
         dynamic = dynamic - (specimen.stiffnesses[0] + s * specimen.dampings[0]) * (moved - 1)
     impedance = SHAKER.coil_resistance_ohm + s * SHAKER.coil_inductance_h
     force_constant = SHAKER.force_constant_n_per_a
-    volts = amplified(frequency_hz)
+    volts = amplifier_gain(frequency_hz)
     base = force_constant * volts / (impedance * dynamic + s * force_constant**2)
     return base, moved * base
 
 
-def amplified(frequency_hz):
+def amplifier_gain(frequency_hz):
     s = 2j * np.pi * frequency_hz
     low, high = 2 * np.pi * AMPLIFIER.low_cut_hz, 2 * np.pi * AMPLIFIER.high_cut_hz
     return AMPLIFIER.gain * s / (s + low) / (1 + s / high)
 
 
 def per_volt(frequency_hz, specimen=None):
-    """Base acceleration and m0 velocity per volt."""
+    """Return base acceleration and m0 velocity per input volt."""
     s = 2j * np.pi * frequency_hz
     base, moved = stroke_per_volt(frequency_hz, specimen)
     return s**2 * base, s * moved
 
 
 def lines(means):
-    """Complex amplitudes of a second of means at LINES_HZ, the mean's droop and middle undone."""
+    """Return complex amplitudes of step means at LINES_HZ, corrected for averaging over the step."""
     angle = np.pi * LINES_HZ * STEP_S
     return np.fft.rfft(means)[LINES_HZ] * 2 / len(means) / np.sinc(angle / np.pi) * np.exp(-1j * angle)
 
 
 @pytest.fixture(scope="module")
 def linear_motion():
-    """A second of periodic motion far below the first contact."""
-    table = shaken()
+    """Drive and one second of periodic motion without contact."""
+    table = loaded_shaker()
     drive = tones(1e-3, LINES_HZ)
-    motion = settled(table, drive, 4)
+    motion = settle(table, drive, 4)
     assert table.impacts == 0
     return drive, motion
 
@@ -122,16 +122,16 @@ def test_a_negligible_specimen_leaves_the_bare_table():
         contact=dust.contact,
     )
     drive = tones(1e-3, LINES_HZ)
-    motion = settled(shaken(dust), drive, 2)
+    motion = settle(loaded_shaker(dust), drive, 2)
     expected, _ = per_volt(LINES_HZ)
     assert lines(motion.base_acceleration) / lines(drive) == pytest.approx(expected, rel=5e-4)
-    assert lines(motion.amplifier_voltage) / lines(drive) == pytest.approx(amplified(LINES_HZ), rel=5e-4)
+    assert lines(motion.amplifier_voltage) / lines(drive) == pytest.approx(amplifier_gain(LINES_HZ), rel=5e-4)
 
 
 @pytest.mark.parametrize("amplitude_v", [1e-3, 0.4])
 def test_electrical_work_is_heat_friction_and_stored_energy(amplitude_v):
     specimen = gong2025()
-    table = shaken(specimen)
+    table = loaded_shaker(specimen)
     drive = amplitude_v * np.sin(2 * np.pi * 260 * STEP_S * np.arange(SECOND))
     before = table.move(drive, np.zeros(SECOND), SECOND).ends[-1]
     motion = table.move(drive, np.zeros(SECOND), SECOND)
@@ -162,7 +162,7 @@ def stored_energy(specimen, state):
 
 
 def test_the_amplifier_clips_at_its_largest_voltage():
-    table = shaken(amplifier=replace(AMPLIFIER, clip_v=5.0))
+    table = loaded_shaker(amplifier=replace(AMPLIFIER, clip_v=5.0))
     drive = tones(5.0, [100.0])
     motion = table.move(drive, np.zeros(SECOND))
     assert np.max(np.abs(motion.amplifier_voltage)) == pytest.approx(5.0)
@@ -170,7 +170,7 @@ def test_the_amplifier_clips_at_its_largest_voltage():
 
 
 def test_the_amplifier_current_stays_within_its_limit():
-    table = shaken(amplifier=replace(AMPLIFIER, current_limit_a=1.0))
+    table = loaded_shaker(amplifier=replace(AMPLIFIER, current_limit_a=1.0))
     motion = table.move(tones(3.0, [200.0]), np.zeros(SECOND), SECOND)
     current = motion.ends[:, COLUMN["current"]]
     assert np.max(np.abs(current)) == pytest.approx(1.0)
@@ -178,13 +178,13 @@ def test_the_amplifier_current_stays_within_its_limit():
 
 
 def test_noise_is_added_at_the_amplifier_output():
-    table = shaken()
+    table = loaded_shaker()
     noise = np.random.default_rng(1).standard_normal(SECOND)
     assert np.array_equal(table.move(np.zeros(SECOND), noise).amplifier_voltage, noise)
 
 
 def test_the_rubber_stops_end_the_stroke_and_are_counted():
-    table = shaken()
+    table = loaded_shaker()
     free = abs(stroke_per_volt(8.0)[0]) * 6.0
     stroke = SHAKER.stroke_m
     assert free > 1.2 * stroke
@@ -195,14 +195,14 @@ def test_the_rubber_stops_end_the_stroke_and_are_counted():
 
 
 def test_a_small_drive_never_touches_the_rubber_stops():
-    table = shaken()
+    table = loaded_shaker()
     table.move(tones(0.5, [50.0]), np.zeros(SECOND))
     assert table.structure["bumps"] == 0
     assert table.structure["limited_steps"] == 0
 
 
 def test_a_non_finite_motion_is_an_error_with_its_time():
-    table = shaken()
+    table = loaded_shaker()
     drive = np.zeros(100)
     drive[40] = np.nan
     with pytest.raises(MotionFailed, match="after 40 of 100 steps"):
@@ -210,14 +210,14 @@ def test_a_non_finite_motion_is_an_error_with_its_time():
 
 
 def test_states_at_step_ends_are_kept_only_on_request():
-    table = shaken()
+    table = loaded_shaker()
     assert table.move(np.zeros(10), np.zeros(10)).ends.shape == (0, len(MOTION_COLUMNS))
     assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))
 
 
 def test_two_consecutive_simulations_equal_the_whole():
     drive = tones(0.7, [260.0])
-    whole, parts = shaken(), shaken()
+    whole, parts = loaded_shaker(), loaded_shaker()
     expected = whole.move(drive, np.zeros(SECOND)).m0_velocity
     got = [parts.move(part, np.zeros(len(part))).m0_velocity for part in np.split(drive, [1, 2, 777, 50_000])]
     assert np.array_equal(np.concatenate(got), expected)
@@ -226,9 +226,9 @@ def test_two_consecutive_simulations_equal_the_whole():
 
 def test_replaying_the_recorded_coil_voltage_reproduces_the_table_motion():
     drive = tones(0.7, [266.0])
-    measured = shaken()
+    measured = loaded_shaker()
     recorded = measured.move(drive, 0.01 * np.random.default_rng(2).standard_normal(SECOND))
-    driven = shaken(amplifier=Amplifier())
+    driven = loaded_shaker(amplifier=Amplifier())
     again = driven.move(recorded.amplifier_voltage)
     assert driven.impacts == measured.impacts > 0
     assert again.base_acceleration == pytest.approx(recorded.base_acceleration, rel=1e-9, abs=1e-9)
@@ -237,7 +237,7 @@ def test_replaying_the_recorded_coil_voltage_reproduces_the_table_motion():
 
 def test_one_simulation_call_equals_a_series_of_blocks():
     drive, block = tones(0.7, [266.0])[:9500], 1000
-    whole, stepwise = shaken(), shaken()
+    whole, stepwise = loaded_shaker(), loaded_shaker()
     motion = whole.move(drive, block=block)
     parts, begun = [], []
     for first in range(0, len(drive), block):
@@ -250,9 +250,9 @@ def test_one_simulation_call_equals_a_series_of_blocks():
 
 def test_a_displaced_specimen_moves_the_undriven_table():
     start = (2e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0)
-    motion = shaken(start=start).move(np.zeros(1000), end_rows=1000)
+    motion = loaded_shaker(start=start).move(np.zeros(1000), end_rows=1000)
     assert motion.ends[0, 3:6] == pytest.approx(start[:3], rel=0.01)
-    # The first push is k0 x on the table, before anything else has moved.
+    # The first force on the table is k0 x.
     push = gong2025().stiffnesses[0] * start[0] / SHAKER.moving_mass_kg
     assert motion.base_acceleration[1] == pytest.approx(push, rel=0.01)
 

@@ -1,4 +1,4 @@
-"""Rig and specimen under a sampled voltage: closed forms at any rate, no seams, sensors, chance."""
+"""Rig and specimen driven by a sampled voltage: closed forms, continuity, sensors, sensitivity."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ TABLE = DrivenTable(Amplifier(), SHAKER, SPECIMEN)
 
 
 def base_per_volt(frequency_hz):
-    """Base acceleration per volt with the specimen's mass on the table: Beranek's coupled equations."""
+    """Return base acceleration per volt with the specimen on the table (Beranek's equations)."""
     s = 2j * np.pi * frequency_hz
     moved = base_transmissibility(SPECIMEN, frequency_hz)[:, :3] @ np.array(SPECIMEN.masses)
     dynamic = (
@@ -36,7 +36,7 @@ def base_per_volt(frequency_hz):
 
 
 def complex_tones(samples, rate_hz, frequencies_hz):
-    """Least-squares amplitudes of the last second; time goes as exp(+i w t) from the first sample."""
+    """Return least-squares amplitudes in the last second, with exp(+i w t) from the first sample."""
     count = round(rate_hz)
     time_s = (np.arange(samples.size) / rate_hz)[-count:]
     waves = np.exp(2j * np.pi * np.outer(time_s, frequencies_hz))
@@ -64,7 +64,7 @@ def test_a_long_recording_is_simulated_in_parts_without_seams():
     time_s = np.arange(300_000) / rate_hz
     volts = 1e-2 * np.cos(2 * np.pi * 150.0 * time_s) * (1 - np.exp(-(time_s**3)))
     motion = follow_voltage(TABLE, volts, rate_hz)
-    # What a slow sine leaves at its sixth difference is nothing; a seam of 1e-7 of it would stand out.
+    # The sixth difference of a slow sine is negligible, and a step of 1e-7 would be visible.
     rough = np.abs(np.diff(motion.base_acceleration[5000:-5000], 6))
     assert rough.max() < 1e-5 * np.abs(motion.base_acceleration).max()
 

@@ -1,4 +1,4 @@
-"""Contact laws: their numbers, their fits, and the names by which a user asks for them."""
+"""Contact laws: parameters, fits, and names in requests."""
 
 from typing import get_args
 

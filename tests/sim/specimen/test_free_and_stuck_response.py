@@ -1,4 +1,4 @@
-"""Closed forms of the answer to the base, free and stuck, against the equations and against integration."""
+"""Closed forms of the response with free and with joined masses match equations and integration."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def test_free_response_is_the_transmissibility():
 
 
 def test_the_stuck_response_equals_that_of_the_joined_masses():
-    """A spring a million times stiffer between m1 and m2 leaves p nowhere to go."""
+    """A spring a million times stiffer between m1 and m2 prevents relative displacement."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses
     tied = Specimen(specimen.masses, (k0, 1e6 * k1, k2), specimen.dampings, 45e-6, specimen.contact)
@@ -28,7 +28,7 @@ def test_the_stuck_response_equals_that_of_the_joined_masses():
 
 @pytest.mark.parametrize("stiffer", [0.5, 3.0])
 def test_the_lever_ratio_gives_x_for_any_p(stiffer):
-    """Another spring between m1 and m2 moves p somewhere else; x follows by the lever."""
+    """Another spring between m1 and m2 changes p, and x changes by the lever ratio times p."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses
     other = Specimen(specimen.masses, (k0, stiffer * k1, k2), specimen.dampings, 45e-6, specimen.contact)

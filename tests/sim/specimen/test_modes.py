@@ -61,7 +61,7 @@ def test_modes_of_an_undamped_specimen_do_not_decay():
 
 
 def test_coinciding_modes_are_refused_with_advice():
-    # m0 alone, critically damped: c2 and c1 of zero leave it coupled only through a vanishing spring.
+    # m0 is critically damped and coupled to m2 only through a vanishing spring.
     k0, m0 = 1000.0, 1e-3
     critical = dataclasses.replace(
         gong2025(),
@@ -93,7 +93,7 @@ def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_states(heavier):
 
 @pytest.mark.parametrize("damping_time_s", [0.3, 30.0])
 def test_strongly_overdamped_modes_are_separated(damping_time_s):
-    """Proportional damping: the rates s of each mode solve s^2 + omega^2 (1 + damping_time s) = 0."""
+    """With proportional damping the rates s of a mode solve s^2 + omega^2 (1 + damping_time s) = 0."""
     specimen = gong2025(damping_time_s=damping_time_s)
     root = np.sqrt(np.asarray(specimen.masses))
     squares = np.linalg.eigvalsh(specimen.stiffness_matrix / np.outer(root, root))

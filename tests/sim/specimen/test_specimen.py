@@ -68,7 +68,7 @@ def test_damping_ratios_of_coupled_modes_match_the_poles():
 
 
 def test_damping_ratios_are_continuous_at_vanishing_mode_coupling():
-    """The poles of an overdamped mode are real: two of them, whose product is the square of its frequency."""
+    """An overdamped mode has two real poles, whose product is the square of its frequency."""
     for damping_time_s in (2e-5, 1e-2):
         alone = gong2025(damping_time_s=damping_time_s)
         coupled = replace(alone, dampings=tuple(np.array(alone.dampings) * (1.0, 1.0 + 1e-7, 1.0)))

@@ -1,4 +1,4 @@
-"""A specimen is data: one file says all its numbers, and whoever reads them builds the same specimen."""
+"""A specimen file states all parameters and always gives the same specimen."""
 
 import math
 from dataclasses import replace
@@ -35,7 +35,7 @@ hertz_stiffness = 4.9e9
 """
 
 
-def written(folder, text, name="mine.toml"):
+def write_file(folder, text, name="mine.toml"):
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
@@ -77,7 +77,7 @@ def test_the_two_mass_specimen_matches_its_equations_with_and_without_contact():
     frequency_hz = np.linspace(20.0, 600.0, 59)
     s = 2j * np.pi * frequency_hz
     spring, base = k1 + c1 * s, k2 + c2 * s
-    # y and z over the table's displacement, by Cramer's rule.
+    # y and z per table displacement, by Cramer's rule.
     own = (m1 * s**2 + spring) * (m2 * s**2 + spring + base) - spring**2
     y, z = spring * base / own, (m1 * s**2 + spring) * base / own
     moved = base_transmissibility(specimen, frequency_hz)
@@ -93,7 +93,7 @@ def test_the_two_mass_specimen_matches_its_equations_with_and_without_contact():
 
 
 def test_a_specimen_file_may_state_every_number(tmp_path):
-    specimen = load_specimen(written(tmp_path, WHOLE)).specimen()
+    specimen = load_specimen(write_file(tmp_path, WHOLE)).specimen()
     assert specimen.stiffnesses == (2e4, 800.0, 1.2e4)
     assert specimen.gaps_m == (30e-6, math.inf)
     assert specimen.contact.stiffness == 1e5
@@ -102,25 +102,25 @@ def test_a_specimen_file_may_state_every_number(tmp_path):
 def test_a_specimen_file_may_begin_with_a_byte_order_mark(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(WHOLE, encoding="utf-8-sig")
-    assert load_specimen(path) == load_specimen(written(tmp_path, WHOLE, "other.toml"))
+    assert load_specimen(path) == load_specimen(write_file(tmp_path, WHOLE, "other.toml"))
 
 
 def test_a_specimen_file_may_be_based_on_another_file(tmp_path):
-    written(tmp_path, WHOLE, "base.toml")
-    own = written(tmp_path, 'model = "base.toml"\nname = "softer"\ndamping_time_s = 1e-5\n')
+    write_file(tmp_path, WHOLE, "base.toml")
+    own = write_file(tmp_path, 'model = "base.toml"\nname = "softer"\ndamping_time_s = 1e-5\n')
     specimen = load_specimen(own).specimen()
     assert specimen.dampings == pytest.approx([0.2, 0.008, 0.12])
     assert specimen.gaps_m == (30e-6, math.inf)
 
 
 def test_a_specimen_with_changed_values_has_no_description_text(tmp_path):
-    changed = load_specimen(written(tmp_path, 'name = "mine"\nmodel = "gong2025"\ngap_m = 62e-6\n'))
+    changed = load_specimen(write_file(tmp_path, 'name = "mine"\nmodel = "gong2025"\ngap_m = 62e-6\n'))
     assert "45 um" in load_specimen("gong2025").about
     assert changed.about == ""
 
 
 def test_a_description_round_trips_through_its_text(tmp_path):
-    described = load_specimen(written(tmp_path, WHOLE))
+    described = load_specimen(write_file(tmp_path, WHOLE))
     assert SpecimenDescription.model_validate_json(described.model_dump_json()) == described
     assert SpecimenTable.model_validate(described.model_dump(mode="json")).specimen() == described.specimen()
 
@@ -157,7 +157,7 @@ def test_a_description_round_trips_through_its_text(tmp_path):
     ],
 )
 def test_a_broken_specimen_file_is_refused_by_name(tmp_path, change, said):
-    path = written(tmp_path, WHOLE.replace(*change))
+    path = write_file(tmp_path, WHOLE.replace(*change))
     with pytest.raises(UnknownSpecimenError, match=said) as refusal:
         load_specimen(path)
     assert str(refusal.value).count("mine.toml") == 1
@@ -165,15 +165,15 @@ def test_a_broken_specimen_file_is_refused_by_name(tmp_path, change, said):
 
 
 def test_specimen_files_based_on_each_other_are_refused(tmp_path):
-    written(tmp_path, 'name = "a"\nmodel = "b.toml"\n', "a.toml")
+    write_file(tmp_path, 'name = "a"\nmodel = "b.toml"\n', "a.toml")
     with pytest.raises(UnknownSpecimenError, match="is based on itself"):
-        load_specimen(written(tmp_path, 'name = "b"\nmodel = "a.toml"\n', "b.toml"))
+        load_specimen(write_file(tmp_path, 'name = "b"\nmodel = "a.toml"\n', "b.toml"))
 
 
 def test_a_specimen_table_outside_a_file_may_not_name_a_file(tmp_path):
-    """What stands in a recording or in a study's answers names shipped specimens only."""
+    """Specimen tables in recordings and study results may name shipped specimens only."""
     with pytest.raises(ValidationError, match="no specimen that comes with vibench"):
-        SpecimenTable.model_validate({"model": str(written(tmp_path, WHOLE))})
+        SpecimenTable.model_validate({"model": str(write_file(tmp_path, WHOLE))})
 
 
 def test_a_random_specimen_round_trips_through_its_file(tmp_path):
@@ -186,7 +186,7 @@ def test_a_random_specimen_round_trips_through_its_file(tmp_path):
             f'gap_m = {rng.uniform(1e-5, 1e-4, 2).tolist()}\ncontact = "hertz"\n'
             f"hertz_stiffness = {rng.uniform(1e9, 1e10)}\n"
         )
-        described = load_specimen(written(tmp_path, text))
+        described = load_specimen(write_file(tmp_path, text))
         again = SpecimenTable.model_validate_json(described.model_dump_json())
         assert again.specimen() == described.specimen()
 
@@ -211,15 +211,15 @@ def test_a_random_specimen_round_trips_through_its_file(tmp_path):
     ],
 )
 def test_booleans_and_texts_are_not_accepted_as_numbers(tmp_path, given, instead):
-    file = written(tmp_path, WHOLE.replace(given, instead))
-    written(tmp_path, f'model = "{file.name}"\nname = "heir"\n', "heir.toml")
+    file = write_file(tmp_path, WHOLE.replace(given, instead))
+    write_file(tmp_path, f'model = "{file.name}"\nname = "heir"\n', "heir.toml")
     for each in (file, tmp_path / "heir.toml"):
         with pytest.raises(UnknownSpecimenError, match=rf"{instead.split(' = ')[0]}.*number"):
             load_specimen(each)
 
 
 def test_an_infinite_gap_is_read_back_from_json(tmp_path):
-    one_sided = load_specimen(written(tmp_path, WHOLE))
+    one_sided = load_specimen(write_file(tmp_path, WHOLE))
     assert SpecimenDescription.model_validate_json(one_sided.model_dump_json()) == one_sided
 
 
@@ -234,14 +234,14 @@ def test_a_mass_that_changes_a_spring_constant_gives_a_warning(tmp_path, index):
     masses[index] *= 1.5
     own = f'name = "mine"\nmodel = "gong2025"\nmasses_kg = {masses}\n'
     with pytest.warns(SpecimenWarning) as warned:
-        made = load_specimen(written(tmp_path, own)).specimen()
+        made = load_specimen(write_file(tmp_path, own)).specimen()
     (springs, dampers) = (str(each.message) for each in warned)
     assert "single_frequencies_hz was kept" in springs
     assert f"give {SPRINGS} to keep them" in springs
     assert "damping_time_s was kept" in dampers
     assert f"give {DAMPERS} to keep them" in dampers
     assert made.stiffnesses[index] == pytest.approx(1.5 * gong2025().stiffnesses[index])
-    kept = load_specimen(written(tmp_path, own + SPRINGS)).specimen()
+    kept = load_specimen(write_file(tmp_path, own + SPRINGS)).specimen()
     assert kept.stiffnesses == pytest.approx(gong2025().stiffnesses, rel=1e-5)
     assert kept.dampings == pytest.approx(gong2025().dampings, rel=1e-5)
 
@@ -249,10 +249,10 @@ def test_a_mass_that_changes_a_spring_constant_gives_a_warning(tmp_path, index):
 def test_springs_that_change_damping_give_a_warning(tmp_path):
     own = 'name = "mine"\nmodel = "gong2025"\nsingle_frequencies_hz = [322.0, 120.0, 390.6]\n'
     with pytest.warns(SpecimenWarning, match=r"dampings changed .* damping_time_s = 2e-05 to confirm"):
-        load_specimen(written(tmp_path, own))
+        load_specimen(write_file(tmp_path, own))
     with pytest.warns(SpecimenWarning, match="dampings changed"):
         SpecimenTable.model_validate({"stiffnesses_n_per_m": [2e4, 800.0, 1.2e4]})
-    load_specimen(written(tmp_path, own + "damping_time_s = 2e-5"))
+    load_specimen(write_file(tmp_path, own + "damping_time_s = 2e-5"))
 
 
 def test_confirmed_and_independent_changes_give_no_warning(tmp_path):
@@ -263,7 +263,7 @@ def test_confirmed_and_independent_changes_give_no_warning(tmp_path):
         f"masses_kg = [5.8e-3, 3e-3, 2e-3]\n{SPRINGS}\n{DAMPERS}",
         f"masses_kg = [5.8e-3, 3e-3, 2e-3]\n{FREQUENCIES}\ndamping_time_s = 2e-5",
     ):
-        load_specimen(written(tmp_path, head + own))
+        load_specimen(write_file(tmp_path, head + own))
     assert SpecimenTable.model_validate(
         load_specimen("two_masses").model_dump()
     ) == SpecimenTable.model_validate("two_masses")

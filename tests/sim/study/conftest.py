@@ -1,4 +1,4 @@
-"""A small study that has everything: chains, gaps, two amplitudes, impacts."""
+"""A small study with chains, two gaps, two amplitudes and impacts."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def study():
 
 @pytest.fixture(scope="session")
 def require_equal():
-    """Bit for bit, but for what belongs to the occasion."""
+    """Return a function that requires bit-for-bit equal results, except for run information."""
 
     def require(one, other):
         assert one.study == other.study

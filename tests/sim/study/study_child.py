@@ -1,4 +1,4 @@
-"""A process that runs a study into a file, says after every commit how much is kept, and may be killed."""
+"""A process for kill tests: it runs a study into a file and prints the number of stored points."""
 
 import sys
 from pathlib import Path
@@ -16,11 +16,11 @@ STUDY = Study(
 
 
 def main(path):
-    def tell(progress):
+    def report(progress):
         sys.stdout.write(f"{progress.done}\n")
         sys.stdout.flush()
 
-    solve_study(STUDY, Path(path), ExistingStudy.RESUME, workers=2, observer=tell)
+    solve_study(STUDY, Path(path), ExistingStudy.RESUME, workers=2, observer=report)
 
 
 if __name__ == "__main__":

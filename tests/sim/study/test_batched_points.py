@@ -1,4 +1,4 @@
-"""Curves of many points go through lanes: chosen by the plan, the same on any thread, as true as stated."""
+"""Points of a curve are computed in SIMD batches: chosen by the plan, reproducible, within their errors."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from vibench.sim.scene.solve import InBatches, solve_scenes
 from vibench.sim.study import Study, planned_work_s, solve_study, study_solver
 
 
-def solve_in_lanes(scene):
+def solve_in_batch(scene):
     return solve_scenes([scene])[0].prediction
 
 
@@ -23,7 +23,7 @@ CURVE = {"frequencies_hz": {"start": 90.0, "stop": 270.0, "step": 9.0}, "amplitu
 
 @pytest.fixture(scope="module")
 def curve():
-    """Three resonances' worth of points: still, repeating, chaotic, with a few other starts each."""
+    """Study over three resonances: contact-free, periodic and chaotic points."""
     return Study(**CURVE, duration_s=20.0, window_s=1.0, budget_s=0.05)
 
 
@@ -57,7 +57,7 @@ def test_any_number_of_threads_gives_the_same_curve_bit_for_bit(curve, answers, 
 
 def test_a_point_of_a_curve_equals_a_single_point(curve, answers):
     for place in (4, 11, 19):
-        alone = solve_in_lanes(curve.scene((0, 0, 0, 0, 0, place), Rest()))
+        alone = solve_in_batch(curve.scene((0, 0, 0, 0, 0, place), Rest()))
         frequency_hz = curve.frequencies_hz[place]
         assert answers.values("response_i", frequency=frequency_hz).item() == alone.response_i
         assert answers.values("error_estimate", frequency=frequency_hz).item() == alone.error_estimate
@@ -100,10 +100,10 @@ def test_scenes_that_batches_do_not_support_are_solved_singly():
 
 
 def test_a_thinned_long_lead_in_does_not_cause_start_dependence():
-    # 13,000 drive periods, of which 4,096 states are held: another start is compared with these.
+    # Of 13,000 drive periods only 4,096 states are stored for the comparison of initial states.
     scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
     assert solve_scene(scene).memory is StartMemory.KEPT
-    assert solve_in_lanes(scene).memory is StartMemory.KEPT
+    assert solve_in_batch(scene).memory is StartMemory.KEPT
 
 
 @pytest.mark.parametrize(("phase_rad", "length"), [(0.5 * np.pi, (20.0, 1.0)), (1.57, (20.0, 1.0))])
@@ -111,17 +111,17 @@ def test_one_contact_per_period_does_not_cause_start_dependence(phase_rad, lengt
     drive = Harmonic(130.0, 20e-6, phase_rad)
     scene = Scene(gong2025(), drive, duration=FixedDuration(*length), budget_s=0.02)
     assert solve_scene(scene).memory is StartMemory.KEPT
-    assert solve_in_lanes(scene).memory is StartMemory.KEPT
+    assert solve_in_batch(scene).memory is StartMemory.KEPT
 
 
 def test_transients_are_computed_singly():
-    # m1 rattles: more than a hundred impacts a period, whose errors add up until they are forgotten.
+    # m1 has more than a hundred impacts per period, whose errors add up during the transient.
     state = (-4.911e-05, -5.537e-05, 9.979e-06, -0.02334, 0.01178, 0.03798)
     drive, length = Harmonic(105.98, 3.15e-07), FixedDuration(2.5, 1.0)
     scene = Scene(gong2025(), drive, duration=length, start=Given(state), budget_s=0.02)
-    assert repr(solve_in_lanes(scene)) == repr(solve_scene(scene))
+    assert repr(solve_in_batch(scene)) == repr(solve_scene(scene))
     longer = replace(scene, duration=FixedDuration(4.0, 1.0))
-    assert solve_in_lanes(longer).memory is solve_scene(longer).memory is StartMemory.KEPT
+    assert solve_in_batch(longer).memory is solve_scene(longer).memory is StartMemory.KEPT
 
 
 def test_scenes_with_many_states_use_smaller_batches_with_equal_results(monkeypatch):
@@ -140,6 +140,6 @@ def test_planned_work_stays_finite_with_unsolvable_points():
 
 
 def test_settled_motions_are_computed_in_batches():
-    # Chaos is another draw there, which is how one sees it.
+    # The motion is chaotic, so a different final state shows that a batch was used.
     scene = Scene(gong2025(), Harmonic(260.3, 20e-6), duration=FixedDuration(6.0, 0.5), budget_s=0.0)
-    assert solve_in_lanes(scene).final_state != solve_scene(scene).final_state
+    assert solve_in_batch(scene).final_state != solve_scene(scene).final_state

@@ -1,4 +1,4 @@
-"""A real Dask cluster of processes on this machine: workers die, schedulers die, strangers join."""
+"""Studies on a real Dask cluster of local processes: killed workers, dead schedulers, wrong versions."""
 
 import json
 import operator
@@ -41,7 +41,7 @@ SHORT_S = 3.0
 
 @contextmanager
 def process(*arguments, folder, environment=None):
-    """A process that ends with the test; what it says goes to a file."""
+    """Run a process until the end of the test; its output goes to a file."""
     with (folder / f"{arguments[0]}-{time.monotonic_ns()}.log").open("wb") as log:
         command = [sys.executable, "-m", "dask", *map(str, arguments), "--no-dashboard"]
         running = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=environment)
@@ -54,7 +54,7 @@ def process(*arguments, folder, environment=None):
 
 @contextmanager
 def scheduler(folder):
-    """A scheduler, and its address."""
+    """Run a scheduler; yields its process and address."""
     told = folder / "scheduler.json"
     with process(
         "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", told, folder=folder
@@ -72,7 +72,7 @@ def worker(address, folder, environment=None):
 
 @pytest.fixture
 def cluster(tmp_path):
-    """A scheduler and two workers that have joined it; what is left of them is ended."""
+    """Run a scheduler with two connected workers; remaining processes end with the test."""
     with ExitStack() as stack:
         running, address = stack.enter_context(scheduler(tmp_path))
         workers = [stack.enter_context(worker(address, tmp_path)) for _ in range(2)]
@@ -82,7 +82,7 @@ def cluster(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def longer():
+def long_study():
     return Study(
         frequencies_hz={"start": 180.0, "stop": 300.0, "step": 4.0},
         amplitudes_m=(2e-6, 10e-6),
@@ -94,12 +94,12 @@ def longer():
 
 
 @pytest.fixture(scope="module")
-def truth(longer):
-    return solve_study(longer)
+def truth(long_study):
+    return solve_study(long_study)
 
 
 @pytest.mark.thorough
-def test_a_killed_worker_changes_no_result(cluster, longer, truth, tmp_path, require_equal):
+def test_a_killed_worker_changes_no_result(cluster, long_study, truth, tmp_path, require_equal):
     _, address, workers = cluster
     kept_at_kill = []
 
@@ -108,8 +108,8 @@ def test_a_killed_worker_changes_no_result(cluster, longer, truth, tmp_path, req
             workers[0].kill()
             kept_at_kill.append(progress.done)
 
-    results = solve_study(longer, tmp_path / "a.h5", cluster=address, observer=watch)
-    assert kept_at_kill[0] < longer.grid.size
+    results = solve_study(long_study, tmp_path / "a.h5", cluster=address, observer=watch)
+    assert kept_at_kill[0] < long_study.grid.size
     assert np.all(results.state == PointState.DONE)
     require_equal(results, truth)
     assert results.sessions[0].executor.startswith(f"Dask cluster at {address}")
@@ -117,7 +117,7 @@ def test_a_killed_worker_changes_no_result(cluster, longer, truth, tmp_path, req
 
 @pytest.mark.slow
 def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
-    cluster, longer, truth, tmp_path, require_equal
+    cluster, long_study, truth, tmp_path, require_equal
 ):
     running, address, _ = cluster
     path = tmp_path / "a.h5"
@@ -127,35 +127,35 @@ def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
             running.kill()
 
     executor = ClusterExecutor(address, patience_s=SHORT_S)
-    with FileStore.created(path, longer) as store, pytest.raises(ClusterLost, match=r"is lost.*resume"):
-        run_study(longer, executor, store, watch)
+    with FileStore.created(path, long_study) as store, pytest.raises(ClusterLost, match=r"is lost.*resume"):
+        run_study(long_study, executor, store, watch)
     executor.close()
     kept = np.count_nonzero(open_study(path).arrays[STATE])
-    assert longer.grid.size // 3 <= kept < longer.grid.size
-    results = solve_study(longer, path, ExistingStudy.RESUME, workers=2)
+    assert long_study.grid.size // 3 <= kept < long_study.grid.size
+    results = solve_study(long_study, path, ExistingStudy.RESUME, workers=2)
     assert np.count_nonzero(results.values(SESSION) == 0.0) == kept
     require_equal(results, truth)
 
 
 @pytest.mark.slow
-def test_a_cluster_reports_errors_and_cancels_like_threads(cluster, longer):
+def test_a_cluster_reports_errors_and_cancels_like_threads(cluster, long_study):
     _, address, _ = cluster
     executor = ClusterExecutor(address, operator.neg)
-    store = MemoryStore(longer)
-    assert run_study(longer, executor, store) is StudyEnd.COMPLETE
+    store = MemoryStore(long_study)
+    assert run_study(long_study, executor, store) is StudyEnd.COMPLETE
     executor.close()
-    failures = list(results_of(longer, store.arrays).failures())
-    assert len(failures) == longer.grid.size
+    failures = list(results_of(long_study, store.arrays).failures())
+    assert len(failures) == long_study.grid.size
     assert all("TypeError: bad operand type for unary -: 'Scene'" in why for _, why in failures)
 
     seen = []
     executor = ClusterExecutor(address)
-    store = MemoryStore(longer)
+    store = MemoryStore(long_study)
     began_s = time.monotonic()
-    end = run_study(longer, executor, store, seen.append, lambda: bool(seen))
+    end = run_study(long_study, executor, store, seen.append, lambda: bool(seen))
     executor.close()
     assert end is StudyEnd.CANCELLED
-    assert 0 < np.count_nonzero(store.arrays[STATE]) < longer.grid.size
+    assert 0 < np.count_nonzero(store.arrays[STATE]) < long_study.grid.size
     assert time.monotonic() - began_s < START_PATIENCE_S
 
 

@@ -1,4 +1,4 @@
-"""The promise: a study survives ``kill -9`` at any moment, and goes on with what is missing."""
+"""A study survives ``kill -9`` at any time and resumes with the missing points."""
 
 import random
 import subprocess
@@ -26,29 +26,29 @@ def truth():
     return solve_study(child.STUDY)
 
 
-def killed(path, words, after_answers, delay_s, program=CHILD):
-    """Run the study in another process and kill it; how many answers it had said were kept."""
+def run_and_kill(path, words, after_answers, delay_s, program=CHILD):
+    """Run the study in another process and kill it; return the number of points reported as stored."""
     with words.open("wb") as out:
         process = subprocess.Popen([sys.executable, str(program), str(path)], stdout=out)
         deadline_s = time.monotonic() + PATIENCE_S
-        while said(words) < after_answers and process.poll() is None:
+        while last_count(words) < after_answers and process.poll() is None:
             assert time.monotonic() < deadline_s
         try:
             process.wait(timeout=delay_s)
         except subprocess.TimeoutExpired:
             process.kill()
         process.wait()
-    return said(words)
+    return last_count(words)
 
 
-def said(words):
-    """Last number of a text whose last line may be cut."""
+def last_count(words):
+    """Return the last complete number in a text file whose last line may be cut."""
     numbers = words.read_text().split("\n")[:-1]
     return int(numbers[-1]) if numbers else 0
 
 
-def resumed(path):
-    """Go on in this process; which scenes were begun."""
+def resume(path):
+    """Resume the study in this process and return the computed scenes."""
     begun = []
 
     def noted(scene):
@@ -68,15 +68,15 @@ def test_a_killed_and_resumed_study_gives_the_results_of_an_uninterrupted_study(
     tmp_path, truth, require_equal
 ):
     path, luck = tmp_path / "a.h5", random.Random(0)
-    promised = killed(path, tmp_path / "words", luck.randint(1, 40), luck.uniform(0.0, 0.4))
+    promised = run_and_kill(path, tmp_path / "words", luck.randint(1, 40), luck.uniform(0.0, 0.4))
     kept = open_study(path)
     is_kept = kept.arrays[STATE] == PointState.DONE
     assert np.count_nonzero(is_kept) >= promised
     for name in ("response_i", "final_state", "scene"):
         np.testing.assert_array_equal(kept.arrays[name][is_kept], truth.arrays[name][is_kept])
-    begun = resumed(path)
+    begun = resume(path)
     results = open_study(path)
-    # What was kept is as it was, and exactly what was missing was computed now.
+    # Stored points are unchanged, and exactly the missing points are computed.
     assert len(begun) == np.count_nonzero(~is_kept)
     np.testing.assert_array_equal(results.arrays[SESSION][is_kept], kept.arrays[SESSION][is_kept])
     require_equal(results, truth)

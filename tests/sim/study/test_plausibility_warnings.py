@@ -1,32 +1,32 @@
-"""What looks like a slip of the pen is said, and what is only large is not."""
+"""Implausible values give a warning, and values that are only large do not."""
 
 import pytest
 
 from vibench.sim.study import plausibility_warnings
 
 
-def said(amplitudes_m, gaps_m=(45e-6,)):
+def warnings_for(amplitudes_m, gaps_m=(45e-6,)):
     return list(plausibility_warnings(amplitudes_m, gaps_m))
 
 
 def test_metres_instead_of_micrometres_give_a_warning_with_the_likely_value():
-    (doubt,) = said([5.0])
+    (doubt,) = warnings_for([5.0])
     assert "5 m is 1.1e+05 times the gap of 4.5e-05 m" in doubt
     assert doubt.endswith("give 5e-06")
 
 
 @pytest.mark.parametrize(("amplitude_m", "count"), [(5e-6, 0), (1e-3, 0), (0.0449, 0), (0.0451, 1)])
 def test_only_base_motion_over_1000_gaps_gives_a_warning(amplitude_m, count):
-    assert len(said([5e-7, amplitude_m])) == count
+    assert len(warnings_for([5e-7, amplitude_m])) == count
 
 
 def test_the_largest_amplitude_is_checked_against_the_narrowest_gap():
-    assert len(said([2e-3, 1e-6], gaps_m=(45e-6, 1e-6))) == 1
-    assert len(said([2e-3, 1e-6], gaps_m=(45e-6, 3e-6))) == 0
+    assert len(warnings_for([2e-3, 1e-6], gaps_m=(45e-6, 1e-6))) == 1
+    assert len(warnings_for([2e-3, 1e-6], gaps_m=(45e-6, 3e-6))) == 0
 
 
 @pytest.mark.parametrize(("gaps_m", "count"), [((45.0,), 1), ((30e-6, float("inf")), 0), ((1e-3,), 0)])
 def test_a_finite_gap_wider_than_a_specimen_gives_a_warning(gaps_m, count):
-    found = said([5e-6], gaps_m)
+    found = warnings_for([5e-6], gaps_m)
     assert len(found) == count
     assert all(doubt.endswith("if 45 micrometres were meant, give 4.5e-05") for doubt in found)

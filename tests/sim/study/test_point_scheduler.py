@@ -28,7 +28,7 @@ def test_short_points_are_grouped_into_larger_jobs():
 
 
 def test_the_priority_of_a_point_includes_all_points_waiting_for_it():
-    # 0 <- 1 <- 2 take 6 s in a row; 3 alone takes 5 s.
+    # The chain 0 <- 1 <- 2 takes 6 s, point 3 alone 5 s.
     scheduler = scheduler_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
     assert scheduler.take(0.1, 1) == (0,)
 
@@ -71,7 +71,7 @@ def test_a_point_that_failed_in_a_group_is_repeated_alone():
     st.integers(0, 2**32),
 )
 def test_every_point_is_scheduled_until_finished_and_never_after(points, seed):
-    """Chains of any length, answers in any order, some handed back, some times learnt."""
+    """Chains of any length, replies in any order, some points put back, some costs learnt."""
     luck = random.Random(seed)
     planned_s, is_chained = zip(*points, strict=True)
     after = [number - 1 if number and chained else NOBODY for number, chained in enumerate(is_chained)]

@@ -1,4 +1,4 @@
-"""The queue: same answers whoever computes, errors kept, cancelled at once."""
+"""Running a study: reproducible results for any executor, stored errors, immediate cancellation."""
 
 import random
 from dataclasses import replace
@@ -20,7 +20,7 @@ from .conftest import SHORT
 
 
 class UnreliableExecutor:
-    """Computes in the calling thread; answers in any order, forgets bundles, and breaks some off."""
+    """Executor in the calling thread with random order, lost bundles and incomplete replies."""
 
     def __init__(self, seed, slots):
         self.slots = slots
@@ -79,17 +79,17 @@ def test_any_number_of_threads_gives_the_same_results_bit_for_bit(small, truth, 
     require_equal(solve_study(small, workers=workers), truth)
 
 
-def alone(frequency_hz, amplitude_m, start):
-    """One scene, solved by itself."""
+def single_prediction(frequency_hz, amplitude_m, start):
+    """Return the prediction of a single scene."""
     return solve_scene(
         Scene(gong2025(), Harmonic(frequency_hz, amplitude_m), duration=FixedDuration(0.2, 0.1), start=start)
     )
 
 
 def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
-    first = alone(200.0, 20e-6, Rest())
-    # 200 Hz for 0.2 s are whole turns: the drive goes on at phase zero.
-    second = alone(230.0, 20e-6, Given(first.final_state))
+    first = single_prediction(200.0, 20e-6, Rest())
+    # 0.2 s at 200 Hz are whole periods, so the drive continues at phase zero.
+    second = single_prediction(230.0, 20e-6, Given(first.final_state))
     point = {"amplitude": 20e-6, "frequency": 230.0}
     assert truth.values("response_i", start="up", **point).item() == second.response_i
     assert truth.values("response_i", start="rest", **point).item() != second.response_i
@@ -108,12 +108,12 @@ def test_base_motion_is_continuous_where_a_chain_changes_frequency():
     assert list(results.values(CONTINUES).ravel()) != list(range(3))
 
 
-def test_predictions_state_the_start_of_their_run(truth):
+def test_predictions_name_the_initial_state_of_their_run(truth):
     starts = {(each.start, each.frequency_hz) for each in truth.predictions()}
     assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
 
 
-def test_every_point_begins_at_the_requested_start():
+def test_every_point_begins_at_the_requested_initial_state():
     state = (0.0, 2e-5, 0.0, 0.0, 0.05, 0.0)
     study = Study(
         frequencies_hz=[100.0, 130.0],
@@ -122,12 +122,12 @@ def test_every_point_begins_at_the_requested_start():
         **SHORT,
     )
     found = list(solve_study(study, workers=2).predictions())
-    assert found[1].response_i == alone(130.0, 5e-6, Given(state)).response_i
+    assert found[1].response_i == single_prediction(130.0, 5e-6, Given(state)).response_i
     assert found[1].start == "kick"
 
 
-class SolverWithACrack:
-    """Solves every scene but those near one frequency."""
+class SolverThatFailsAt:
+    """Solver that fails at one frequency."""
 
     def __init__(self, frequency_hz):
         self._frequency_hz = frequency_hz
@@ -140,7 +140,7 @@ class SolverWithACrack:
 
 def test_an_error_in_one_scene_affects_only_its_point(small, truth):
     store = MemoryStore(small)
-    executor = ThreadExecutor(2, SolverWithACrack(200.0))
+    executor = ThreadExecutor(2, SolverThatFailsAt(200.0))
     assert run_study(small, executor, store) is StudyEnd.COMPLETE
     executor.close()
     results = results_of(small, store.arrays)
@@ -152,7 +152,7 @@ def test_an_error_in_one_scene_affects_only_its_point(small, truth):
     failures = list(results.failures())
     assert len(failures) == 6
     assert all(where["frequency"] == 200.0 and "a matrix is singular" in why for where, why in failures)
-    # Whoever should have continued the failed point begins at rest instead, and says so.
+    # The successor of the failed point begins at rest and states this.
     restarted = {"start": "up", "frequency": 230.0}
     assert np.isnan(results.values(CONTINUES, **restarted)).all()
     rested = truth.values("response_i", start="rest", frequency=230.0)
@@ -160,7 +160,7 @@ def test_an_error_in_one_scene_affects_only_its_point(small, truth):
 
 
 class SolverThatStops:
-    """Says of every scene that its run did not reach its end."""
+    """Solver that reports every run as stopped by too many impacts."""
 
     def __call__(self, scene):
         whole = solve_scene(scene)
@@ -181,7 +181,7 @@ def test_a_run_that_did_not_reach_its_end_is_marked_as_stopped(small):
     assert {each.response_i for each in results.predictions()} == {None}
 
 
-def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_equal):
+def test_a_cancelled_study_stops_at_once_and_keeps_its_finished_points(study, require_equal):
     seen = []
     begun = []
 
@@ -196,7 +196,7 @@ def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_
     results = results_of(study, store.arrays)
     kept = int(np.count_nonzero(results.state))
     assert 10 <= kept < study.grid.size
-    # Whatever had begun came to its end and was kept; nothing began afterwards.
+    # Every point that had begun was finished and stored; no point began afterwards.
     assert len(begun) == kept
     whole = solve_study(study).values("response_i")
     is_done = results.state == PointState.DONE

@@ -34,7 +34,7 @@ def test_equal_scenes_have_one_identity_however_they_are_constructed():
     assert scene_identity(again) == scene_identity(SCENE)
 
 
-def test_the_name_of_a_start_does_not_change_the_scene_identity():
+def test_the_name_of_an_initial_state_does_not_change_the_scene_identity():
     one, other = (replace(SCENE, start=Given(STATE, name)) for name in ("kick", "push"))
     assert scene_identity(one) == scene_identity(other)
 

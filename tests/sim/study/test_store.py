@@ -1,4 +1,4 @@
-"""The file: self-describing, committed in an order that cannot lie, resumed and never overwritten."""
+"""Study files are self-describing, consistent after power cuts, resumed and never overwritten."""
 
 import itertools
 import json
@@ -39,8 +39,8 @@ def small():
     )
 
 
-def computed_in(path, study, solver=solve_scene, cancelled=None):
-    """Run a study into its file, which is resumed; the scenes that were begun, and how it ended."""
+def run_into_file(path, study, solver=solve_scene, cancelled=None):
+    """Run or resume a study in its file; return the computed scenes and how the run ended."""
     begun = []
 
     def noted(scene):
@@ -58,7 +58,7 @@ def test_every_prediction_field_of_fixed_length_is_stored():
     kept = set(NUMBERS) | {"motion", "method", "outcome", "ended", "final_state", "memory", "ensemble"}
     of_the_study = {"frequency_hz", "amplitude_m", "accuracy", "start"}
     of_any_length = {"section", "spectrum", "spectrum_hz"}
-    of_the_call = {"target"}  # what was requested and when it was met; its error is kept
+    of_the_call = {"target"}  # the request is not stored; the reached error is
     fields = set(ScenePrediction.__dataclass_fields__)
     assert fields == kept | of_the_study | of_any_length | of_the_call
 
@@ -74,7 +74,7 @@ def test_a_study_file_round_trips(small, tmp_path, require_equal):
 
 
 def test_motions_of_an_ensemble_round_trip_through_the_study_file(tmp_path):
-    """Chaos that dies out within a few tens of seconds: some starts have settled after twelve."""
+    """Chaos ends within a few tens of seconds here: some runs have settled after 12 s."""
     study = Study(
         frequencies_hz=[242.0],
         amplitudes_m=[5e-6],
@@ -135,10 +135,10 @@ def test_sessions_record_which_executor_computed_which_point(small, tmp_path):
     path = tmp_path / "a.h5"
     make_file(path, small)
     count = itertools.count()
-    _, end = computed_in(path, small, cancelled=lambda: next(count) >= 0)
+    _, end = run_into_file(path, small, cancelled=lambda: next(count) >= 0)
     assert end is StudyEnd.CANCELLED
     first = open_study(path)
-    computed_in(path, small)
+    run_into_file(path, small)
     results = open_study(path)
     assert len(results.sessions) == 2
     assert "numpy" in json.loads(results.sessions[0].software_json)
@@ -152,10 +152,10 @@ def test_resuming_computes_only_missing_points(study, tmp_path, require_equal):
     path = tmp_path / "a.h5"
     make_file(path, study)
     count = itertools.count()
-    begun, end = computed_in(path, study, cancelled=lambda: next(count) >= 3)
+    begun, end = run_into_file(path, study, cancelled=lambda: next(count) >= 3)
     assert end is StudyEnd.CANCELLED
     assert 0 < len(begun) < study.grid.size
-    more, end = computed_in(path, study)
+    more, end = run_into_file(path, study)
     assert end is StudyEnd.COMPLETE
     assert len(begun) + len(more) == study.grid.size
     require_equal(open_study(path), solve_study(study))
@@ -201,7 +201,7 @@ def test_a_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
 
 
 def test_a_short_read_of_its_file_does_not_stop_a_study(small, tmp_path):
-    """A reader holds HDF5's lock while it looks: a study that began just then was refused its own file."""
+    """A reader holds the HDF5 lock for a moment; a study that starts then must wait for its file."""
     path = tmp_path / "a.h5"
     make_file(path, small)
     reader = h5py.File(path, "r")
@@ -247,7 +247,7 @@ def test_a_missing_folder_of_a_study_is_named_in_the_error(small, tmp_path):
 
 
 class LoggingDisk:
-    """Writes, and remembers what was written since the last sync, and before."""
+    """Disk that logs every write and sync."""
 
     def __init__(self, path):
         self._inner = sole_writer(path)
@@ -266,7 +266,7 @@ class LoggingDisk:
 
 
 def images_after_power_cuts(empty, log, luck):
-    """Every state of the disk that a power cut may leave: what was synced, and any part of the rest."""
+    """Yield disk contents that a power cut may leave: synced data and any part of later writes."""
     safe, loose = bytearray(empty), []
     for entry in [*log, None]:
         if entry is None:
