@@ -1,4 +1,4 @@
-"""Verdicts follow from the numbers alone: the defaults first, then the options, in order."""
+"""The verdict of a claim follows from its numbers: first with the defaults, then with each option."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ def no_studies(study):
     raise AssertionError(f"a synthetic measurement asked for {study}")
 
 
-def made(measure, *wanted, tried=(), **more):
+def make(measure, *wanted, tried=(), **more):
     return claim("section 3", "Read off.", *wanted, tried=tried, **more)(measure)
 
 
@@ -29,7 +29,7 @@ def judge(values_by_damping, *wanted, tried=(DAMPED, VERY_DAMPED)):
         """It is so."""
         return values_by_damping[reading.case.damping_time_s]
 
-    return judgement(made(measure, *wanted, tried=tried), Evidence(no_studies), CASE)
+    return judgement(make(measure, *wanted, tried=tried), Evidence(no_studies), CASE)
 
 
 def test_a_claim_takes_its_key_and_text_from_its_function():
@@ -62,9 +62,9 @@ def test_a_claim_that_holds_under_no_option_fails_and_keeps_all_findings():
     assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
 
 
-def test_a_claim_that_holds_from_some_starts_holds_for_a_share_of_starts():
+def test_a_claim_that_holds_for_some_initial_states_states_their_share():
     last_hz = (310.0, 288.0, 291.0, 330.0)
-    sweep = made(lambda r: (last_hz[r.case.draw],), about("last", "Hz", 290.0, 5.0), tried=(DAMPED,), draws=4)
+    sweep = make(lambda r: (last_hz[r.case.draw],), about("last", "Hz", 290.0, 5.0), tried=(DAMPED,), draws=4)
     found = judgement(sweep, Evidence(no_studies), CASE)
     assert found.verdict is Verdict.HOLDS_FOR_SHARE
     (only,) = found.findings
@@ -72,17 +72,17 @@ def test_a_claim_that_holds_from_some_starts_holds_for_a_share_of_starts():
     assert verdict_text(found) == "holds for a share of starts: 2 of 4 (15 to 85 %)"
 
 
-def test_a_claim_that_holds_from_no_start_is_tested_under_options():
+def test_a_claim_that_holds_for_no_initial_state_is_tested_under_options():
     def measure(reading):
         return (100.0 + reading.case.draw if reading.case.damping_time_s == 3e-5 else 10.0,)
 
-    both = made(measure, at_least("exponent", "1/s", 50.0), tried=(DAMPED,), draws=3)
+    both = make(measure, at_least("exponent", "1/s", 50.0), tried=(DAMPED,), draws=3)
     found = judgement(both, Evidence(no_studies), CASE)
     assert found.verdict is Verdict.HOLDS_UNDER
     assert [len(each.draws) for each in found.findings] == [3, 3]
 
 
-def test_random_starts_are_reproducible_and_within_a_millionth_of_the_gap():
+def test_random_initial_states_are_reproducible_and_within_a_millionth_of_the_gap():
     assert CASE.start == (0.0,) * 6
     moved = replace(CASE, draw=3)
     assert 0.0 < max(abs(value) for value in moved.start[:3]) <= 1e-6 * CASE.gap_m
@@ -102,7 +102,7 @@ def test_a_nan_value_meets_no_expectation():
 
 @given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
 def test_expectation_bounds_include_their_ends(low, width, value):
-    wanted = made(no_studies, Expectation("anything", "", low, low + width))
+    wanted = make(no_studies, Expectation("anything", "", low, low + width))
     assert wanted.is_met_by((low,))
     assert wanted.is_met_by((low + width,))
     assert wanted.is_met_by((value,)) == (low <= value <= low + width)

@@ -1,4 +1,4 @@
-"""Every option changes what it says that it changes, and a bad value is one sentence."""
+"""Every option changes its own setting, and an invalid value is refused in one sentence."""
 
 import math
 from dataclasses import replace
@@ -23,12 +23,12 @@ CASE = Case()
 NOTHING = Evidence(lambda study: pytest.fail(f"asked for {study}"))
 
 
-def under(*said, **options):
+def case_for(*said, **options):
     return case_with(FigureOptions(**options), said)
 
 
 def test_the_zeta_option_sets_the_damping_ratio_of_every_mass():
-    case = under("zeta=0.0165")
+    case = case_for("zeta=0.0165")
     study = case.study(("hertz",), (5e-6,))
     for specimen in (case.specimen(), study.scene((0,) * 6, Rest()).specimen):
         m, k, c = (np.array(each) for each in (specimen.masses, specimen.stiffnesses, specimen.dampings))
@@ -40,7 +40,7 @@ def test_the_zeta_option_sets_the_damping_ratio_of_every_mass():
 
 @pytest.mark.parametrize("model", ["power:3", "power:47", "power:3@0.05+5@0.15+7@0.8"])
 def test_a_fitted_model_has_the_contact_force_at_the_fitted_indentation(model):
-    case = under("fit=0.45e-6")
+    case = case_for("fit=0.45e-6")
     fitted, stops = (
         spring_of(case.specimen(each)).force(np.array([45.45e-6]), np.zeros(1))[0]
         for each in (model, "hertz")
@@ -66,13 +66,13 @@ def test_models_are_compared_up_to_the_requested_frequency():
 
 def test_the_sweep_option_gives_a_linear_sweep_up_or_down():
     assert sweep_of(CASE)[1] == LinearSweep(150.0, 350.0, 200.0, 5e-6)
-    assert sweep_of(under("sweep=down"))[1] == LinearSweep(350.0, 150.0, 200.0, 5e-6)
-    assert sweep_of(under("sweep-amplitude=4e-6"))[1].amplitude_m == 4e-6
+    assert sweep_of(case_for("sweep=down"))[1] == LinearSweep(350.0, 150.0, 200.0, 5e-6)
+    assert sweep_of(case_for("sweep-amplitude=4e-6"))[1].amplitude_m == 4e-6
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 3.0])
 def test_the_sweep_amplitude_follows_the_requested_power_of_frequency(power):
-    even, drive = sweep_of(under(f"sweep-falls={power}"))
+    even, drive = sweep_of(case_for(f"sweep-falls={power}"))
     rate_hz = drive.sample_rate_hz
     for at_s in (0.0, 100.0, 199.0):
         cycles = drive.displacement_m[int(at_s * rate_hz) : int((at_s + 0.5) * rate_hz)]
@@ -83,7 +83,7 @@ def test_the_sweep_amplitude_follows_the_requested_power_of_frequency(power):
 
 @pytest.mark.thorough
 def test_the_exponents_option_uses_ode45_only_for_colliding_points():
-    case = under("exponents=ode45", duration_s=0.3, window_s=0.1)
+    case = case_for("exponents=ode45", duration_s=0.3, window_s=0.1)
     frequency_hz = np.array([30.0, 260.0])
     some = np.ones(2)
     curve = Responses(frequency_hz, some, some, some, np.array([-1.5, 110.0]), np.array([False, True]))
@@ -95,7 +95,7 @@ def test_the_exponents_option_uses_ode45_only_for_colliding_points():
 
 
 def test_options_for_sum_logarithm_and_gap_are_applied():
-    case = under("sum=3@0.1+7@0.9", "log=m", "gap=30e-6")
+    case = case_for("sum=3@0.1+7@0.9", "log=m", "gap=30e-6")
     assert (case.sum_model, case.logarithm_of, case.gap_m) == (
         "power:3@0.1+7@0.9",
         "m",

@@ -1,4 +1,4 @@
-"""The page says what was found, and the page in docs was made by this code from these claims."""
+"""The claims page shows the verdicts, and the page in docs matches the claims in the code."""
 
 import re
 from pathlib import Path
@@ -19,17 +19,17 @@ NO_STUDIES = Evidence(lambda study: pytest.fail(f"asked for {study}"))
 WANTED = at_least("exponent", "1/s", 100.0)
 
 
-def judged(key, measure, **more):
+def verdict_on(key, measure, **more):
     measure.__name__, measure.__doc__ = key, f"It is so with {key}."
     made = claim("section 3", "Read off.", WANTED, tried=(damping(3e-5),), **more)(measure)
     return judgement(made, NO_STUDIES, Case())
 
 
 def by_damping(key, value_by_damping):
-    return judged(key, lambda reading: (value_by_damping[reading.case.damping_time_s],))
+    return verdict_on(key, lambda reading: (value_by_damping[reading.case.damping_time_s],))
 
 
-def scored(*held_and_failed):
+def score_rows(*held_and_failed):
     return tuple(
         DampingScore(damping_s, held, failed, -1.5, 120.0)
         for damping_s, (held, failed) in zip((2e-5, 3e-5), held_and_failed, strict=False)
@@ -43,7 +43,7 @@ def found():
         by_damping("second", {2e-5: 50.0, 3e-5: 130.0}),
         by_damping("third", {2e-5: 50.0, 3e-5: 60.0}),
     )
-    scores = scored((("first",), ("second", "third")), (("first", "second"), ("third",)))
+    scores = score_rows((("first",), ("second", "third")), (("first", "second"), ("third",)))
     regions = ReportTable("Regions", ("A0", "colliding"), (("1 µm", "nowhere"),), "Frequencies.")
     return Reproduction(
         {"Synthetic": judgements}, scores, (score_table(scores), regions), "Defaults: these.", "By nobody."
@@ -80,15 +80,15 @@ def test_the_claims_page_begins_with_differences_and_agreeing_options(found):
     assert "- **third**: It is so with third. It holds under none of 1 options tested." in summary
 
 
-def test_an_option_that_holds_from_some_starts_is_reported_with_their_number():
-    """A sweep downwards held for most starts, and the page said that it does not hold."""
+def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_number():
+    """A claim that held for most initial states was once listed as "does not hold" only."""
 
     def measure(reading):
         return (130.0 if reading.case.damping_time_s == 3e-5 and reading.case.draw != 2 else 50.0,)
 
-    found = judged("chance", measure, draws=4)
+    found = verdict_on("chance", measure, draws=4)
     page = reproduction_document(
-        Reproduction({"Synthetic": (found,)}, scored(((), ("chance",))), (), "Defaults: these.", "")
+        Reproduction({"Synthetic": (found,)}, score_rows(((), ("chance",))), (), "Defaults: these.", "")
     )
     except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
     assert f"It holds under none of 1 options tested{except_it}." in page
@@ -143,9 +143,9 @@ def test_the_claims_page_in_docs_matches_the_claims_in_the_code():
 
 def test_the_claims_page_in_docs_has_the_damping_scores_and_figures():
     page = PAGE.read_text(encoding="utf-8")
-    scored = re.findall(r"^\| (\S+) s \| \d+ of (\d+) \|", page, re.MULTILINE)
+    score_rows = re.findall(r"^\| (\S+) s \| \d+ of (\d+) \|", page, re.MULTILINE)
     asked = sum(claim.is_scored for claim in CLAIMS)
-    assert [(float(each), int(of)) for each, of in scored] == [(each, asked) for each in SCORED_S]
+    assert [(float(each), int(of)) for each, of in score_rows] == [(each, asked) for each in SCORED_S]
     pictures = re.findall(r"^!\[.*\]\((.*)\)$", page, re.MULTILINE)
     assert pictures
     assert all((PAGE.parent / each).is_file() for each in pictures)

@@ -1,4 +1,4 @@
-"""The paper's figures from short studies: they draw what was computed, and show what the paper shows."""
+"""The paper's figures from short studies show the computed data and the effects in the paper."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
 
 @pytest.fixture(scope="module")
 def solved():
-    """Solve each study once."""
+    """Return a function that solves each study once."""
     found = {}
 
     def solve(study):
@@ -29,7 +29,7 @@ def solved():
     return solve
 
 
-def drawn(solved, number, options=SHORT):
+def draw(solved, number, options=SHORT):
     figure = paper_figure(number)
     return figure.draw(options, *(solved(each) for each in figure.studies(options)))
 
@@ -43,7 +43,7 @@ def numbers(table, heading):
     "number", [1, 2, 3, 5, 7, *(pytest.param(n, marks=pytest.mark.slow) for n in (6, 8, 9, 11))]
 )
 def test_a_paper_figure_is_saved_in_every_format_with_its_numbers(solved, number, tmp_path):
-    found = drawn(solved, number)
+    found = draw(solved, number)
     paths = found.save(tmp_path, list(ImageKind))
     heads = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     for path in paths:
@@ -55,7 +55,7 @@ def test_a_paper_figure_is_saved_in_every_format_with_its_numbers(solved, number
 
 @pytest.mark.thorough
 def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solved):
-    weak, *_, strong = drawn(solved, 3).tables
+    weak, *_, strong = draw(solved, 3).tables
     f = numbers(weak, "frequency_hz")
 
     def peaks(table):
@@ -70,7 +70,7 @@ def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solv
 @pytest.mark.thorough
 def test_figure_3_shades_only_the_frequencies_with_collisions(solved):
     results = solved(paper_figure(3).studies(SHORT)[0])
-    for amplitude_m, table in zip(AMPLITUDES_M, drawn(solved, 3).tables, strict=True):
+    for amplitude_m, table in zip(AMPLITUDES_M, draw(solved, 3).tables, strict=True):
         curve = responses(results, amplitude=amplitude_m)
         assert np.array_equal(numbers(table, "collides") > 0, curve.collides)
     shares = [responses(results, amplitude=each).collides.mean() for each in AMPLITUDES_M]
@@ -93,7 +93,7 @@ def test_collision_shading_extends_halfway_to_neighbouring_points():
 
 @pytest.mark.thorough
 def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solved):
-    (table,) = drawn(solved, 5).tables
+    (table,) = draw(solved, 5).tables
     share = {name: numbers(table, f"collides_{name}").mean() for name in ("damped", "undamped", "damped_7um")}
     assert share["damped"] < share["undamped"]
     assert share["damped"] < share["damped_7um"]
@@ -101,9 +101,9 @@ def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solved
 
 @pytest.mark.thorough
 def test_figure_7_has_the_papers_rates_at_the_weakest_level(solved):
-    caption = drawn(solved, 7).caption
+    caption = draw(solved, 7).caption
     assert "log10 of the response [mm]" in caption
-    titles = [axes.get_title() for axes in drawn(solved, 7).figure.axes]
+    titles = [axes.get_title() for axes in draw(solved, 7).figure.axes]
     assert "Response I: R = 8" in titles[0]
 
 
@@ -112,8 +112,8 @@ def test_the_argument_of_the_logarithm_is_an_option_of_figure_7(solved):
     other = FigureOptions(
         accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED
     )
-    assert drawn(solved, 7, other).caption != drawn(solved, 7).caption
-    assert drawn(solved, 7, other).figure.axes[0].get_title() != drawn(solved, 7).figure.axes[0].get_title()
+    assert draw(solved, 7, other).caption != draw(solved, 7).caption
+    assert draw(solved, 7, other).figure.axes[0].get_title() != draw(solved, 7).figure.axes[0].get_title()
 
 
 @pytest.mark.parametrize(("name", "value"), [("gap_m", 0.0), ("damping_time_s", -1.0), ("gap_m", np.nan)])

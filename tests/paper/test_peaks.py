@@ -1,4 +1,4 @@
-"""Peaks are where closed forms say, and roughness is none."""
+"""Peaks of curves are at the closed-form frequencies, and ripples are not peaks."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Claims are measured on studies that are solved here: short runs, on the coarse grid."""
+"""Claims of the paper are measured on short studies on a coarse grid."""
 
 from dataclasses import replace
 

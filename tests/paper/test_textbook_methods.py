@@ -1,4 +1,4 @@
-"""Textbook methods are what they are called, and an impact costs the energy that their steps make it cost."""
+"""Textbook integrators have their known order, and their steps change the energy in impacts."""
 
 import math
 from dataclasses import replace
@@ -23,8 +23,8 @@ def end_of(specimen, method, duration_s):
     return textbook_states(specimen, DRIVE, method, duration_s, [MOVING])[0]
 
 
-def energy_kept(method, speed, late_s):
-    """Of impacts that begin so late in a step, shape as ``late_s``."""
+def energy_ratios(method, speed, late_s):
+    """Return the energy ratios of impacts that begin ``late_s`` after the begin of a step."""
     before = np.zeros((len(late_s), 6))
     before[:, 1], before[:, 4] = FREE.gap_m - speed * late_s, speed
     after = textbook_states(FREE, Harmonic(100.0, 0.0), method, 4e-4, before)
@@ -53,14 +53,14 @@ def test_motions_computed_together_equal_motions_computed_singly():
     for method in (ode45(), runge_kutta(2e-6)):
         together = textbook_states(gong2025(), DRIVE, method, 5e-4, starts)
         for start, end in zip(starts, together, strict=True):
-            # The choice of steps amplifies rounding.
+            # Step size control amplifies rounding errors.
             assert state_error(end, textbook_states(gong2025(), DRIVE, method, 5e-4, [start])[0]) < 1e-8
 
 
 def test_ode45_conserves_impact_energy_and_long_runge_kutta_steps_do_not():
-    kept = [energy_kept(ode45(), each, np.zeros(1))[0] for each in (0.03, 0.1, 0.3)]
+    kept = [energy_ratios(ode45(), each, np.zeros(1))[0] for each in (0.03, 0.1, 0.3)]
     np.testing.assert_allclose(kept, 1.0, atol=0.01)
-    mean = energy_kept(runge_kutta(2e-5), 0.03, np.linspace(0, 2e-5, 20)).mean()
+    mean = energy_ratios(runge_kutta(2e-5), 0.03, np.linspace(0, 2e-5, 20)).mean()
     assert mean == pytest.approx(0.90, abs=0.02)
 
 
@@ -75,7 +75,7 @@ def test_textbook_exponents_without_contact_are_the_slowest_decay(method):
 
 @pytest.mark.thorough
 def test_chaos_under_a_tight_tolerance_matches_the_exact_motion():
-    # Many short motions, which go together, in place of a long one.
+    # Many short motions, computed together, replace one long motion.
     drives = [Harmonic(260.0, 5e-6, phase) for phase in np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)]
     exact = lyapunov_exponent(gong2025(), Harmonic(260.0, 5e-6)).exponent_per_s
     tight, usual = (
@@ -101,6 +101,6 @@ def test_an_invalid_step_or_tolerance_is_refused(value):
 
 
 def test_no_drives_give_no_exponents():
-    """As where nothing collides: the page of the paper's claims follows only motions that do."""
+    """The claims page follows only colliding motions, and there may be none."""
     assert textbook_exponents(gong2025(), [], ode45()).shape == (0,)
     assert textbook_exponents(gong2025(), [], runge_kutta(1e-3)).shape == (0,)
