@@ -1,4 +1,4 @@
-"""Campaign files: defaults, refusals, exact round trips, and the two that are shipped."""
+"""Campaign files: defaults, refusals, exact round trips, and the shipped files."""
 
 import re
 import tomllib
@@ -66,7 +66,7 @@ EXCITATIONS = st.one_of(
     st.just(SineSweep(amplitude_vpp=1.5, start_hz=350, stop_hz=150, duration_s=20)),
     st.just(StreamedNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, duration_s=9)),
 )
-# Lone surrogates are no text: no file can hold them.
+# Lone surrogates are not text and cannot be stored in a file.
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 MEASUREMENTS = st.builds(
     Measurement,
@@ -93,7 +93,7 @@ class TestRoundTrips:
         assert load_campaign(path) == campaign
 
     @given(measurement=MEASUREMENTS)
-    def test_a_measurement_round_trips_through_json(self, measurement):
+    def test_a_measurement_is_unchanged_after_writing_and_reading_json(self, measurement):
         assert Measurement.model_validate_json(measurement.model_dump_json()) == measurement
 
     @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -109,7 +109,7 @@ class TestDefaults:
         assert measurement.ramp_s == 0.7
         assert measurement.excitation.settle_s == 9.0
 
-    def test_a_value_of_a_measurement_overrides_the_default(self, tmp_path):
+    def test_a_value_in_a_measurement_overrides_the_default(self, tmp_path):
         text = 'name = "c"\n[defaults.dwell]\nduration_s = 9.0\n' + DWELL_TABLE
         (measurement,) = loaded(tmp_path, text).measurements
         assert measurement.excitation.duration_s == 2.0
@@ -188,11 +188,11 @@ class TestEstimates:
         )
         campaign = Campaign(name="c", measurements=(plan,))
         assert campaign.recording_names() == ("a-1", "a-2", "a-3")
-        # Each: 0.6 s of check, a second of ramp, 3 s of settling, 7 s of dwell, a second of ramp.
+        # Each: 0.6 s of check, 1 s of ramp up, 3 s of settling, 7 s of dwell, 1 s of ramp down.
         assert campaign.duration_s == pytest.approx(3 * 12.6)
         assert campaign.size_bytes(1000.0, 2) == 3 * 12600 * 2 * 4
 
-    def test_a_change_of_waveform_adds_a_ramp_down_and_up(self):
+    def test_the_duration_includes_a_ramp_down_and_up_at_each_change_of_waveform(self):
         noise = WhiteNoise(
             amplitude_vpp=1, band_start_hz=20, band_stop_hz=90, realisations=4, periods=2, settle_s=1
         )

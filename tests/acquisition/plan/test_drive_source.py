@@ -1,4 +1,4 @@
-"""Sines are the generator's unless an output is plugged in for them; streams are always the output's."""
+"""Sines use the generator unless an output is configured for them; streams always use the output."""
 
 import pytest
 
@@ -50,7 +50,7 @@ def test_a_stream_requires_an_analogue_output_even_if_the_rig_has_none(rig):
     assert drive_source(STREAM, rig) is DriveSource.OUTPUT
 
 
-def test_the_output_limit_applies_only_to_its_own_signals(rig):
+def test_the_limit_of_the_analogue_output_applies_only_to_signals_it_plays(rig):
     measurement = Measurement(name="m", excitation=TONES[0])
     named = "the analogue output's voltage (peak)"
     by_generator = limit_checks(measurement, with_output(rig, OutputUse.STREAMS))

@@ -1,4 +1,4 @@
-"""Predicted loads against closed forms, and what is refused."""
+"""Predicted loads match closed forms, and plans beyond a limit are refused."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from vibench.acquisition.rig import BaseQuantity, RigModel, shaker_of
 
 @pytest.fixture
 def linear_rig(rig):
-    """A rig whose specimen strikes no stops."""
+    """Return a rig whose specimen has no contact."""
     return rig.model_copy(update={"specimen": rig.specimen.model_copy(update={"contact": "linear"})})
 
 
@@ -57,7 +57,7 @@ def test_a_sweep_is_checked_at_the_largest_response_of_the_rig(rig):
 
 
 def test_predicted_peaks_of_a_waveform_match_time_integration(rig):
-    """The Fourier prediction against a step-by-step solution of the shaker's equations, nearly unladen."""
+    """Compare the Fourier prediction with time integration, with a specimen of almost no mass."""
     light = {"masses_kg": tuple(1e-6 * each for each in rig.specimen.masses_kg), "contact": "linear"}
     rig = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=light)})
     noise = WhiteNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=200, repetition_hz=2, realisations=1)
@@ -69,7 +69,7 @@ def test_predicted_peaks_of_a_waveform_match_time_integration(rig):
     time_s = np.arange(len(held)) / (8192 * fine * 2)
     space = shaker_of(rig).equations()
     terminal_v = held * 0.5 * 2.0 * rig.generator.terminal_factor()
-    # The amplifier's band edges are far outside 20 to 200 Hz: its gain alone stands for it here.
+    # The band edges of the amplifier are far outside 20 to 200 Hz: its gain is sufficient here.
     voltage = terminal_v * rig.amplifier.gain
     _, _, states = lsim((space.A, space.B[:, :1], np.eye(3), np.zeros((3, 1))), voltage, time_s, interp=False)
     last = states[-len(held) // 3 :]
@@ -88,7 +88,7 @@ def test_streamed_noise_reaches_exactly_the_terminal_range(rig):
 @pytest.mark.thorough
 @given(factor=st.floats(0.01, 5))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_predicted_loads_grow_with_the_generator_setting(linear_rig, factor):
+def test_predicted_loads_are_proportional_to_the_generator_setting(linear_rig, factor):
     one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), linear_rig)
     more = predicted_loads(Dwell(amplitude_vpp=factor, frequency_hz=50, duration_s=1), linear_rig)
     for quantity in BaseQuantity:
@@ -115,7 +115,7 @@ def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):
     assert text.endswith("Nothing was played.")
 
 
-def test_all_limit_violations_are_in_one_message(rig):
+def test_all_limit_violations_are_listed_in_one_message(rig):
     with pytest.raises(LimitExceeded) as refused:
         require_within_limits(
             plan(Dwell(amplitude_vpp=18, frequency_hz=5000, duration_s=1), ramp_s=0.05, ramp_step_s=0.01), rig

@@ -1,4 +1,4 @@
-"""What a measurement will be is known before anything moves."""
+"""The preview of a measurement shows its signal, limits and duration before anything plays."""
 
 from pathlib import Path
 
@@ -45,7 +45,7 @@ def test_limit_checks_are_sorted_by_use_and_violations_are_marked(rig):
     assert "generator" in seen.checks[0].complaint()
 
 
-def test_a_long_sweep_is_shown_from_a_bounded_number_of_samples(rig):
+def test_a_preview_of_a_long_sweep_has_a_bounded_number_of_samples(rig):
     excitation = QUICK["sweep"].excitation.model_copy(update={"duration_s": 900.0})
     seen = preview_measurement(QUICK["sweep"].model_copy(update={"excitation": excitation}), rig)
     assert len(seen.volts) <= 1.01 * MOST_SAMPLES

@@ -1,4 +1,4 @@
-"""Campaigns over points of measurement: names, order, numbers, and points that are refused."""
+"""Scan campaigns: names, order, node numbers, and points that are refused."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How a measurement is laid out in time, before anything plays."""
+"""The time schedule of a measurement: check, ramp, lead-in, settling and recording."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def test_a_sweep_starts_after_check_ramp_and_settling():
     assert lead_in_s(measurement(sweep)) == pytest.approx(CHECK_S + 0.5 + 2.0)
 
 
-def test_the_tones_that_lead_to_a_dwell_are_part_of_its_lead_in():
+def test_the_lead_in_tones_of_a_dwell_are_part_of_its_lead_in_time():
     tones = tuple(LeadIn(frequency_hz=hz, amplitude_vpp=1.0) for hz in (90, 95))
     dwell = Dwell(amplitude_vpp=1.0, frequency_hz=100, duration_s=5, settle_s=1.0, lead_in=tones, lead_s=0.25)
     assert lead_in_s(measurement(dwell)) == pytest.approx(CHECK_S + 0.5 + 2 * 0.25 + 1.0)

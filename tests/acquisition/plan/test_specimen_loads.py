@@ -1,4 +1,4 @@
-"""The specimen's motion foretold by a plan: exact while nothing collides, near the truth when it does."""
+"""Predicted motion of the specimen: exact without contact, approximate with contact."""
 
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ from vibench.sim.shaker.loaded_shaker import LoadedShaker
 RATE_HZ = 51_200.0
 
 
-def settled_m(rig, amplitude_vpp, frequency_hz):
-    """Largest displacement of m0 against the table in the last second of six, followed in time [m]."""
+def peak_m(rig, amplitude_vpp, frequency_hz):
+    """Return the largest displacement of m0 relative to the table in the last of six seconds [m]."""
     step_s = 1 / RATE_HZ
     shaken = LoadedShaker(amplifier_of(rig), shaker_of(rig), specimen_of(rig), step_s)
     middle_s = (np.arange(round(6 * RATE_HZ)) + 0.5) * step_s
@@ -35,21 +35,21 @@ def settled_m(rig, amplitude_vpp, frequency_hz):
 def test_predicted_motion_without_contact_matches_the_linear_response(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=0.02, frequency_hz=266, duration_s=1), rig)
     assert loads[BaseQuantity.P].peak < specimen_of(rig).gap_m
-    assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(settled_m(rig, 0.02, 266.0), rel=2e-3)
+    assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(peak_m(rig, 0.02, 266.0), rel=2e-3)
     assert loads[BaseQuantity.AMPLITUDE].cause == "at 266 Hz"
 
 
 @pytest.mark.parametrize("frequency_hz", [180.0, 201.0, 440.0])
 def test_predicted_motion_with_contact_is_within_50_percent(rig, frequency_hz):
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
-    assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(settled_m(rig, 8.0, frequency_hz), rel=0.5)
+    assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(peak_m(rig, 8.0, frequency_hz), rel=0.5)
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(frequency_hz=st.floats(150, 300), level=st.floats(0.05, 0.99))
 @example(frequency_hz=195.0, level=0.5)
 def test_motion_during_ramps_stays_within_the_prediction(rig, frequency_hz, level):
-    """Ramps pass every level, and the base may move less at a higher one: stops take the notch away."""
+    """At ramp levels the base may move more than at full level, since contact removes the antiresonance."""
     model = RigModel(rig)
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
     passed_v = 0.5 * 8 * level * rig.generator.terminal_factor()
@@ -66,7 +66,7 @@ def test_noise_loads_follow_the_free_or_stuck_linear_response(rig, kind):
     hz, model = np.arange(50.0, 600.0, 0.25), RigModel(rig)
 
     def rms_m(noise, transfer):
-        """Of noise that is as strong at every frequency of its band, through a linear specimen."""
+        """Return the rms displacement [m] of a linear specimen driven by noise with a flat spectrum."""
         volts = noise.preview(2048.0).rms_v * rig.generator.terminal_factor()
         return volts * np.sqrt(np.mean(np.abs(transfer(BaseQuantity.AMPLITUDE, hz)) ** 2))
 

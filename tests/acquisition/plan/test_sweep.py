@@ -1,4 +1,4 @@
-"""Nested sweeps: their points, names, order and chains, and what is refused."""
+"""Nested sweeps: points, names, order, chains and refusals."""
 
 import pytest
 
@@ -35,7 +35,7 @@ class TestOrder:
         )
         assert names(plan) == [f"line-{hz}hz-{level}vpp" for hz in (200, 210) for level in ("0p5", "1p5")]
 
-    def test_repetitions_are_a_sweep_axis(self):
+    def test_repetitions_can_be_a_sweep_axis(self):
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
         assert [name[:7] for name in names(plan)] == ["line-r1", "line-r1", "line-r2", "line-r2"]
 
@@ -51,7 +51,7 @@ class TestOrder:
         assert by_name["line-stepped_sine-down"].direction == "down"
         assert {excitation.settle_s for excitation in by_name.values()} == {0.5}
 
-    def test_measurements_come_before_sweeps_and_defaults_reach_both(self, tmp_path):
+    def test_measurements_come_before_sweeps_and_defaults_apply_to_both(self, tmp_path):
         path = tmp_path / "c.toml"
         path.write_text("""
 name = "c"
@@ -150,7 +150,7 @@ class TestChains:
         assert peak == pytest.approx(predicted_loads(alone, rig)[BaseQuantity.ACCELERATION].peak)
         require_within_limits(last, rig)
 
-    def test_a_chain_round_trips_through_toml(self, tmp_path):
+    def test_a_chain_is_unchanged_after_writing_and_reading_toml(self, tmp_path):
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 205], continue_from_previous="frequency_hz")
         path = tmp_path / "c.toml"
         path.write_text(toml_text(plan))

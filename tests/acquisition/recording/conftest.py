@@ -1,4 +1,4 @@
-"""A small recording to write and read: two channels of a 24-bit converter."""
+"""A small recording of two channels of a 24-bit converter, for tests that write and read."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def make_header():
 
 @pytest.fixture
 def make_block():
-    """Blocks whose counts are known: full 24-bit numbers from a seed and a position."""
+    """Return a function that makes random 24-bit counts and a block, both determined by seed and position."""
 
     def make(first_sample, samples, channels=2, overloads=()):
         counts = np.random.default_rng([first_sample, samples]).integers(

@@ -1,8 +1,8 @@
-"""A program that records until it is killed, and says on its standard output what it has handed over.
+"""A program that records until it is killed, and prints how many samples it has handed over.
 
-With arguments (the path of the recording, and how many blocks to record before finishing) it records
-once. Without, it records again and again, each time in a process forked off for it, as the JSON lines
-on its standard input say: a fork is there in milliseconds, where a new interpreter takes a second.
+With arguments (path of the recording, number of blocks) it records once. Without arguments it records
+repeatedly, as the JSON lines on its standard input say, each time in a forked process: a fork takes
+milliseconds, a new interpreter a second.
 """
 
 import json
@@ -31,13 +31,13 @@ COUNTER_BYTES = 8
 
 
 def truth(first, stop, row):
-    """Counts that anybody can compute from the sample's number: full 24 bits, no pattern a shift repeats."""
+    """Return 24-bit counts that depend on sample number and row only, without a short repeating pattern."""
     hashed = (np.arange(first, stop, dtype=np.int64) * (2 * row + 1) * SPREAD) % 2**24
     return (hashed - 2**23).astype(np.int32)
 
 
 class DeadlyDisk:
-    """A disk that kills its process at the n-th step of its commits: a sync, or the write of a counter."""
+    """A disk that kills its process at the n-th step of a commit: a sync, or the write of a counter."""
 
     def __init__(self, disk, step):
         self._disk = disk
@@ -95,7 +95,7 @@ def serve():
         os.write(1, f"pid {pid}\n".encode())
         os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
         os.write(1, b"ended\n")
-        sys.stdin.readline()  # until then the number is nobody else's, so that nobody else can be killed
+        sys.stdin.readline()  # until then the number is not reused, so that no other process can be killed
         os.waitpid(pid, 0)
 
 

@@ -1,4 +1,4 @@
-"""A crash between any two writes, and a power cut that keeps any part of what was not synced."""
+"""A recording survives a crash between any two writes, and a power cut that loses any unsynced writes."""
 
 import hashlib
 import os
@@ -24,7 +24,7 @@ SECTOR = 512
 
 @dataclass
 class TracedDisk:
-    """A real file that also remembers what was done to it, in order; ``None`` stands for a sync."""
+    """A real file that also records all writes in order; ``None`` stands for a sync."""
 
     file: PositionedFile
     trace: list = field(default_factory=list)
@@ -45,7 +45,7 @@ class TracedDisk:
 
 @pytest.fixture
 def traced(tmp_path, make_header, make_block):
-    """A recording that commits every batch: its empty file, its trace of writes, its true counts."""
+    """Return places, empty file, list of writes and true counts of a recording that commits every batch."""
     path = tmp_path / "a.h5"
     header = make_header(expected_samples=BLOCKS * BLOCK, sample_rate_hz=20.0)
     places = preallocate(path, part_of(path), header)
@@ -66,8 +66,8 @@ def traced(tmp_path, make_header, make_block):
     return places, empty, disk.trace, np.concatenate(written, axis=1)
 
 
-def handed_over(places, trace):
-    """Samples of the last channel that the trace has written: what the disk has seen at most."""
+def written_samples(places, trace):
+    """Return the number of samples of the last channel that the trace has written."""
     base = places.channels[-1]
     ends = [(each[0] - base + len(each[1])) // ITEM_BYTES for each in trace if each and each[0] >= base]
     return max(ends, default=0)
@@ -79,7 +79,7 @@ def test_a_crash_after_any_write_loses_at_most_one_block(tmp_path, traced):
     crashed = tmp_path / "crashed.h5.part"
     crashed.write_bytes(empty)
     assert len(trace) > 300
-    # Replayed write by write: the file is what a crash after each of them leaves.
+    # After each replayed write the file is what a crash at that moment would leave.
     with crashed.open("r+b", buffering=0) as file:
         for point, write in enumerate(trace):
             if write is None:
@@ -87,7 +87,7 @@ def test_a_crash_after_any_write_loses_at_most_one_block(tmp_path, traced):
             file.seek(write[0])
             file.write(write[1])
             with open_recording(crashed) as recording:
-                seen = handed_over(places, trace[: point + 1])
+                seen = written_samples(places, trace[: point + 1])
                 assert seen - BLOCK <= recording.samples <= seen
                 for row, role in enumerate(recording.roles):
                     np.testing.assert_array_equal(
@@ -99,7 +99,7 @@ def test_a_crash_after_any_write_loses_at_most_one_block(tmp_path, traced):
 
 
 class CutFile:
-    """A file on which power cuts are tried one after another: each begins from the empty recording."""
+    """A file for trying power cuts one after another, each starting from the empty recording."""
 
     def __init__(self, path, empty):
         path.write_bytes(empty)
@@ -125,7 +125,7 @@ class CutFile:
 
 
 def sectors_of(write):
-    """A write in the pieces that a power cut keeps or loses as a whole."""
+    """Divide a write into the pieces that a power cut keeps or loses as a whole."""
     offset, data = write
     edges = [offset, *range((offset // SECTOR + 1) * SECTOR, offset + len(data), SECTOR), offset + len(data)]
     return [(begin, data[begin - offset : end - offset]) for begin, end in pairwise(edges)]
@@ -153,9 +153,9 @@ def test_a_recording_opens_whatever_unsynced_writes_survive_a_power_cut(tmp_path
             durable = recording.samples
         cut_file.apply(pending[index] for index in order if keep[index])
         with open_recording(cut_file.path) as recording:
-            require_nothing_but_the_truth(recording, truth)
+            require_truth(recording, truth)
             assert recording.samples >= durable
-            assert recording.samples >= handed_over(places, synced) - BLOCK
+            assert recording.samples >= written_samples(places, synced) - BLOCK
 
     try:
         survives()
@@ -163,8 +163,8 @@ def test_a_recording_opens_whatever_unsynced_writes_survive_a_power_cut(tmp_path
         cut_file.close()
 
 
-def require_nothing_but_the_truth(recording, truth):
-    """Whatever the file says is so: samples, segments, overloads, and how it ended."""
+def require_truth(recording, truth):
+    """Require that all contents of the file are true: samples, segments, overloads, and its end."""
     for row, role in enumerate(recording.roles):
         np.testing.assert_array_equal(recording.read_counts(role), truth[row, : recording.samples])
     for number, segment in enumerate(recording.segments):
@@ -199,7 +199,7 @@ def test_the_sample_count_never_exceeds_the_data_after_a_power_cut(traced):
             np.testing.assert_array_equal(counts, truth[row, :samples])
 
 
-def test_the_power_cut_model_detects_wrong_write_order(traced):
+def test_the_power_cut_model_detects_missing_syncs(traced):
     places, empty, trace, truth = traced
     careless = [each for at, each in enumerate(trace) if each is not None or at == len(trace) - 1]
     chance = random.Random(3)
@@ -224,7 +224,7 @@ def test_no_structure_of_the_file_is_written_after_the_start(traced):
 
 @dataclass
 class TracedFolder:
-    """What was done to the names in a folder, and when a file or the folder itself was synced."""
+    """Records renames and removals in a folder, and syncs of its files and of the folder."""
 
     folder: object
     operations: list = field(default_factory=list)
@@ -285,7 +285,7 @@ def test_a_power_cut_during_finishing_keeps_the_whole_recording(
 
 
 def names_after(operations, durable):
-    """Which names a folder holds after these operations, and the content that is safe under each."""
+    """Return the names in a folder after these operations, with the durable content of each."""
     names = {"a.h5.part": None, "a.h5.tmp": durable.get("a.h5.tmp")}
     for kind, *operands in operations:
         if kind == "rename":
@@ -300,7 +300,7 @@ def valid_samples(places, image):
 
 
 def pages_of(writes, image):
-    """Pages that the writes would leave in the cache, by number."""
+    """Return the pages that the writes would leave in the cache, by page number."""
     cached = bytearray(image)
     touched = set()
     for write in writes:

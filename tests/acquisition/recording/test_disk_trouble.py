@@ -1,4 +1,4 @@
-"""A disk that is full or slow on demand: a recording meets it where it would meet a real one."""
+"""A simulated full or slow disk affects a recording like a real one."""
 
 import errno
 import time

@@ -1,4 +1,4 @@
-"""Notes of a controller: texts in recordings made before are read as values, and written as they were."""
+"""Notes of a feedback controller in older recordings are read as values and written unchanged."""
 
 import pytest
 
@@ -22,7 +22,7 @@ from vibench.acquisition.recording import (
 from vibench.acquisition.recording._layout import TEXT_WIDTH
 from vibench.acquisition.recording._tables import Event
 
-# Word for word from recordings of November 2026.
+# Copied from recordings of November 2026.
 LOST = (
     '{"level": 0, "asked_m_per_s2": 0.5, "frequency_hz": null, "frequency_u_hz": null, "at_hz": 265.205, '
     '"phase_deg": -75.1097, "response_ii": 22.2421, "base_m_per_s2": 0.501311, "base_u": 0.000104905, '

@@ -1,4 +1,4 @@
-"""The finished file as a stranger sees it, with h5py alone."""
+"""The finished file can be read with h5py alone."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def file(tmp_path, make_header, make_block):
         yield opened
 
 
-def test_a_channel_is_named_scaled_and_dimensioned(file, make_block):
+def test_a_channel_has_units_scale_and_time_axis(file, make_block):
     _, block = make_block(0, SAMPLES)
     velocity = file["m0_velocity"]
     assert velocity.attrs["units"] == b"m s-1"
@@ -65,7 +65,7 @@ def test_all_data_types_are_readable_by_old_readers(file):
     assert kinds == {h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING}
 
 
-def test_events_overloads_and_segments_are_stored_as_plain_columns(file):
+def test_events_overloads_and_segments_are_stored_as_columns(file):
     assert file["events/text"][0].decode() == "gap 45 µm"
     assert file["overloads/first_sample"][:].tolist() == [3]
     assert file["segments/last_sample"][:].tolist() == [SAMPLES - 1]

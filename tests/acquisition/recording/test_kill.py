@@ -1,4 +1,4 @@
-"""The promise: a recording survives ``kill -9`` at any moment, minus at most the last second."""
+"""A recording survives ``kill -9`` at any moment and loses at most the last second."""
 
 import json
 import os
@@ -36,7 +36,7 @@ forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows cannot fork"
 
 @dataclass
 class Killed:
-    """What is known of a recording that was killed: what it had handed over, and when it died."""
+    """A killed recording: its folder, when it was killed, and the samples handed over by then."""
 
     folder: Path
     phase: str
@@ -53,7 +53,7 @@ class Killed:
 
     @property
     def promised(self):
-        """Samples that were handed over a second before the kill."""
+        """Number of samples that were handed over a second before the kill."""
         before_s = self.killed_s - PROMISE_S
         return max((samples for time_s, samples in self.acknowledged if time_s <= before_s), default=0)
 
@@ -63,7 +63,7 @@ class Killed:
 
 
 class Victims:
-    """Processes that record and are killed, forked off one that has everything loaded."""
+    """Processes that record and are killed; they are forked from a process that has imported everything."""
 
     def __init__(self, folder):
         self._folder = folder
@@ -79,23 +79,23 @@ class Victims:
         self._server.stdout.close()
 
     def while_recording(self, chance):
-        return self._killed("recording", 1, chance.uniform(0.0, 2.2), PACED_BLOCKS, BLOCKS_PER_S)
+        return self._kill_after("recording", 1, chance.uniform(0.0, 2.2), PACED_BLOCKS, BLOCKS_PER_S)
 
     def while_finalising(self, chance):
         delay_s = chance.uniform(0.0, self.finishing_s)
-        return self._killed("finalising", FINISHED_BLOCKS + 1, delay_s, FINISHED_BLOCKS)
+        return self._kill_after("finalising", FINISHED_BLOCKS + 1, delay_s, FINISHED_BLOCKS)
 
     def while_committing(self, chance):
-        """Kill itself at a step of a commit: before a sync, or when a counter has just been written."""
-        folder, _ = self._begun(PACED_BLOCKS, BLOCKS_PER_S, chance.randint(1, COMMIT_STEPS))
+        """Kill the process at a step of a commit: before a sync, or just after a counter was written."""
+        folder, _ = self._begin(PACED_BLOCKS, BLOCKS_PER_S, chance.randint(1, COMMIT_STEPS))
         lines = list(iter(self._server.stdout.readline, "ended\n"))
-        self._let_go()
+        self._release()
         (said,) = (line for line in lines if line.startswith("committing"))
-        return Killed(folder, "committing", float(said.split()[1]), _acknowledged(lines))
+        return Killed(folder, "committing", float(said.split()[1]), _acknowledgements(lines))
 
-    def _killed(self, phase, line_number, delay_s, blocks, blocks_per_s=None):
-        """Kill ``delay_s`` after a line was said; nothing comes back when it had finished by then."""
-        folder, pid = self._begun(blocks, blocks_per_s)
+    def _kill_after(self, phase, line_number, delay_s, blocks, blocks_per_s=None):
+        """Kill ``delay_s`` after an output line; return None if the recording had finished by then."""
+        folder, pid = self._begin(blocks, blocks_per_s)
         lines = [self._server.stdout.readline() for _ in range(line_number)]
         died_s = []
 
@@ -110,16 +110,16 @@ class Victims:
             if line == "finished\n":
                 timer.cancel()
         timer.join()
-        self._let_go()
+        self._release()
         has_finished = lines[-1] == "finished\n"
-        return None if has_finished else Killed(folder, phase, died_s[0], _acknowledged(lines))
+        return None if has_finished else Killed(folder, phase, died_s[0], _acknowledgements(lines))
 
-    def _let_go(self):
-        """Let the ended process be forgotten: its number may be another's from now on."""
+    def _release(self):
+        """Allow the ended process to be removed, so that its number can be reused."""
         self._server.stdin.write("\n")
         self._server.stdin.flush()
 
-    def _begun(self, blocks, blocks_per_s=None, commit_step=None):
+    def _begin(self, blocks, blocks_per_s=None, commit_step=None):
         folder = self._folder / str(next(self._number))
         folder.mkdir()
         order = {
@@ -134,17 +134,17 @@ class Victims:
         return folder, next(int(line.split()[1]) for line in lines if line.startswith("pid"))
 
     def _finishing_s(self):
-        self._begun(FINISHED_BLOCKS)
+        self._begin(FINISHED_BLOCKS)
         for line in iter(self._server.stdout.readline, "ended\n"):
             if line == "finishing\n":
                 began_s = time.monotonic()
             elif line == "finished\n":
                 taken_s = time.monotonic() - began_s
-        self._let_go()
+        self._release()
         return taken_s
 
 
-def _acknowledged(lines):
+def _acknowledgements(lines):
     pairs = [line.split() for line in lines if line[0].isdigit()]
     return [(float(time_s), int(samples)) for time_s, samples in pairs]
 
@@ -155,7 +155,7 @@ def require_truth(recording):
 
 
 def require_kept(killed):
-    """Open what is there, then recover it: every sample is true, and at most the last second is missing."""
+    """Open and recover a killed recording: every sample is true, and at most the last second is missing."""
     committed, state = None, RecordingState.COMPLETE
     if killed.part.exists():
         with open_recording(killed.part) as recording:
@@ -176,8 +176,8 @@ def require_kept(killed):
         assert recording.check_seal("whole").state.value == "intact"
 
 
-def killed_at(folder, moments, seed):
-    """Kill as many recordings as there are moments in each phase; gives what was left behind by each."""
+def kill_in_phases(folder, moments, seed):
+    """Kill recordings in each phase, as many as requested; count the files that were left behind."""
     left = Counter()
     victims = Victims(folder)
     try:
@@ -186,7 +186,7 @@ def killed_at(folder, moments, seed):
             for attempt in range(4 * wanted):
                 killed = kill(random.Random(f"{seed} {phase} {attempt}"))
                 if killed is None:
-                    continue  # it was too late: the recording had finished
+                    continue  # the kill came too late: the recording had finished
                 names = frozenset(each.name.removeprefix("a.h5") or ".h5" for each in killed.folder.iterdir())
                 left[phase, names] += 1
                 require_kept(killed)
@@ -205,7 +205,7 @@ def in_phase(left, phase):
 @pytest.mark.thorough
 @forks
 def test_recordings_killed_in_every_phase_lose_at_most_one_second(tmp_path):
-    left = killed_at(tmp_path, {"recording": 2, "committing": 3, "finalising": 3}, seed=1)
+    left = kill_in_phases(tmp_path, {"recording": 2, "committing": 3, "finalising": 3}, seed=1)
     assert [in_phase(left, phase) for phase in ("recording", "committing", "finalising")] == [2, 3, 3]
 
 

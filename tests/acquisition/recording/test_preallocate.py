@@ -1,4 +1,4 @@
-"""Preparing a recording: a program that is killed in it leaves no .part that cannot be opened."""
+"""A program killed while it prepares a recording leaves no .part file that cannot be opened."""
 
 import multiprocessing
 import os
@@ -10,7 +10,7 @@ from vibench.acquisition.recording import RecordingState, _preallocate as preall
 
 
 def _die_before(step, path, header):
-    """Begin a recording, and end without a word when ``step`` of its preparation is reached."""
+    """Begin a recording, and end the process without cleaning up at ``step`` of the preparation."""
     setattr(preallocate_module, step, lambda *_: os._exit(9))
     create_recording(path, header)
 

@@ -82,38 +82,38 @@ def test_a_finished_recording_is_still_found_by_its_part_name(path):
         assert recording.state == "complete"
 
 
-def missing(path):
+def remove(path):
     path.unlink()
 
 
-def interrupted(path):
+def rename_to_part(path):
     path.rename(path.with_name("a.h5.part"))
 
 
-def empty(path):
+def make_empty(path):
     path.write_bytes(b"")
 
 
-def text(path):
+def replace_by_text(path):
     path.write_text("time,voltage\n0,1\n" * 1000)
 
 
-def cut_short(path):
+def truncate(path):
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
 
 
-def another_hdf5(path):
+def replace_by_other_hdf5(path):
     with h5py.File(path, "w") as file:
         file["x"] = 1.0
 
 
-def newer(path):
+def set_newer_version(path):
     with h5py.File(path, "r+") as file:
         file.attrs["format_version"] = 2
 
 
-def without_segments(path):
+def remove_segments(path):
     with h5py.File(path, "r+") as file:
         del file["segments"]
 
@@ -121,15 +121,15 @@ def without_segments(path):
 @pytest.mark.parametrize(
     ("damage", "sentence"),
     [
-        (missing, "does not exist"),
-        (interrupted, r"a\.h5\.part does: it is being recorded, or was interrupted"),
-        (empty, "is empty"),
-        (text, "is not a readable HDF5 file"),
-        (text, "If another program wrote it, convert it with vibench import"),
-        (cut_short, "cut short"),
-        (another_hdf5, "not a recording of vibench"),
-        (newer, "format version 2.*reads version 1.*Update"),
-        (without_segments, "is damaged"),
+        (remove, "does not exist"),
+        (rename_to_part, r"a\.h5\.part does: it is being recorded, or was interrupted"),
+        (make_empty, "is empty"),
+        (replace_by_text, "is not a readable HDF5 file"),
+        (replace_by_text, "If another program wrote it, convert it with vibench import"),
+        (truncate, "cut short"),
+        (replace_by_other_hdf5, "not a recording of vibench"),
+        (set_newer_version, "format version 2.*reads version 1.*Update"),
+        (remove_segments, "is damaged"),
     ],
 )
 def test_each_kind_of_unreadable_file_has_a_specific_message(path, damage, sentence):

@@ -13,7 +13,7 @@ from vibench.acquisition.recording._preallocate import preallocate
 
 @pytest.fixture
 def abandoned(tmp_path, make_header, make_block):
-    """What a dead program left: samples committed, a segment open, no ending."""
+    """Return a function that leaves a recording as a killed program does: an open segment, no end."""
 
     def make(folder):
         path = folder / "a.h5"
@@ -67,7 +67,7 @@ def test_recovery_finishes_a_recording_without_starting_a_thread(tmp_path, aband
         np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
 
 
-def test_recover_accepts_the_part_and_the_final_name(tmp_path, abandoned):
+def test_recover_accepts_the_final_name_of_a_recording(tmp_path, abandoned):
     abandoned(tmp_path)
     assert recover(tmp_path / "a.h5") == tmp_path / "a.h5"
 

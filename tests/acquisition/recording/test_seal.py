@@ -1,4 +1,4 @@
-"""The seal of a recording: whatever is changed afterwards is found, and results have seals of their own."""
+"""The seal of a recording reveals later changes; each result has a separate seal."""
 
 import hashlib
 import hmac
@@ -34,7 +34,7 @@ def recorded(tmp_path, make_header, make_block):
         with create_recording(tmp_path / name, make_header()) as writer:
             writer.begin_segment("dwell", frequency_hz=260.0)
             writer.append(make_block(0, 1000)[1])
-            writer.append(make_block(1200, 1300)[1])  # with a gap before it
+            writer.append(make_block(1200, 1300)[1])  # after a gap of 200 samples
             writer.end_segment()
             writer.log("mark", "somebody knocked")
         return tmp_path / name
@@ -55,7 +55,7 @@ def state_of(path, depth="whole", key=None):
         return recording.check_seal(depth, key).state
 
 
-def example_says(path, *more):
+def run_example(path, *more):
     found = subprocess.run(
         [sys.executable, EXAMPLE, path, *more], capture_output=True, text=True, check=False
     )
@@ -88,18 +88,18 @@ def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
     path = recorded()
     with open_recording(path) as recording:
         seal = recording.seal
-    assert example_says(path) == (0, f"unchanged since it was sealed: {seal}")
+    assert run_example(path) == (0, f"unchanged since it was sealed: {seal}")
     with h5py.File(path, "r+") as file:
         file["m0_velocity"].attrs["delay_s"] = 0.1
-    assert example_says(path) == (1, "changed since it was sealed: /m0_velocity")
+    assert run_example(path) == (1, "changed since it was sealed: /m0_velocity")
 
 
-def test_only_the_signing_key_verifies_the_signature(recorded, key_file):
+def test_the_h5py_example_verifies_a_signature_with_its_key_only(recorded, key_file):
     path = recorded()
-    assert example_says(path, key_file)[0] == 0
+    assert run_example(path, key_file)[0] == 0
     other = key_file.with_name("other")
     other.write_bytes(b"another key, which is wrong")
-    assert example_says(path, other) == (1, "not signed with this key")
+    assert run_example(path, other) == (1, "not signed with this key")
 
 
 def change_sample(file):
@@ -139,13 +139,13 @@ def add_a_dataset(file):
     file["notes"] = 1
 
 
-def take_a_table(file):
+def remove_overview(file):
     del file["overview"]
 
 
 CHANGES = (
     change_scale, change_segment, change_time, change_plan, change_identity, change_overview, change_view,
-    add_a_dataset, take_a_table,
+    add_a_dataset, remove_overview,
 )  # fmt: skip
 
 
@@ -168,7 +168,7 @@ def test_the_full_check_finds_a_changed_sample(recorded):
     assert (found.state, found.sentence) == (SealState.DAMAGED, "changed since sealing: data of /m0_velocity")
 
 
-def test_resealing_changed_content_changes_the_digest_of_the_seal(recorded):
+def test_a_changed_manifest_damages_the_seal_and_resealing_changes_its_digest(recorded):
     path = recorded()
     with open_recording(path) as recording:
         before = recording.seal
@@ -195,7 +195,7 @@ def test_a_recording_without_a_seal_is_reported_as_such(recorded):
             assert (found.state, recording.seal) == (SealState.SEAL_GONE, "")
             assert "its seal is gone: vibench" in found.sentence
     with h5py.File(path, "r+") as file:
-        del file["overview"], file["view"]  # came with seals
+        del file["overview"], file["view"]  # which files of versions before seals do not have
     with open_recording(path) as recording:
         found = recording.check_seal("whole")
         assert found.state is SealState.UNSEALED
@@ -239,7 +239,7 @@ def test_a_renamed_finished_recording_is_checked_against_its_seal(recorded):
     assert state_of(path.rename(part_of(path))) is SealState.DAMAGED
 
 
-def test_a_missing_seal_is_an_error_if_a_key_is_given(recorded, key_file):
+def test_a_recording_without_a_seal_fails_a_check_with_a_key(recorded, key_file):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -254,7 +254,7 @@ def test_recovery_seals_a_recording(tmp_path, make_header, make_block):
     assert state_of(tmp_path / "a.h5.part") is SealState.UNFINISHED
     path = recover(tmp_path / "a.h5.part")
     assert state_of(path) is SealState.INTACT
-    assert example_says(path)[0] == 0
+    assert run_example(path)[0] == 0
 
 
 def test_a_damaged_copy_does_not_remove_its_source(recorded, tmp_path, make_header, make_block):
@@ -264,7 +264,7 @@ def test_a_damaged_copy_does_not_remove_its_source(recorded, tmp_path, make_head
     writer._committer.close()
     part = part_of(tmp_path / "a.h5").read_bytes()
     writer.finish(RecordingState.COMPLETE)
-    part_of(tmp_path / "a.h5").write_bytes(part)  # as if the end had come before it was deleted
+    part_of(tmp_path / "a.h5").write_bytes(part)  # as if the program had ended before it was deleted
     with h5py.File(tmp_path / "a.h5", "r+") as file:
         change_sample(file)
     with pytest.raises(RecordingError, match=r"a.h5 is damaged.*Nothing was changed"):
@@ -413,7 +413,7 @@ def test_an_invalid_group_of_results_is_refused_in_a_sentence(recorded, what):
 
 
 class TestChangedAfterTheCheck:
-    """Between a check and the analysis a file can be changed: what is read must be what was checked."""
+    """A file may change between its check and the analysis: the analysis must read what was checked."""
 
     @pytest.fixture
     def long(self, tmp_path, make_header, make_block):
@@ -422,8 +422,8 @@ class TestChangedAfterTheCheck:
         return tmp_path / "long.h5"
 
     @staticmethod
-    def written_over(path, change):
-        """As another program does it that asks nobody, while this one has the file open."""
+    def overwrite(path, change):
+        """Overwrite a file in place, as another program could while this program has it open."""
         code = f"import h5py\nwith h5py.File({str(path)!r}, 'r+', locking=False) as file:\n    {change}"
         subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -440,7 +440,7 @@ class TestChangedAfterTheCheck:
             ):
                 assert np.array_equal(recording.read_counts(role, start, stop), before[start:stop])
         with open_recording(long) as recording:
-            self.written_over(long, f"file[{role!r}][{at}] += 1")
+            self.overwrite(long, f"file[{role!r}][{at}] += 1")
             assert np.array_equal(recording.read_counts(role, 0, at - 1000), before[: at - 1000])
             with pytest.raises(RecordingError, match="were changed after the seal had been checked"):
                 recording.read_counts(role, at - 5, at - 4)
@@ -448,13 +448,13 @@ class TestChangedAfterTheCheck:
     def test_a_reopened_file_must_match_its_earlier_check(self, long):
         with open_recording(long) as recording:
             recording.check_seal("whole")
-        self.written_over(long, f"file[{recording.roles[0]!r}].attrs['delay_s'] = 0.001")
+        self.overwrite(long, f"file[{recording.roles[0]!r}].attrs['delay_s'] = 0.001")
         with pytest.raises(RecordingError, match="was changed after its seal had been checked"):
             open_recording(long)
 
     def test_metadata_read_before_the_seal_check_are_checked(self, long):
         sound = long.read_bytes()
-        self.written_over(long, "file.attrs['expected_samples'] = 5")
+        self.overwrite(long, "file.attrs['expected_samples'] = 5")
         with open_recording(long) as recording:
             assert recording.expected_samples == 5
             long.write_bytes(sound)

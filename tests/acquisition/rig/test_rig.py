@@ -1,4 +1,4 @@
-"""A hardware configuration is right, or is refused with file, key, what was given and what is allowed."""
+"""A wrong hardware configuration is refused with file, key, given value and allowed values."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def test_every_shipped_configuration_is_valid(path):
     assert load_rig(path).name
 
 
-def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
+def edited_config(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
     text = shipped.read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "bench.toml"
@@ -42,7 +42,7 @@ def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
 )
 def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
     with pytest.raises(ConfigurationError, match=said):
-        load_rig(edited(tmp_path, old, new))
+        load_rig(edited_config(tmp_path, old, new))
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old
 )
 def test_a_wrong_output_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
     with pytest.raises(ConfigurationError, match=said) as failure:
-        load_rig(edited(tmp_path, old, new, CONFIGS / "virtual_rig_streaming.toml"))
+        load_rig(edited_config(tmp_path, old, new, CONFIGS / "virtual_rig_streaming.toml"))
     assert "\n" not in str(failure.value)
 
 
@@ -74,14 +74,14 @@ def test_a_missing_file_is_refused_with_its_path(tmp_path):
         load_rig(tmp_path / "nowhere.toml")
 
 
-def test_a_configuration_round_trips_through_json():
+def test_a_configuration_is_unchanged_after_writing_and_reading_json():
     rig = load_rig(VIRTUAL)
     assert Rig.model_validate_json(rig.model_dump_json()) == rig
 
 
 @pytest.mark.parametrize(("load", "factor"), [('"high-z"', 1.0), ("50.0", 2.0)])
 def test_a_generator_set_to_50_ohm_gives_twice_the_displayed_voltage(tmp_path, load, factor):
-    rig = load_rig(edited(tmp_path, 'load_ohm = "high-z"', f"load_ohm = {load}"))
+    rig = load_rig(edited_config(tmp_path, 'load_ohm = "high-z"', f"load_ohm = {load}"))
     loading = 15000 / 15050
     assert rig.generator.terminal_factor() == pytest.approx(factor * loading)
 

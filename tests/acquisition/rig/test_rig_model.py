@@ -1,4 +1,4 @@
-"""The chain without a specimen against closed forms; with one: tests/sim/shaker/test_linear_motion.py."""
+"""The rig model without specimen against closed forms; see also tests/sim/shaker/test_linear_motion.py."""
 
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ def test_state_equations_and_transfer_function_agree(frequency_hz):
 
 @given(st.floats(1.0, 5e3))
 def test_electrical_power_equals_heat_and_friction(frequency_hz):
-    # Mean power of a sine from peak phasors; no specimen takes any.
+    # Mean power of a sine from peak phasors; without specimen no other power is used.
     shaker = RIG.shaker
     voltage, current, velocity = (
         complex(MODEL.transfer(q, frequency_hz))

@@ -1,4 +1,4 @@
-"""Sensitivities in the units of data sheets: one meaning, or a refusal that says what to write."""
+"""Sensitivities in the units of data sheets are converted, or refused with the right way to write them."""
 
 import tomllib
 
@@ -69,7 +69,7 @@ NOT_ABOVE_0 = ("-100 mV/g", "0 mV/g", "0 g/V", "nan mV/g", "1e400 mV/g", "1e-310
         ("100 mV/g", "N", "such as '11.2 mV/N'"),
     ],
 )
-def test_ambiguous_units_are_refused(text, unit, said):
+def test_ambiguous_or_unknown_sensitivities_are_refused(text, unit, said):
     with pytest.raises(
         ValueError, match="^" + repr(text)[:3].replace("+", r"\+").replace(".", r"\.")
     ) as refused:

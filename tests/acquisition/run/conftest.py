@@ -1,4 +1,4 @@
-"""A laboratory whose instruments can be made to fail, found by their addresses like any others."""
+"""A virtual rig whose instruments can be made to fail and are opened by address, like real ones."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -13,7 +13,7 @@ Laboratory = Callable[..., tuple[VirtualRig, Rig]]
 
 @pytest.fixture
 def laboratory(rig: Rig) -> Iterator[Laboratory]:
-    """Start a rig with faults on demand, and the configuration of a bench on it."""
+    """Return a function that starts a virtual rig, and the configuration of a bench on it."""
     with ExitStack() as opened:
 
         def start(**habits) -> tuple[VirtualRig, Rig]:

@@ -1,4 +1,4 @@
-"""How tests of runs reach a state, let something fail there, and look at what is left."""
+"""Functions for tests of runs: reach a state, cause a fault, and look at the output and the recording."""
 
 import re
 
@@ -19,7 +19,7 @@ def upto(run, state):
 
 
 def when_recording(act):
-    """Do ``act`` once, at the first block that belongs to the record."""
+    """Return a progress callback that calls ``act`` once, at the first recorded block."""
     done = []
 
     def watch(progress):
@@ -31,7 +31,7 @@ def when_recording(act):
 
 
 def terminal_v(virtual, duration_s=0.1):
-    """Largest voltage at the generator's terminal during the next tenth of a second."""
+    """Return the largest voltage at the generator's terminal during the next ``duration_s``."""
     start_s, interval_s = virtual.world.time_s, 1e-4
     virtual.world.advance(duration_s)
     count = round(duration_s / interval_s)
@@ -39,7 +39,7 @@ def terminal_v(virtual, duration_s=0.1):
 
 
 def kept_drive(path, state, reason):
-    """Drive voltage of a recording that ended so, for that reason."""
+    """Return the drive voltage of a recording, which must have this state and reason."""
     with open_recording(path) as recording:
         assert recording.state is state
         assert re.search(reason, recording.reason, re.IGNORECASE), recording.reason

@@ -1,4 +1,4 @@
-"""A generator that takes its time for a setting, while samples are converted."""
+"""Runs with a generator that needs time for each command while samples are converted."""
 
 from collections import deque
 from contextlib import suppress
@@ -27,8 +27,8 @@ def sweep(step_s, **changes):
     return Measurement(name="sweep", excitation=excitation, **RAMP)
 
 
-def stretch(bench, label):
-    """Drive voltage of a segment."""
+def segment_drive(bench, label):
+    """Return the drive voltage of a segment."""
     found = next(each for each in bench.recorder.segments if each["label"] == label)
     return bench.recorder.channel(DRIVE)[found["first"] : found["last"] + 1]
 
@@ -37,14 +37,14 @@ def run_of(bench, plan, tmp_path):
     return Run(bench, plan, tmp_path / "run.h5", create=bench.recorder.create)
 
 
-def carried_out(bench, plan, tmp_path):
+def carry_out(bench, plan, tmp_path):
     with run_of(bench, plan, tmp_path) as run:
         deque(run, maxlen=0)
     return bench.recorder
 
 
 def cycles(drive):
-    """Rising zero crossings, and the parts of a period at both ends, of a sine of one amplitude."""
+    """Return the number of cycles of a sine with constant amplitude, including fractions at both ends."""
     up = np.flatnonzero((drive[:-1] < 0) & (drive[1:] >= 0))
     exact = up + drive[up] / (drive[up] - drive[up + 1])
     first, last = exact[1] - exact[0], exact[-1] - exact[-2]
@@ -54,10 +54,10 @@ def cycles(drive):
 @pytest.mark.parametrize("latency_s", [0.02, 0.1, 0.2, 0.35])
 def test_the_check_waits_until_commands_have_taken_effect(bench, tmp_path, latency_s):
     bench.world.latency_s = latency_s
-    recorder = carried_out(bench, dwell(), tmp_path)
+    recorder = carry_out(bench, dwell(), tmp_path)
     assert recorder.ending[0] is RecordingState.COMPLETE
-    # What is recorded as a dwell is the dwell's tone from its first sample to its last.
-    drive = stretch(bench, "dwell")
+    # The recorded dwell contains only its tone, from the first to the last sample.
+    drive = segment_drive(bench, "dwell")
     assert drive.size == pytest.approx(0.5 * RATE, abs=1)
     assert cycles(drive) == pytest.approx(130.0, abs=0.05)
 
@@ -67,7 +67,7 @@ def test_settling_starts_when_the_tone_plays(bench, tmp_path, latency_s):
     bench.world.latency_s = latency_s
     grid = {"start_hz": 200.0, "stop_hz": 260.0, "step_hz": 20.0}
     excitation = SteppedSine(amplitude_vpp=1.0, grid=grid, settle_s=0.2, record_s=0.3)
-    recorder = carried_out(bench, Measurement(name="steps", excitation=excitation, **RAMP), tmp_path)
+    recorder = carry_out(bench, Measurement(name="steps", excitation=excitation, **RAMP), tmp_path)
     steps = [each for each in recorder.segments if each["label"] == "step"]
     assert len(steps) == 4
     for each in steps:
@@ -82,13 +82,13 @@ def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, late
     plan = sweep(step_s)
     if step_s < 1.25 * latency_s:
         with pytest.raises(ConfigurationError, match=f"step_s = {step_s:g} s is too short.*for a setting"):
-            carried_out(bench, plan, tmp_path)
+            carry_out(bench, plan, tmp_path)
         assert not bench.world.calls
         return
-    carried_out(bench, plan, tmp_path)
-    # Here a command is in force when it has ended, so the sweep is late by as much, and so is its end.
+    carry_out(bench, plan, tmp_path)
+    # A command takes effect when it ends, so that the sweep lags by this time, also at its end.
     late = latency_s * (plan.excitation.stop_hz - plan.excitation.start_hz) * (1 - step_s / 4.0)
-    assert cycles(stretch(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
+    assert cycles(segment_drive(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
 
 
 def test_a_ramp_is_extended_to_the_time_of_its_commands(bench, tmp_path):
@@ -96,8 +96,8 @@ def test_a_ramp_is_extended_to_the_time_of_its_commands(bench, tmp_path):
     with run_of(bench, dwell(), tmp_path) as run:
         most = [bench.digitizer.waiting_samples / RATE for _ in run]
     assert max(most) <= 3 * 0.25
-    up = stretch(bench, "ramp_up")
-    # The tone, its output and four stairs.
+    up = segment_drive(bench, "ramp_up")
+    # one command for the tone, one for its output, and four amplitude steps
     assert up.size / RATE == pytest.approx(6 * 0.25, abs=0.01)
 
 
@@ -127,16 +127,16 @@ def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s)
         deque(run, maxlen=0)
     assert bench.recorder.ending[0] is RecordingState.COMPLETE
     assert [kind for _, kind, _ in bench.recorder.events].count("late") in range(2, round(stall_s / 0.1) + 5)
-    # What the pause lost is made up: the end is as late as the command alone makes it, and that is noted.
+    # The sweep catches up after the pause; at its end it lags by the time of one command, which is noted.
     late = 0.02 * (plan.excitation.stop_hz - plan.excitation.start_hz)
-    assert cycles(stretch(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
+    assert cycles(segment_drive(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
     *_, last = (text for _, kind, text in bench.recorder.events if kind == "late")
     assert "cycles from its plan" in last
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_sweep_stays_within_its_frequencies_despite_computer_stalls(bench, tmp_path, seed):
-    """A sweep from 20 Hz to 600 Hz asked its generator for -186 Hz after some stalls, others for 1,451 Hz."""
+    """Stalls once led to set frequencies of -186 Hz and 1,451 Hz in a sweep from 20 Hz to 600 Hz."""
     chance = np.random.default_rng(seed)
     bench.world.latency_s = 0.005
     with suppress(DriveLate), run_of(bench, sweep(0.1, start_hz=20.0), tmp_path) as run:

@@ -1,4 +1,4 @@
-"""A drive that ends by itself: bursts that the run triggers again while it lives."""
+"""A drive with a dead man: bursts that end by themselves unless the run triggers them again."""
 
 from collections import deque
 from itertools import pairwise
@@ -32,7 +32,7 @@ LOUD_V = 5e-3
 
 @pytest.fixture
 def guarded(laboratory):
-    """A virtual rig, and a bench on it whose drive has a dead man."""
+    """Yield a virtual rig, and a bench on it whose generator has a dead man."""
     virtual, connected = laboratory()
     generator = connected.generator.model_copy(update={"dead_man_s": DEAD_MAN_S})
     connected = connected.model_copy(update={"generator": generator})
@@ -41,7 +41,7 @@ def guarded(laboratory):
 
 
 def terminal(virtual, duration_s):
-    """What the generator gives while nobody does anything."""
+    """Return the voltage at the generator's terminal while the program is idle."""
     start_s = virtual.world.time_s
     return virtual.generator.render(start_s, 1e-4, round(duration_s / 1e-4))
 
@@ -52,7 +52,7 @@ def test_a_stalled_run_is_silent_after_its_dead_man_burst(guarded, tmp_path):
         upto(run, RunState.RECORDING)
         volts = terminal(virtual, 2 * DEAD_MAN_S)
         loud = np.flatnonzero(np.abs(volts) > LOUD_V)
-        assert loud.size  # it was playing
+        assert loud.size  # the output was playing
         assert loud[-1] * 1e-4 <= DEAD_MAN_S
     assert run.outcome.state is RunState.STOPPED
 

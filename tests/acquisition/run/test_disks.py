@@ -1,4 +1,4 @@
-"""Disks that are slow, small, or gone, and clocks that jump: silence, one sentence, and a recording."""
+"""Slow, full and missing disks, and clock jumps: the run ends silent with an error and a recording."""
 
 import errno
 import os
@@ -25,7 +25,7 @@ PAUSE = Event()
 
 @dataclass
 class BadDisk:
-    """A recorder whose disk does, from a moment on, what ``meet`` does before every write and sync."""
+    """A recorder whose disk calls ``meet`` before every write and sync once ``is_bad`` is set."""
 
     meet: object
     is_bad: bool = False
@@ -50,28 +50,28 @@ class BadDisk:
         return writer
 
 
-def at_one_megabyte_a_second(disk, count):
+def write_at_1_mb_per_s(disk, count):
     PAUSE.wait(count / 1e6)
 
 
-def refusing(number):
+def refuse_with(number):
     def refuse(disk, count):
         raise OSError(number, os.strerror(number))
 
     return refuse
 
 
-def hanging(disk, count):
+def hang(disk, count):
     disk.back.wait()
 
 
 DISKS = {
-    "1 MB/s": at_one_megabyte_a_second,
-    "full": refusing(errno.ENOSPC),
-    "quota": refusing(errno.EDQUOT),
-    "network gone": refusing(errno.ESTALE),
-    "input/output error": refusing(errno.EIO),
-    "network hangs": hanging,
+    "1 MB/s": write_at_1_mb_per_s,
+    "full": refuse_with(errno.ENOSPC),
+    "quota": refuse_with(errno.EDQUOT),
+    "network gone": refuse_with(errno.ESTALE),
+    "input/output error": refuse_with(errno.EIO),
+    "network hangs": hang,
 }
 
 
@@ -84,7 +84,7 @@ def test_every_disk_fault_ends_in_silence_with_an_error_and_a_recording(laborato
         try:
             with Run(bench, PLAN, path, create=disk.create) as run:
                 upto(run, RunState.RECORDING)
-                PAUSE.wait(0.6)  # a commit has been made
+                PAUSE.wait(0.6)  # long enough for one commit
                 disk.is_bad = True
                 deque(run, maxlen=0)
         except AcquisitionError as error:
@@ -95,7 +95,7 @@ def test_every_disk_fault_ends_in_silence_with_an_error_and_a_recording(laborato
     assert said or run.outcome.state is RunState.FINISHED
     assert "\n" not in said
     if not path.exists():
-        if name == "network hangs":  # its thread lets go of the file when the folder is back
+        if name == "network hangs":  # the thread closes the file when the folder is back
             give_up_s = time.monotonic() + 20
             while any("committer" in each.name for each in threads()) and time.monotonic() < give_up_s:
                 PAUSE.wait(0.01)
@@ -108,13 +108,13 @@ def test_every_disk_fault_ends_in_silence_with_an_error_and_a_recording(laborato
 
 @pytest.mark.parametrize("by_s", [3600.0, -3600.0])
 def test_a_clock_jump_changes_time_labels_only(laboratory, tmp_path, monkeypatch, by_s):
-    """Of the calendar; deadlines go by a clock that no one can set."""
+    """Deadlines use a monotonic clock, which cannot be set."""
     virtual, connected = laboratory()
     now = time.time
     with bench_on(connected) as bench:
         with Run(bench, PLAN, tmp_path / "run.h5") as run:
             upto(run, RunState.RECORDING)
-            # The recording's own look at the clock: gRPC's must agree with that of its core.
+            # Replace the clock of the recording only: gRPC must agree with its own core.
             clock = SimpleNamespace(time=lambda: now() + by_s, monotonic=time.monotonic)
             monkeypatch.setattr(_committer, "time", clock)
             run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "enough"))
@@ -124,6 +124,6 @@ def test_a_clock_jump_changes_time_labels_only(laboratory, tmp_path, monkeypatch
         assert recording.state is RecordingState.STOPPED
         assert recording.gaps == ()
         times = [each.unix_time_s for each in recording.events]
-        assert max(times) - min(times) > 3500  # what is labelled says what the clock said
+        assert max(times) - min(times) > 3500  # the labels follow the changed clock
         samples = [each.sample for each in recording.events]
         assert samples == sorted(samples)

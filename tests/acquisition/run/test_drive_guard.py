@@ -1,4 +1,4 @@
-"""A run that stands still is silenced, whatever holds it up; a stop is confirmed when the output is off."""
+"""The drive guard silences a stalled run; a stop is confirmed only when the output is off."""
 
 import os
 import threading
@@ -46,7 +46,7 @@ def until(is_so, within_s=20.0):
 
 @pytest.fixture
 def recording(laboratory, tmp_path, monkeypatch):
-    """A run in the middle of its dwell, which goes on only when it is asked."""
+    """Yield the virtual rig and a run in its dwell that proceeds only when iterated."""
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "state"))
     virtual, connected = laboratory()
     with bench_on(connected) as bench, Run(bench, PLAN, tmp_path / "run.h5") as run:
@@ -87,7 +87,7 @@ def test_a_continuing_run_is_not_silenced(recording, monkeypatch):
 
 
 class Output:
-    """A drive whose output cannot be read back, or not at once."""
+    """A drive whose output fails to switch off, as often as there are failures."""
 
     def __init__(self, *failures):
         self.failures = list(failures)
@@ -106,7 +106,7 @@ def own_state(tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
 
 
-def stopped(level="abort"):
+def request_stop(level="abort"):
     stop = stop_path(str(engines_folder()), *own_process(), level)
     write_stop_file(stop, "smoke")
     return stop
@@ -126,7 +126,7 @@ def announced(own_state):
 def test_a_stop_is_confirmed_only_after_the_output_is_off(announced):
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
-        stop = stopped()
+        stop = request_stop()
         until(lambda: not Path(stop).exists())
         assert Path(answer_path(stop, "taken")).exists()
         guard.silence()
@@ -138,7 +138,7 @@ def test_a_stop_without_output_read_back_is_not_confirmed(announced, monkeypatch
     guard = DriveGuard(Output(*[InstrumentLost("gone")] * 1000), StopSwitch())
     with guard:
         guard.begin()
-        stop = stopped()
+        stop = request_stop()
         with pytest.raises(InstrumentLost):
             guard.silence()
     assert fate_of(stop) is Fate.UNCONFIRMED
@@ -150,7 +150,7 @@ def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, mo
     guard = DriveGuard(Output(), StopSwitch(), is_heard=lambda: True)
     with guard:
         guard.begin()
-        stop = stopped()
+        stop = request_stop()
         guard.silence()
     assert fate_of(stop) is Fate.UNCONFIRMED
     DRIVES_ON.confirm_silence(guard)
@@ -160,7 +160,7 @@ def test_an_emptied_state_folder_confirms_no_stop(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
-        stop = stopped()
+        stop = request_stop()
         until(lambda: not Path(stop).exists())
         for each in engines_folder().iterdir():
             each.unlink()
@@ -169,7 +169,7 @@ def test_an_emptied_state_folder_confirms_no_stop(announced, monkeypatch):
         assert fate_of(stop) is Fate.SILENT
 
 
-def test_an_earlier_confirmation_confirms_no_later_stop(own_state, monkeypatch):
+def test_an_earlier_confirmation_does_not_confirm_a_later_stop(own_state, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     stop = stop_path(str(engines_folder()), *own_process(), "abort")
     Path(answer_path(stop, "silent")).touch()
@@ -186,7 +186,7 @@ def test_a_stop_is_confirmed_after_a_ramp_longer_than_the_timeout(announced, mon
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
-        stop, pause = stopped("ramp"), Event()
+        stop, pause = request_stop("ramp"), Event()
 
         def ramp_down():
             for _ in range(20):
@@ -214,10 +214,10 @@ def test_running_out_of_memory_frees_the_reserve_and_switches_the_output_off():
 def test_a_run_without_memory_reserve_is_refused(monkeypatch):
     MEMORY_RESERVE.release()
 
-    def exhausted(*_):
+    def refuse_memory(*_):
         raise OSError(12, "Cannot allocate memory")
 
-    monkeypatch.setattr("mmap.mmap", exhausted)
+    monkeypatch.setattr("mmap.mmap", refuse_memory)
     with pytest.raises(AcquisitionError, match="can get no more memory"):
         DriveGuard(Output(), StopSwitch())
 
@@ -232,7 +232,7 @@ def test_background_jobs_of_a_run_start_no_new_thread(monkeypatch):
     assert done == [1, 2]
 
 
-def test_a_guard_that_cannot_silence_says_so_once_and_tries_again(monkeypatch, caplog):
+def test_a_drive_guard_that_cannot_silence_warns_once_and_tries_again(monkeypatch, caplog):
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 1)
     output = Output(*[InstrumentLost("THE OUTPUT MAY STILL BE ON")] * 3)
     with caplog.at_level("INFO"), DriveGuard(output, StopSwitch()) as guard:

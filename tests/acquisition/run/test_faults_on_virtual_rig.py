@@ -1,6 +1,6 @@
-"""What goes wrong in a laboratory, on the virtual rig: a clear error, a silent generator, a kept recording.
+"""Faults of a laboratory on the virtual rig: a clear error, a silent generator, a kept recording.
 
-Silence is looked at in the simulated world, at the generator's terminal, not in what a driver believes.
+Silence is checked in the simulated world, at the generator's terminal, not in the state of a driver.
 """
 
 import re
@@ -60,7 +60,7 @@ def test_a_converter_failure_ends_in_silence_and_keeps_the_recording(laboratory,
 def test_a_device_used_by_another_program_is_named_before_output(laboratory):
     virtual, connected = laboratory()
     with bench_on(connected):
-        # The generator is let go of first, so that it is the converter that is found busy.
+        # The generator is released first, so that only the converter is busy.
         with pytest.raises(InstrumentError), bench_on(connected):
             pass
         virtual.faults.heal()
@@ -75,7 +75,7 @@ def test_a_pulled_usb_cable_advises_the_operator_to_switch_the_amplifier_off(lab
     pull = when_recording(virtual.faults.pull_usb_cable)
     with pytest.raises(InstrumentLost, match="amplifier") as failure, bench_on(connected) as bench:
         run_measurement(bench, SWEEP, tmp_path / "run.h5", on_progress=pull)
-    # Nobody can silence what cannot be reached: it is said, and the next program can.
+    # A generator that cannot be reached cannot be silenced: the error says so, and the next program can.
     assert "MAY STILL BE ON" in "".join([str(failure.value), *getattr(failure.value, "__notes__", [])])
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
     virtual.faults.heal()
@@ -95,7 +95,7 @@ def test_a_late_reply_silences_the_drive(laboratory, tmp_path):
 
 def test_a_silently_replaced_setting_ends_the_run(laboratory, tmp_path):
     virtual, connected = laboratory()
-    # A bench that allows more than the instrument can: 25 Vpp become its default without a word.
+    # The bench allows more than the instrument: 25 Vpp silently become its default.
     bold = changed(connected, generator={"amplitude_limit_vpp": 20.0})
     with bench_on(bold) as bench:
         virtual.generator.execute(b"OUTP1:IMP 50\n")
@@ -119,7 +119,7 @@ def test_a_laser_drop_out_and_an_over_range_are_flagged_without_ending_the_run(l
         assert samples / recording.sample_rate_hz == pytest.approx(0.2, abs=0.05)
 
 
-def test_a_stuck_relay_is_silenced_by_the_amplitude(laboratory, tmp_path):
+def test_a_drive_with_a_stuck_relay_is_silenced_by_lowering_its_amplitude(laboratory, tmp_path):
     virtual, connected = laboratory()
     switch = StopSwitch()
 
@@ -140,7 +140,7 @@ def test_a_stuck_relay_is_silenced_by_the_amplitude(laboratory, tmp_path):
         assert np.max(np.abs(recording.read("drive_voltage")[-100:])) < SILENT_V
 
 
-def test_a_stuck_relay_is_silenced_after_a_second_keyboard_interrupt(laboratory, tmp_path):
+def test_a_drive_with_a_stuck_relay_is_silenced_despite_a_keyboard_interrupt(laboratory, tmp_path):
     virtual, connected = laboratory()
 
     def interrupt(progress):
@@ -157,7 +157,7 @@ def test_a_stuck_relay_is_silenced_after_a_second_keyboard_interrupt(laboratory,
         assert terminal_v(virtual) < SILENT_V
 
 
-def test_an_output_that_stays_on_is_lowered_and_reported(laboratory):
+def test_an_output_that_stays_on_is_set_to_the_minimum_and_reported(laboratory):
     virtual, connected = laboratory()
     execute = virtual.generator.execute
     with bench_on(connected) as bench:
@@ -171,7 +171,7 @@ def test_an_output_that_stays_on_is_lowered_and_reported(laboratory):
 
 
 def test_a_hanging_generator_gets_one_attempt_after_a_failed_stop(laboratory, monkeypatch):
-    """A run with instruments that hang took minutes to end."""
+    """A run with hanging instruments must not take minutes to end."""
     virtual, connected = laboratory()
     attempts = []
     with bench_on(connected) as bench:

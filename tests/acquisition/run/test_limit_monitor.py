@@ -1,4 +1,4 @@
-"""The guard: every limit in physical terms is watched, named with its numbers, and cheap to watch."""
+"""The limit monitor checks every limit in physical units, names its values, and is fast."""
 
 import json
 import time
@@ -22,7 +22,7 @@ def monitor_of(rig, **limits):
 
 
 def sine_blocks(rig, frequency_hz, duration_s=3.0, **peaks):
-    """Blocks with a sine of that peak (in physical units) on each named channel, faded in over a second."""
+    """Return blocks with a sine of this physical peak on each named channel, faded in over a second."""
     time_s = np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
     shape = np.minimum(time_s, 1.0) * np.sin(2 * np.pi * frequency_hz * time_s)
     volts = np.stack(
@@ -51,8 +51,8 @@ LIMITS = {
 }
 
 
-def only(rig, kept):
-    """The rig with one limit as it is, and the others far away."""
+def only_limit(rig, kept):
+    """Return the rig with one limit unchanged and all other limits far away."""
     limits = rig.shaker.limits
     far = {
         name: getattr(limits, name).model_copy(update={"value": 100 * value})
@@ -91,7 +91,7 @@ def test_each_exceeded_limit_ends_the_run_and_is_named_in_the_error(
 ):
     five_per_cent_above = {role: 1.05 * peak for role, peak in peaks.items()}
     blocks = sine_blocks(rig, frequency_hz, **five_per_cent_above)
-    trip, text = trip_of(monitor_of(only(rig, kept)), blocks)
+    trip, text = trip_of(monitor_of(only_limit(rig, kept)), blocks)
     assert trip.quantity == quantity
     assert trip.limit == pytest.approx(limit)
     assert trip.value > trip.limit
@@ -103,7 +103,7 @@ def test_each_exceeded_limit_ends_the_run_and_is_named_in_the_error(
 @pytest.mark.parametrize(("kept", "frequency_hz", "peaks", "quantity", "limit"), CASES)
 def test_a_run_within_every_limit_continues(rig, kept, frequency_hz, peaks, quantity, limit):
     five_per_cent_below = {role: 0.95 * peak for role, peak in peaks.items()}
-    monitor = monitor_of(only(rig, kept))
+    monitor = monitor_of(only_limit(rig, kept))
     watch(monitor, sine_blocks(rig, frequency_hz, **five_per_cent_below))
 
 
@@ -111,7 +111,7 @@ def test_a_lasting_current_below_the_peak_limit_trips_the_rms_limit(rig):
     weak = with_limiter(rig, 1.8)
     trip, _ = trip_of(monitor_of(weak), sine_blocks(weak, 300.0, 6.0, amplifier_voltage=7.0))
     assert trip.quantity == "coil current (rms)"
-    # 7 V over 2.6 ohm: 1.9 A rms, reached only when the fading in is a second or two past.
+    # 7 V over 2.6 ohm: 1.9 A rms, which is reached a second or two after the fade-in.
     assert trip.time_s > 2.0
 
 
@@ -122,7 +122,7 @@ def test_the_limit_event_names_the_first_sample_past_the_limit(rig):
     assert (trip.sample, trip.value) == (BLOCK + 1234, pytest.approx(750.0))
 
 
-def test_an_overload_names_the_range_of_the_vibrometer_or_converter(rig):
+def test_an_overload_error_names_the_exceeded_range(rig):
     volts = np.zeros((4, BLOCK))
     volts[3, 100] = 3.9
     volts[0, 200] = 4.9
@@ -164,7 +164,7 @@ def test_a_flagged_over_range_does_not_trip_an_amplitude_limit(rig):
 
 
 def test_a_gap_restarts_the_integration(rig):
-    monitor = monitor_of(only(rig, "stroke_m"))
+    monitor = monitor_of(only_limit(rig, "stroke_m"))
     blocks = sine_blocks(rig, 12.0, base_acceleration=20.0)
     watch(monitor, blocks[:20])
     monitor.require_safe(Block(blocks[25].first_sample, np.zeros((4, BLOCK))))
@@ -178,7 +178,7 @@ def test_checking_a_block_of_0_1_s_takes_less_than_a_millisecond(rig):
         began_s = time.perf_counter()
         monitor.require_safe(block)
         spent_s.append(time.perf_counter() - began_s)
-    # The median, since others share the machine.
+    # The median is robust against other programs on the machine.
     assert np.median(spent_s) < 1e-3
 
 
@@ -213,7 +213,7 @@ def test_an_exceeded_limit_is_recorded_with_its_values(bench, tmp_path):
 
 
 def test_settling_of_an_ac_coupled_input_does_not_trip_the_stroke_limit(rig):
-    """An AC-coupled input with a time constant of 0.1 s, half a volt from its rest when the run begins."""
+    """The AC-coupled input has a time constant of 0.1 s and starts at half a volt."""
     monitor = monitor_of(rig)
     time_s = np.arange(round(2 * RATE_HZ)) / RATE_HZ
     volts = np.zeros((4, time_s.size))

@@ -1,4 +1,4 @@
-"""The motion behind the limits: sines come out with the right amplitude, in whatever blocks they arrive."""
+"""Base and specimen motion behind the limits: right amplitudes for any block size."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ STILL = BaseMotion(np.zeros(TIME_S.size), np.zeros(TIME_S.size))
 
 
 def amplitude(values):
-    """Peak of the last second, when what the start has left is gone."""
+    """Return the peak of the last second, after the initial transient."""
     return np.max(np.abs(values[-round(RATE_HZ) :]))
 
 
@@ -20,7 +20,7 @@ def amplitude(values):
 def test_velocity_and_stroke_of_a_sine_are_its_integrals(frequency_hz):
     turn = 2 * np.pi * frequency_hz
     motion = BaseTracker(RATE_HZ).follow(7.0 * np.sin(turn * TIME_S))
-    # What the high pass takes: its own gain for a velocity, twice for a displacement.
+    # The high-pass filter acts once on a velocity and twice on a displacement.
     gain = 1 / np.sqrt(1 + (HIGH_PASS_HZ / frequency_hz) ** 4)
     assert amplitude(motion.velocity) == pytest.approx(gain * 7.0 / turn, rel=3e-3)
     assert amplitude(motion.displacement) == pytest.approx(gain**2 * 7.0 / turn**2, rel=6e-3)
@@ -29,7 +29,7 @@ def test_velocity_and_stroke_of_a_sine_are_its_integrals(frequency_hz):
 def test_the_motion_does_not_depend_on_the_block_size():
     rng = np.random.default_rng(5)
     acceleration = rng.standard_normal(TIME_S.size)
-    first, rest = np.split(acceleration, [5120])  # by the first block alone it is known what was there before
+    first, rest = np.split(acceleration, [5120])  # the first block determines the initial state
     at_once, tracker = BaseTracker(RATE_HZ), BaseTracker(RATE_HZ)
     at_once.follow(first)
     tracker.follow(first)
@@ -43,7 +43,7 @@ def test_the_motion_does_not_depend_on_the_block_size():
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 3.0])
 def test_residual_ringing_at_the_start_does_not_inflate_the_motion(phase):
-    """A run that follows the one before at once: base at 66 Hz and 3.6 m/s2, m0 at 95 Hz and 30 mm/s."""
+    """The run before ended just now: base at 66 Hz and 3.6 m/s2, m0 at 95 Hz and 30 mm/s."""
     time_s = TIME_S[: round(0.4 * RATE_HZ)]
     acceleration = 3.6 * np.exp(-60 * time_s) * np.cos(2 * np.pi * 66 * time_s + phase)
     velocity = 0.03 * np.exp(-3 * time_s) * np.cos(2 * np.pi * 95 * time_s + phase)

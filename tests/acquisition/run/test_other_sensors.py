@@ -1,4 +1,4 @@
-"""Rigs with an accelerometer or a displacement probe on m0, sensors on other masses, and a force cell."""
+"""Rigs with other sensors on m0, sensors on other masses, and a force cell."""
 
 import json
 import re
@@ -36,7 +36,7 @@ NOISE = {"acceleration": 3e-5, "displacement": 1e-12, "force": 2e-6}
 DWELL = {"kind": "dwell", "settle_s": 1.0, "duration_s": 1.5}
 
 
-def sheet(role, **more):
+def sensor_table(role, **more):
     quantity = role.partition("_")[2]
     noise = {"value": NOISE.get(quantity, 1e-9), "source": "test"}
     usual = {"model": role, "full_scale_v": 5.0, "calibrated": "2026-02-10", "noise_per_rthz": noise}
@@ -44,14 +44,14 @@ def sheet(role, **more):
 
 
 def rig_with(*roles, without=("amplifier_voltage",), **more):
-    """The virtual rig with further sensors at the inputs of channels that are left out."""
+    """Return the virtual rig with further sensors at the inputs of omitted channels."""
     said = BASE.model_dump(mode="json")
     kept = [each for each in said["daq"]["channels"] if each["role"] not in without]
     free = sorted({f"ai{number}" for number in range(4)} - {each["physical"] for each in kept})
     usual = {"range_v": 5.0, "coupling": "DC", "calibrated": "2026-02-10"}
     kept += [{"role": role, "physical": at, **usual} for role, at in zip(roles, free, strict=False)]
     said["daq"]["channels"] = kept
-    said["sensors"] = {role: sheet(role, **more) for role in roles}
+    said["sensors"] = {role: sensor_table(role, **more) for role in roles}
     if "m0_velocity" in without:
         said["vibrometer"] = None
     return Rig.model_validate(said)
@@ -60,7 +60,7 @@ def rig_with(*roles, without=("amplifier_voltage",), **more):
 ON_M0 = pytest.mark.parametrize("role", ["m0_acceleration", "m0_displacement"])
 
 
-def measured(rig, folder, **excitation):
+def record(rig, folder, **excitation):
     plan = {
         "name": "s",
         "defaults": {"ramp_s": 0.2},
@@ -80,7 +80,7 @@ def amplitude(samples, rate_hz, frequency_hz):
 @pytest.mark.thorough
 @pytest.mark.parametrize("role", ["m0_displacement", "m0_acceleration"])
 def test_probe_and_accelerometer_measure_the_motion_of_the_vibrometer(tmp_path, role):
-    path = measured(rig_with(role), tmp_path, amplitude_vpp=0.5, frequency_hz=250.0, **DWELL)
+    path = record(rig_with(role), tmp_path, amplitude_vpp=0.5, frequency_hz=250.0, **DWELL)
     with open_recording(path) as recording:
         rate = recording.sample_rate_hz
         chosen = slice(round(0.5 * rate), None)
@@ -96,7 +96,7 @@ def test_probe_and_accelerometer_measure_the_motion_of_the_vibrometer(tmp_path, 
 
 
 def test_a_force_cell_measures_the_force_on_fixture_and_specimen(tmp_path):
-    path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
+    path = record(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     with open_recording(path) as recording:
         rate, stop = recording.sample_rate_hz, recording.samples - round(0.4 * recording.sample_rate_hz)
         force, base = (
@@ -141,7 +141,7 @@ def test_a_plan_beyond_the_range_of_a_sensor_on_m0_is_refused(role):
 def test_a_dwell_without_a_vibrometer_gives_responses_of_its_accelerometers(tmp_path):
     results = [
         analyse_files(
-            [measured(rig, tmp_path / str(number), amplitude_vpp=1.5, frequency_hz=260.0, **DWELL)],
+            [record(rig, tmp_path / str(number), amplitude_vpp=1.5, frequency_hz=260.0, **DWELL)],
             "s",
             Simulation.LEFT_OUT,
         )
@@ -163,13 +163,13 @@ def test_a_dwell_without_a_vibrometer_gives_responses_of_its_accelerometers(tmp_
     ("change", "words"),
     [
         ({"vibrometer": None}, "the channel m0_velocity has no sensor; add the table [vibrometer]"),
-        ({"sensors": {"m2_velocity": sheet("m0_acceleration")}}, "is not a sensitivity for 'm s-1'"),
-        ({"sensors": {"drive_voltage": sheet("m0_force")}}, "a voltage channel has no sensor"),
+        ({"sensors": {"m2_velocity": sensor_table("m0_acceleration")}}, "is not a sensitivity for 'm s-1'"),
+        ({"sensors": {"drive_voltage": sensor_table("m0_force")}}, "a voltage channel has no sensor"),
         (
-            {"sensors": {"m0_velocity": sheet("m0_velocity")}},
+            {"sensors": {"m0_velocity": sensor_table("m0_velocity")}},
             "describe it in the table [vibrometer]",
         ),
-        ({"sensors": {"m9_velocity": sheet("m0_velocity")}}, "m9_velocity"),
+        ({"sensors": {"m9_velocity": sensor_table("m0_velocity")}}, "m9_velocity"),
     ],
 )
 def test_an_unsuitable_sensor_is_refused(change, words):
@@ -200,11 +200,11 @@ def test_the_first_day_procedure_covers_all_sensors_of_the_template(tmp_path):
     assert rig.sensors["base_force"].serial == "4711"
 
 
-def test_feedback_without_a_sensor_on_m0_is_refused_before_anything_plays(tmp_path):
+def test_feedback_without_a_sensor_on_m0_is_refused_before_output(tmp_path):
     level = {"displacement_m": 1e-6}
     rig = rig_with("m2_acceleration", without=("m0_velocity",))
     with pytest.raises(ConfigurationError, match=r"needs the channel m0_velocity.*Nothing was played"):
-        measured(
+        record(
             rig, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
             base_level=level, duration_s=1.0,
         )  # fmt: skip
@@ -213,7 +213,7 @@ def test_feedback_without_a_sensor_on_m0_is_refused_before_anything_plays(tmp_pa
 @pytest.mark.thorough
 def test_a_sensor_on_m2_is_analysed_and_reported(tmp_path):
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
-    path = measured(
+    path = record(
         rig_with("m2_acceleration"), tmp_path, kind="white_noise", amplitude_vpp=0.05, settle_s=2.0, **noise
     )
     assert other_responses([path]) == {"m2_acceleration": (path,)}
@@ -233,13 +233,13 @@ def test_a_sensor_on_m2_is_analysed_and_reported(tmp_path):
     report = (tmp_path / "out" / "report_m2_acceleration.html").read_text(encoding="utf-8")
     assert list((tmp_path / "out" / "figures_m2_acceleration").glob("transmission_s.*"))
     shown = re.sub(r"<(script|style).*?</\1>|data:[^\"]+", "", report, flags=re.DOTALL)
-    # The channel of m0 stands among the levels of all channels, and nothing else speaks of m0.
+    # m0 appears in the list of channel levels only.
     assert re.findall(r".{30}\bm0\b(?! velocity).{20}", shown) == []
 
 
 @pytest.mark.thorough
 def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
-    """The paper's campaign, shortened: noise, sweep and chaotic dwell."""
+    """The campaign is the paper's, shortened: noise, sweep and chaotic dwell."""
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
     plans = {
         "noise": {"kind": "white_noise", "amplitude_vpp": 0.05, "settle_s": 2.0, **noise},
@@ -250,7 +250,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     }  # fmt: skip
     budgets, verdicts = [], []
     for number, rig in enumerate((BASE, WITHOUT)):
-        paths = [measured(rig, tmp_path / f"{number}_{name}", **plan) for name, plan in plans.items()]
+        paths = [record(rig, tmp_path / f"{number}_{name}", **plan) for name, plan in plans.items()]
         done = analyse_files(paths, "both", Simulation.LEFT_OUT)
         assert not done.failures
         budgets.append([each for result in done.results for each in budgets_of(result)])
@@ -267,7 +267,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
 
 
 def test_a_force_response_of_a_sine_is_refused(tmp_path):
-    path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
+    path = record(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
     with pytest.raises(UnusableData, match="base_force has results only for noise"):
         analyse(path, response="base_force")
@@ -278,7 +278,7 @@ def test_a_force_response_of_a_sine_is_refused(tmp_path):
 @pytest.mark.thorough
 def test_a_force_cell_gives_the_apparent_mass_in_kilograms(tmp_path):
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
-    path = measured(
+    path = record(
         rig_with("base_force"), tmp_path, kind="white_noise", amplitude_vpp=0.05, settle_s=2.0, **noise
     )
     command = [sys.executable, "-m", "vibench.cli", "analyse", path, "--no-simulate", "--json"]
@@ -309,13 +309,13 @@ def test_a_force_cell_gives_the_apparent_mass_in_kilograms(tmp_path):
 @pytest.mark.thorough
 @ON_M0
 def test_feedback_tracks_the_same_resonance_with_an_accelerometer_or_a_probe(role, tmp_path):
-    """It refused rigs without a vibrometer; the closed form has the frequency."""
+    """The resonance frequency is compared with the closed form."""
     rig = rig_with(role, without=("m0_velocity",))
     plan = {
         "kind": "resonance_tracking", "amplitude_vpp": 0.1, "start_hz": 94.0, "low_hz": 90.0, "high_hz": 99.0,
         "accelerations_m_per_s2": [0.05], "flank_pairs": 0,
     }  # fmt: skip
-    with open_recording(measured(rig, tmp_path, **plan)) as recording:
+    with open_recording(record(rig, tmp_path, **plan)) as recording:
         (note,) = [json.loads(each.text) for each in recording.events if each.kind == "resonance"]
     at_hz = np.arange(90.0, 99.0, 0.001)
     ratio = base_transmissibility(specimen_of(rig), at_hz)[:, 0]

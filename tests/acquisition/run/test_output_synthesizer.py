@@ -1,4 +1,4 @@
-"""The samples of a score against closed forms: envelopes, phases, boundaries."""
+"""Synthesised samples against closed forms: envelopes, phases and segment boundaries."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ RATE_HZ = 5120.0
 NOISE = Stream(GaussianBand(50.0, 600.0, seed=3))
 
 
-def ramped(play, ramp_s=0.1, hold_s=0.3):
+def with_ramps(play, ramp_s=0.1, hold_s=0.3):
     return [
         Phase(RunState.RAMPING_UP, play, ramp_s),
         Phase(RunState.RECORDING, play, hold_s),
@@ -28,7 +28,7 @@ def half_cosine(samples):
 
 def test_a_stream_is_multiplied_by_a_half_cosine_envelope():
     synthesizer = OutputSynthesizer(RATE_HZ)
-    synthesizer.append(ramped(NOISE))
+    synthesizer.append(with_ramps(NOISE))
     envelope = np.concatenate([half_cosine(512), np.ones(1536), 1 - half_cosine(512), np.zeros(100)])
     expected = NOISE.source.samples(0, 2660, RATE_HZ) * envelope
     np.testing.assert_allclose(synthesizer.take(2660), expected, atol=1e-14)
@@ -39,7 +39,7 @@ def test_a_stream_is_multiplied_by_a_half_cosine_envelope():
 def test_synthesised_samples_do_not_depend_on_the_block_size(cuts):
     whole, pieces = OutputSynthesizer(RATE_HZ), OutputSynthesizer(RATE_HZ)
     for synthesizer in (whole, pieces):
-        synthesizer.append([*ramped(Tone(123.4)), *ramped(NOISE)])
+        synthesizer.append([*with_ramps(Tone(123.4)), *with_ramps(NOISE)])
     taken = np.concatenate([np.empty(0), *(pieces.take(count) for count in cuts)])
     np.testing.assert_allclose(taken, whole.take(taken.size), atol=1e-11)
 
@@ -59,7 +59,7 @@ def test_a_tone_with_changing_frequency_is_continuous(frequencies, hold_s):
         ]
     )
     volts = synthesizer.take(round(RATE_HZ * (0.25 + hold_s * len(tones))))
-    # Slope of the fastest sine, and of the ramp.
+    # the steepest slopes of the fastest sine and of the ramp
     steepest = (2 * np.pi * max(frequencies) + np.pi / 2 / 0.1) / RATE_HZ
     assert np.max(np.abs(np.diff(volts))) <= steepest
 
@@ -77,7 +77,7 @@ def test_segment_boundaries_are_rounded_to_the_nearest_sample(durations):
     ends = np.round((0.1 + np.cumsum(durations)) * RATE_HZ).astype(int) - 512
     expected = np.repeat(levels, np.diff(ends, prepend=0))
     volts = synthesizer.take(expected.size)
-    # A quarter of the rate is 0, 1, 0, -1: every second sample shows the level.
+    # At a quarter of the sample rate a sine is 0, 1, 0, -1: every second sample shows its level.
     np.testing.assert_allclose(np.abs(volts[1::2]), expected[1::2], atol=1e-9)
 
 
@@ -96,9 +96,9 @@ def test_the_last_signal_fades_out_without_a_step():
 
 def test_a_signal_appended_after_the_end_begins_at_the_next_sample():
     synthesizer = OutputSynthesizer(RATE_HZ)
-    synthesizer.append(ramped(NOISE))
+    synthesizer.append(with_ramps(NOISE))
     synthesizer.take(4321)
-    synthesizer.append(ramped(Tone(100.0)))
+    synthesizer.append(with_ramps(Tone(100.0)))
     expected = np.sin(2 * np.pi * 100.0 * np.arange(512) / RATE_HZ) * half_cosine(512)
     np.testing.assert_allclose(synthesizer.take(512), expected, atol=1e-12)
 
@@ -106,7 +106,7 @@ def test_a_signal_appended_after_the_end_begins_at_the_next_sample():
 @pytest.mark.parametrize("taken", [0, 1, 300, 1000, 2300, 2600])
 def test_a_fade_starts_at_the_current_level_and_ends_silent(taken):
     synthesizer = OutputSynthesizer(RATE_HZ)
-    synthesizer.append(ramped(NOISE))
+    synthesizer.append(with_ramps(NOISE))
     synthesizer.take(taken)
     level = synthesizer.level
     synthesizer.fade(0.1)
@@ -119,6 +119,6 @@ def test_a_fade_starts_at_the_current_level_and_ends_silent(taken):
 
 def test_the_synthesizer_refuses_generator_waveforms():
     synthesizer = OutputSynthesizer(RATE_HZ)
-    synthesizer.append(ramped(Waveform(np.array([0.0, 1.0]), 1.0)))
+    synthesizer.append(with_ramps(Waveform(np.array([0.0, 1.0]), 1.0)))
     with pytest.raises(ConfigurationError, match="play it with the function generator"):
         synthesizer.take(10)

@@ -1,4 +1,4 @@
-"""The Keysight 33500B of the virtual rig: sweeps that it makes by itself, and all else at the wall's pace."""
+"""Sweeps made by the generator, a simulated Keysight 33500B, and runs in real time."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def sweep(start_hz=150.0, stop_hz=310.0, **changes):
     return Measurement(name="sweep", excitation=SineSweep(start_hz=start_hz, stop_hz=stop_hz, **own), **RAMP)
 
 
-def at_the_walls_pace(bench):
+def in_real_time(bench):
     rig = load_rig(bench)
     generator = rig.generator.model_copy(update={"settle_s": LABORATORY_SETTLE_S})
     virtual = rig.virtual.model_copy(update={"pace": "wall"})
@@ -42,7 +42,7 @@ def at_the_walls_pace(bench):
 
 
 def excess_cycles(path, excitation):
-    """Cycles of the recorded drive beyond the plan's, and whether the run noted any."""
+    """Return the difference in cycles between recorded drive and plan, and whether the run noted it."""
     with open_recording(path) as recording:
         found = next(each for each in recording.segments if each.label == "sweep")
         drive = recording.read("drive_voltage", found.first_sample, found.last_sample + 1)
@@ -114,7 +114,7 @@ def test_check_and_campaign_run_in_real_time_with_instrument_delays(tmp_path, be
         name="first",
         measurements=[Measurement(name=name, excitation=each, **RAMP) for name, each in excitations.items()],
     )
-    with open_bench(at_the_walls_pace(bench)) as opened:
+    with open_bench(in_real_time(bench)) as opened:
         found = check_bench(opened, tmp_path).findings
         assert not [each for each in found if each.verdict is Verdict.FAIL]
         results = run_campaign(opened, campaign, tmp_path / "campaign")

@@ -1,4 +1,4 @@
-"""The run as a state machine: what it plays and records, and every way out of every state."""
+"""The states of a run: what each state plays and records, and every way to end a run."""
 
 from itertools import pairwise
 
@@ -61,7 +61,7 @@ RECORDED_STATES = [
 every_state = pytest.mark.parametrize("state", RECORDED_STATES)
 
 
-def with_(**changes):
+def changed_dwell(**changes):
     return DWELL.model_copy(update=changes)
 
 
@@ -90,7 +90,7 @@ def assert_silent_and_finished(bench, state):
 
 
 def assert_ended_without_a_jump(bench, state=RunState.RECORDING):
-    """While the output was on, no amplitude setting was more than one stair below the last."""
+    """Require that no amplitude setting falls by more than one ramp step while the output is on."""
     if state is RunState.CHECKING:
         return
     settings = [value for _, value in bench.world.amplitudes()]
@@ -102,13 +102,13 @@ def assert_ended_without_a_jump(bench, state=RunState.RECORDING):
 
 @pytest.fixture(scope="module")
 def played(new_bench, rig, tmp_path_factory):
-    """A bench after a whole run; ``shown`` is the progress."""
+    """Return a bench after a complete run; ``shown`` contains the progress."""
     bench = new_bench(rig)
     bench.shown = list(run_of(bench, tmp_path_factory.mktemp("run")))
     return bench
 
 
-class TestThePlanIsCarriedOut:
+class TestCompleteRuns:
     def test_a_run_passes_all_states_in_order(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         assert run.state is RunState.IDLE
@@ -142,7 +142,7 @@ class TestThePlanIsCarriedOut:
         expected = AMPLITUDE_VPP / 2 * played.rig.generator.terminal_factor()
         assert sine_amplitude(volts, 260.0, RATE) == pytest.approx(expected, rel=1e-9)
 
-    def test_the_ramp_follows_a_half_cosine_in_steps(self, played):
+    def test_a_ramp_follows_a_half_cosine_in_steps(self, played):
         ramp = next(each for each in played.recorder.segments if each["label"] == "ramp_up")
         stairs = [
             (at - ramp["first"], value) for at, value in played.world.amplitudes() if ramp["first"] <= at
@@ -165,7 +165,7 @@ class TestThePlanIsCarriedOut:
                 at_start.append(amplitude)
         assert at_start == [pytest.approx(0.02 * AMPLITUDE_VPP), pytest.approx(2.5e-3)]
 
-    def test_a_checked_bench_is_not_checked_again(self, bench, tmp_path):
+    def test_a_run_on_a_checked_bench_skips_the_low_level_check(self, bench, tmp_path):
         list(run_of(bench, tmp_path, check=LowLevelCheck.RECENTLY_PASSED))
         assert [each["label"] for each in bench.recorder.segments] == ["ramp_up", "dwell", "ramp_down"]
         events = [event[1:] for event in bench.recorder.events]
@@ -186,26 +186,26 @@ class TestSweepsAndSteps:
         sweep = SineSweep(
             amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=1, step_s=0.0123, settle_s=0.2
         )
-        plan = with_(excitation=sweep)
+        plan = changed_dwell(excitation=sweep)
         list(run_of(bench, tmp_path, plan))
         segments = [each for each in bench.recorder.segments if each["label"] == "sweep"]
         assert len(segments) == 1
         assert segments[0]["last"] - segments[0]["first"] + 1 == round(RATE)
         changes = [at for name, _, at in bench.world.calls if name == "set_frequency"]
         expected = segments[0]["first"] + np.arange(1, 82) * 0.0123 * RATE
-        # Steps that are no whole number of samples do not drift: each change is at the nearest one.
+        # Steps with a non-integer number of samples do not drift: each change is at the nearest sample.
         np.testing.assert_allclose(changes, expected, atol=0.5 + 1e-6)
 
     def test_a_sweep_never_jumps_in_phase_or_amplitude(self, bench, tmp_path):
         sweep = SineSweep(amplitude_vpp=2, start_hz=50, stop_hz=80, duration_s=1, step_s=0.01, settle_s=0.1)
-        list(run_of(bench, tmp_path, with_(excitation=sweep)))
+        list(run_of(bench, tmp_path, changed_dwell(excitation=sweep)))
         segment = next(each for each in bench.recorder.segments if each["label"] == "sweep")
         volts = bench.recorder.channel(0)[segment["first"] : segment["last"] + 1]
         assert np.max(np.abs(np.diff(volts * bench.channels[0].units_per_volt))) <= 2 * np.pi * 80 / RATE
 
     def test_stepped_sine_settles_at_every_frequency(self, bench, tmp_path):
         steps = SteppedSine(amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=0.13, record_s=0.2)
-        list(run_of(bench, tmp_path, with_(excitation=steps)))
+        list(run_of(bench, tmp_path, changed_dwell(excitation=steps)))
         segments = [each for each in bench.recorder.segments if each["label"] == "step"]
         assert [each["numbers"]["frequency_hz"] for each in segments] == [100, 150, 260]
         gaps = [b["first"] - a["last"] - 1 for a, b in pairwise(segments)]
@@ -215,7 +215,7 @@ class TestSweepsAndSteps:
     def test_a_new_waveform_is_loaded_only_when_the_drive_is_quiet(self, bench, tmp_path):
         band = {"band_start_hz": 20, "band_stop_hz": 800, "repetition_hz": 2}
         noise = WhiteNoise(amplitude_vpp=2, realisations=3, periods=1, settle_s=0.1, **band)
-        list(run_of(bench, tmp_path, with_(excitation=noise)))
+        list(run_of(bench, tmp_path, changed_dwell(excitation=noise)))
         amplitude, before, after = None, [], []
         for name, value, _ in bench.world.calls:
             if name == "load_waveform":
@@ -239,12 +239,12 @@ class TestSweepsAndSteps:
         steps = SteppedSine(
             amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=settle_s, record_s=record_s
         )
-        list(run_of(bench, tmp_path, with_(excitation=steps)))
+        list(run_of(bench, tmp_path, changed_dwell(excitation=steps)))
         total_s = CHECK_S + 0.4 + 3 * (settle_s + record_s)
         assert abs(bench.recorder.samples - total_s * RATE) <= 0.5 + 1e-6
 
 
-class TestEveryWayOut:
+class TestEndsOfARun:
     @every_state
     def test_a_cancel_ramps_down(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
@@ -379,7 +379,7 @@ class TestEveryWayOut:
             list(run)
         assert bench.recorder.ending[1] == "DataLost: a hole; then: cannot stop"
 
-    def test_a_limit_passed_while_ramping_down_does_not_stop_the_ramp(self, bench, tmp_path):
+    def test_a_limit_exceeded_during_the_ramp_down_does_not_stop_the_ramp(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.cancel()
         bench.world.background_m_per_s2 = 1000.0
@@ -393,8 +393,8 @@ def text_of_silence(bench):
 
 
 class TestStopLevels:
-    def ended(self, bench, tmp_path, *levels):
-        """Stop a recording at each level, a block after the other; the blocks after the first wish."""
+    def stop_at_levels(self, bench, tmp_path, *levels):
+        """Stop a recording at each level, one block apart; return the run and the blocks from then on."""
         run = run_upto(RunState.RECORDING, bench, tmp_path, SLOW)
         shown = []
         for level in levels:
@@ -403,14 +403,14 @@ class TestStopLevels:
         return run, [*shown, *list(run)]
 
     def test_a_ramp_takes_as_long_as_planned(self, bench, tmp_path):
-        run, shown = self.ended(bench, tmp_path, StopLevel.RAMP)
+        run, shown = self.stop_at_levels(bench, tmp_path, StopLevel.RAMP)
         took_s = shown[-1].elapsed_s - shown[0].elapsed_s - LISTEN_S
         assert took_s == pytest.approx(SLOW.ramp_s * 49 / 50, abs=1e-3)
         assert run.outcome.cause is Cause.OPERATOR
         assert_ended_without_a_jump(bench)
 
     def test_an_abort_takes_three_periods_of_the_suspension(self, bench, tmp_path):
-        _, shown = self.ended(bench, tmp_path, StopLevel.ABORT)
+        _, shown = self.stop_at_levels(bench, tmp_path, StopLevel.ABORT)
         ramp_s = shortest_ramp_s(bench.rig)
         took_s = shown[-1].elapsed_s - shown[0].elapsed_s - LISTEN_S
         assert took_s == pytest.approx(ramp_s * 49 / 50, abs=1e-3)
@@ -425,24 +425,24 @@ class TestStopLevels:
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
     def test_a_faster_stop_replaces_a_slow_ramp(self, bench, tmp_path):
-        _, shown = self.ended(bench, tmp_path, StopLevel.RAMP, StopLevel.ABORT)
+        _, shown = self.stop_at_levels(bench, tmp_path, StopLevel.RAMP, StopLevel.ABORT)
         assert shown[-1].elapsed_s - shown[0].elapsed_s < shortest_ramp_s(bench.rig) + 2 * SLOW.ramp_s / 50
         assert_ended_without_a_jump(bench)
         assert [event[2] for event in bench.recorder.events if event[1] == "end"] == [
             "ramp pressed", "abort pressed"
         ]  # fmt: skip
 
-    def test_a_slower_stop_does_not_replace_a_faster_one(self):
+    def test_a_slower_stop_does_not_replace_a_faster_stop(self):
         switch = StopSwitch()
         switch.ask(StopRequest(Cause.EMERGENCY, StopLevel.ABORT, "first"))
         switch.ask(by_operator(StopLevel.RAMP))
         assert switch.request.reason == "first"
 
     def test_the_time_to_silence_is_recorded(self, bench, tmp_path):
-        self.ended(bench, tmp_path, StopLevel.ABORT)
+        self.stop_at_levels(bench, tmp_path, StopLevel.ABORT)
         said = text_of_silence(bench)
         took_s = float(said.removeprefix("abort: ").partition(" ")[0])
-        # The last stair of the ramp lies below what counts as silence.
+        # The last step of the ramp is below the level that counts as silence.
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "measured silence" in said
 
@@ -457,7 +457,7 @@ class TestStopLevels:
         assert not any(was_on)
 
     def test_unread_samples_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
-        """A busy computer reads five times as fast as real time, and ten seconds are unread."""
+        """A busy computer reads five times as fast as real time and has ten seconds of unread samples."""
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         convert, read = bench.world.convert, bench.digitizer.read
         unread = 10 * round(bench.digitizer.sample_rate_hz)
@@ -473,12 +473,12 @@ class TestStopLevels:
         list(run)
         loud = np.flatnonzero(np.abs(bench.recorder.channel(0)) > SILENT_V)
         took_s = (loud[-1] - stopped) / bench.digitizer.sample_rate_hz
-        # The block in which the stop is seen, then the ramp.
+        # One block until the stop is noticed, then the ramp.
         assert took_s <= BLOCK_S / 5 + shortest_ramp_s(bench.rig)
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
     @pytest.mark.parametrize("reading_s", [0.0, 0.03, 0.1])
-    def test_a_ramp_keeps_its_stairs_on_a_computer_that_reads_slowly(
+    def test_a_ramp_keeps_enough_steps_on_a_computer_that_reads_slowly(
         self, bench, tmp_path, monkeypatch, reading_s
     ):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
@@ -510,7 +510,7 @@ class TestStopLevels:
 
     def test_mains_hum_does_not_count_as_drive(self, bench, tmp_path):
         bench.world.hum_v = 0.012
-        run = run_upto(RunState.RECORDING, bench, tmp_path, with_(excitation=LOUD))
+        run = run_upto(RunState.RECORDING, bench, tmp_path, changed_dwell(excitation=LOUD))
         run.switch.ask(by_operator(StopLevel.ABORT))
         list(run)
         assert "measured silence" in text_of_silence(bench)
@@ -568,12 +568,12 @@ class TestRefusals:
 
     def test_a_plan_beyond_a_limit_is_refused_before_output(self, bench, tmp_path):
         hard = Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)
-        text = self.refused(bench, tmp_path, with_(excitation=hard), LimitExceeded)
+        text = self.refused(bench, tmp_path, changed_dwell(excitation=hard), LimitExceeded)
         assert "the stroke (at 20 Hz, peak) would be" in text
 
     def test_streamed_noise_needs_an_analogue_output(self, bench, tmp_path):
         noise = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=800, duration_s=1)
-        text = self.refused(bench, tmp_path, with_(excitation=noise), ConfigurationError)
+        text = self.refused(bench, tmp_path, changed_dwell(excitation=noise), ConfigurationError)
         assert "use white_noise with more realisations" in text
 
     def test_a_bench_without_a_recorded_drive_is_refused(self, bench, tmp_path):
@@ -593,7 +593,7 @@ class TestTheBenchCheck:
             ({"background_m_per_s2": 10.0}, "before anything plays"),
         ],
     )
-    def test_a_bench_that_does_not_fit_its_configuration_stays_silent(self, bench, tmp_path, fault, sentence):
+    def test_a_low_level_check_that_finds_a_deviation_prevents_output(self, bench, tmp_path, fault, sentence):
         for name, value in fault.items():
             setattr(bench.world, name, value)
         run = run_of(bench, tmp_path)
@@ -633,7 +633,7 @@ class TestOverloads:
         assert bench.recorder.blocks[0].overloads == bench.world.overloads
 
     def test_an_overload_ends_the_run_if_the_plan_says_so(self, bench, tmp_path):
-        strict = with_(limits=InRunLimits(on_overload=OnOverload.STOP))
+        strict = changed_dwell(limits=InRunLimits(on_overload=OnOverload.STOP))
         run = run_upto(RunState.RECORDING, bench, tmp_path, strict)
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
@@ -649,7 +649,7 @@ class TestOverloads:
         ],
     )
     def test_a_plan_may_set_tighter_limits_than_the_rig(self, bench, tmp_path, limits, named):
-        run = run_of(bench, tmp_path, with_(limits=limits))
+        run = run_of(bench, tmp_path, changed_dwell(limits=limits))
         with pytest.raises(LimitExceeded, match=named):
             list(run)
         assert_silent_and_finished(bench, RecordingState.FAILED)

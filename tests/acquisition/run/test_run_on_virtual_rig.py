@@ -1,4 +1,4 @@
-"""The whole path: plans, unmodified pyvisa and nidaqmx, simulated instruments, files."""
+"""Complete runs: plan, real pyvisa and nidaqmx, simulated instruments, files."""
 
 import signal
 import subprocess
@@ -25,8 +25,8 @@ def virtual_bench():
         yield bench
 
 
-def measured(bench, folder, excitation, **fields):
-    """Carry out a plan and open its recording."""
+def record(bench, folder, excitation, **fields):
+    """Carry out a plan and return its recording."""
     plan = Measurement(name="run", excitation=excitation, **{"ramp_s": 0.4, "ramp_step_s": 0.02, **fields})
     outcome = run_measurement(bench, plan, folder / "run.h5")
     assert outcome.state is RunState.FINISHED
@@ -40,28 +40,28 @@ def segment(recording, label):
 
 def test_a_recorded_dwell_has_its_frequency_and_amplitude(virtual_bench, tmp_path):
     dwell = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1)
-    with measured(virtual_bench, tmp_path, dwell) as recording:
+    with record(virtual_bench, tmp_path, dwell) as recording:
         drive = segment(recording, "dwell")
         rate_hz = recording.sample_rate_hz
     assert len(drive) == rate_hz
     assert sine_amplitude(drive, 260.0, rate_hz) == pytest.approx(0.75 * TERMINAL, rel=1e-3)
-    # Beside the sine there is noise of the generator and the converter, and nothing else.
+    # The remaining signal is noise of generator and converter.
     rms = np.sqrt(np.mean(drive**2))
     assert rms == pytest.approx(0.75 * TERMINAL / np.sqrt(2), rel=1e-3)
 
 
 def test_the_ramps_rise_and_fall_on_a_half_cosine(virtual_bench, tmp_path):
     dwell = Dwell(amplitude_vpp=1.5, frequency_hz=500, settle_s=0.1, duration_s=0.2)
-    with measured(virtual_bench, tmp_path, dwell) as recording:
+    with record(virtual_bench, tmp_path, dwell) as recording:
         rate_hz = recording.sample_rate_hz
         up, down = segment(recording, "ramp_up"), segment(recording, "ramp_down")
     stair = round(0.02 * rate_hz)
     expected = 0.75 * TERMINAL * (1 - np.cos(np.pi * np.arange(1, 21) / 20)) / 2
     for ramp, heights in ((up, expected), (down, np.append(expected[-2::-1], 0.0))):
-        # The converter's filter shows a stair some 40 samples late: leave the beginning of each out.
+        # The converter's filter delays each step by some 40 samples: omit the beginning of each step.
         settled = ramp.reshape(-1, stair)[:, stair // 8 :]
         levels = [sine_amplitude(piece, 500.0, rate_hz) for piece in settled]
-        # The quiet level of 2.5 mVpp is where a ramp begins and ends.
+        # A ramp begins and ends at the quiet level of 2.5 mVpp.
         np.testing.assert_allclose(levels, heights, atol=2e-3)
 
 
@@ -69,15 +69,15 @@ def test_recorded_noise_has_a_flat_line_spectrum_in_its_band(virtual_bench, tmp_
     noise = WhiteNoise(
         amplitude_vpp=1.0, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1, settle_s=0.2
     )
-    with measured(virtual_bench, tmp_path, noise) as recording:
+    with record(virtual_bench, tmp_path, noise) as recording:
         drive = segment(recording, "realisation")
     lines = np.abs(np.fft.rfft(drive))[:2000] * 2 / len(drive)
     inside = lines[20:801]
     values = next(noise.steps()).play.values
     planned = np.sqrt(2 * np.mean(values**2) / 781) * 0.5 * TERMINAL
     assert np.mean(inside) == pytest.approx(planned, rel=0.01)
-    # The two clocks differ by 17 ppm: in a second the lines slip by 17e-6 cycles per hertz and leak
-    # that share of themselves into their neighbours, 1.4 % at 800 Hz and 0.3 % at 200 Hz.
+    # The clocks differ by 17 ppm: in a second the lines shift by 17e-6 cycles per hertz, and the leakage into
+    # neighbouring lines is 1.4 % at 800 Hz and 0.3 % at 200 Hz.
     low = lines[20:201]
     assert np.ptp(low) / np.mean(low) < 0.03
     assert np.ptp(inside) / np.mean(inside) < 0.12
@@ -86,7 +86,7 @@ def test_recorded_noise_has_a_flat_line_spectrum_in_its_band(virtual_bench, tmp_
 
 def test_a_recorded_sweep_has_the_cycles_of_the_ideal_sweep(virtual_bench, tmp_path):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=2, step_s=0.05, settle_s=0.2)
-    with measured(virtual_bench, tmp_path, sweep) as recording:
+    with record(virtual_bench, tmp_path, sweep) as recording:
         drive = segment(recording, "sweep")
     rising = np.flatnonzero((drive[:-1] < 0) & (drive[1:] >= 0))
     assert len(rising) == pytest.approx(sweep.cycles(2.0), abs=1)

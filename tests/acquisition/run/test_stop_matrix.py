@@ -1,8 +1,8 @@
-"""Every state of a run, every way to stop it, every fault beside it: silence, a file that opens, a reason.
+"""Every stop and every fault in every state of a run ends silent, with a readable recording and a reason.
 
-Silence is looked at in the simulated world, at the generator's terminal. Times are rig time: from the moment
-of the cause to the end of the run, which is later than the zero of the drive. The whole product takes
-minutes (``pytest -m slow``); without it each state meets each stop, and each fault, on its own.
+Silence is checked in the simulated world, at the generator's terminal. Times are rig time, from the cause to
+the end of the run, which is later than the silence of the drive. All combinations take minutes (``pytest -m
+slow``); otherwise each state is combined with stops and faults separately.
 """
 
 import itertools
@@ -55,7 +55,7 @@ SILENT_V = 1e-2
 
 @dataclass(frozen=True)
 class Stop:
-    """A way to stop, and how long silence may take after it [s]; None: the plan is carried out."""
+    """A way to stop, and the longest time to silence [s]; None if the plan is completed."""
 
     press: Callable[[Run], None]
     reason: str
@@ -91,7 +91,7 @@ STOPS = {
 
 @dataclass(frozen=True)
 class Fault:
-    """What goes wrong, and whether the run survives it."""
+    """A fault, and whether it ends the run."""
 
     happens: Callable[[object], None]
     ends_the_run: bool
@@ -136,15 +136,15 @@ class FullDisk:
         return writer
 
 
-def brought_to(run, state):
+def bring_to(run, state):
     upto(run, RunState.RECORDING if state is RunState.HELD else state)
     if state is RunState.HELD:
         run.switch.hold()
         upto(run, state)
 
 
-def pressed(stop, run):
-    """Stop; what leaving the run raised, where that is the way to stop."""
+def press_stop(stop, run):
+    """Stop the run; return the error that leaving the run raised, if any."""
     try:
         stop.press(run)
     except AcquisitionError as error:
@@ -152,8 +152,8 @@ def pressed(stop, run):
     return None
 
 
-def ended(run):
-    """Go on to the end; what was raised there."""
+def run_to_end(run):
+    """Iterate to the end of the run; return the error that it raised, if any."""
     try:
         for _ in run:
             if run.state is RunState.HELD:
@@ -163,7 +163,7 @@ def ended(run):
     return None
 
 
-def carried_out(laboratory, tmp_path, state, stop, fault_name):
+def carry_out(laboratory, tmp_path, state, stop, fault_name):
     fault = FAULTS[fault_name]
     virtual, connected = laboratory()
     disk = FullDisk()
@@ -172,11 +172,11 @@ def carried_out(laboratory, tmp_path, state, stop, fault_name):
         with bench_on(connected) as bench:
             run = Run(bench, PLAN, tmp_path / "run.h5", create=disk.create)
             with stop_on_signal(run.switch), run:
-                brought_to(run, state)
+                bring_to(run, state)
                 fault.happens(virtual.faults)
                 disk.is_full = fault_name == "disk full"
                 cause_s = virtual.world.time_s
-                error = pressed(stop, run) or ended(run)
+                error = press_stop(stop, run) or run_to_end(run)
             end_s = virtual.world.time_s
             if fault.is_reachable:
                 assert terminal_v(virtual) < SILENT_V
@@ -189,7 +189,7 @@ def carried_out(laboratory, tmp_path, state, stop, fault_name):
 
 
 def check_silence(virtual, fault, error):
-    """Whoever cannot be reached is shouted out; everybody else is silent."""
+    """Require silence, or an error that says that the output may still be on."""
     if not fault.is_reachable and error is not None:
         said = "".join([str(error), *getattr(error, "__notes__", [])])
         assert "MAY STILL BE ON" in said or terminal_v(virtual) < SILENT_V
@@ -201,14 +201,14 @@ def check_time(stop, fault, error, state, took_s):
     if error is not None and fault.ends_the_run:
         assert took_s <= SILENT_AFTER_FAULT_S + 1e-3
     elif stop.silent_within_s is not None and fault.is_reachable:
-        # A ramp down that was under way is finished first, unless something harder was requested.
+        # A ramp down that has begun is completed first, unless a faster stop is requested.
         under_way_s = RAMP_S if state is RunState.RAMPING_DOWN else 0.0
         assert took_s <= stop.silent_within_s + under_way_s + 1e-3
 
 
 def check_recording(path, run, stop, error, disk):
     if disk.is_full and not path.exists():
-        # Nothing more could be written, the ending included: what was committed is recovered.
+        # No end could be written to the full disk: the committed samples are recovered.
         disk.is_full = False
         recover(path)
         with open_recording(path) as recording:
@@ -228,22 +228,22 @@ def check_recording(path, run, stop, error, disk):
                 assert type(error).__name__ in recording.reason or str(error)[:40] in recording.reason
 
 
-def every_third(ways):
-    """Each way in a third of the states, and each state with a third of the ways; the slow test has all."""
+def third_of_pairs(ways):
+    """Return each stop in a third of the states and each state with a third of the stops."""
     pairs = [(i, j) for i in range(len(ways)) for j in range(len(STATES)) if (i + j) % 3 == 0]
     return [(STATES[j], ways[i]) for i, j in pairs]
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("state", "stop"), every_third(list(STOPS)))
+@pytest.mark.parametrize(("state", "stop"), third_of_pairs(list(STOPS)))
 def test_every_stop_in_every_state_ends_in_silence_with_a_reason(laboratory, tmp_path, state, stop):
-    carried_out(laboratory, tmp_path, state, STOPS[stop], "none")
+    carry_out(laboratory, tmp_path, state, STOPS[stop], "none")
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("state", "fault"), every_third([name for name in FAULTS if name != "none"]))
+@pytest.mark.parametrize(("state", "fault"), third_of_pairs([name for name in FAULTS if name != "none"]))
 def test_every_fault_in_every_state_ends_in_silence_with_a_reason(laboratory, tmp_path, state, fault):
-    carried_out(laboratory, tmp_path, state, STOPS["nothing"], fault)
+    carry_out(laboratory, tmp_path, state, STOPS["nothing"], fault)
 
 
 @pytest.mark.slow
@@ -252,7 +252,7 @@ def test_every_fault_in_every_state_ends_in_silence_with_a_reason(laboratory, tm
     list(itertools.product(STATES, STOPS, FAULTS)),
 )
 def test_every_stop_with_and_without_a_fault_ends_in_silence(laboratory, tmp_path, state, stop, fault):
-    carried_out(laboratory, tmp_path, state, STOPS[stop], fault)
+    carry_out(laboratory, tmp_path, state, STOPS[stop], fault)
 
 
 def test_the_stated_time_of_an_abort_matches_the_shipped_rig(rig):
@@ -275,12 +275,12 @@ def test_a_removed_folder_ends_the_run_in_silence_with_an_error(laboratory, tmp_
         assert terminal_v(virtual) < SILENT_V
     assert "\n" not in str(told.value)
     assert run.outcome.state is RunState.FAILED
-    if what == "moved":  # and put back: nothing is lost
+    if what == "moved":  # and moved back, so that nothing is lost
         assert recover(tmp_path / "elsewhere" / "run.h5").exists()
 
 
-def slow(rig):
-    """The same rig with a generator that takes a tenth of a second for a setting, as a laboratory's may."""
+def slow_rig(rig):
+    """Return the rig with a generator that needs 0.1 s for a setting, as real ones may."""
     return rig.model_copy(update={"generator": rig.generator.model_copy(update={"settle_s": 0.1})})
 
 
@@ -290,9 +290,9 @@ LOST_WITHIN_S, ABORTED_WITHIN_S = 1.1, 1.17
 
 @pytest.mark.thorough
 def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tmp_path):
-    """Its ramp has a setting for each of 20 stairs: two seconds."""
+    """A ramp of 20 steps with a setting each would take two seconds."""
     virtual, connected = laboratory()
-    with bench_on(slow(connected)) as bench:
+    with bench_on(slow_rig(connected)) as bench:
         stop, off_s = bench.generator.stop, []
         bench.generator.stop = lambda: (stop(), off_s.append(monotonic()))
         with Run(bench, PLAN.model_copy(update={"ramp_step_s": 0.015}), tmp_path / "run.h5") as run:
@@ -300,7 +300,7 @@ def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tm
             virtual.faults.overrun()
             off_s.clear()
             lost_s = monotonic()
-            assert ended(run) is not None
+            assert run_to_end(run) is not None
         assert off_s[0] - lost_s < LOST_WITHIN_S
         assert terminal_v(virtual) < SILENT_V
 
@@ -310,7 +310,7 @@ def test_an_abort_of_a_slow_generator_meets_its_time(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     plan = PLAN.model_copy(update={"ramp_step_s": 0.015})
-    with open_bench(slow(on_the_wall)) as bench, Run(bench, plan, tmp_path / "run.h5") as run:
+    with open_bench(slow_rig(on_the_wall)) as bench, Run(bench, plan, tmp_path / "run.h5") as run:
         upto(run, RunState.RECORDING)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
         for _ in run:
@@ -326,7 +326,7 @@ def test_an_abort_in_real_time_is_recorded_until_the_drive_is_silent(rig, tmp_pa
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     with open_bench(on_the_wall) as bench, Run(bench, PLAN, tmp_path / "run.h5") as run:
         upto(run, RunState.RECORDING)
-        Event().wait(0.7)  # a process that stands still: what it reads then is of the past
+        Event().wait(0.7)  # a stalled process later reads samples of the past
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
         for _ in run:
             pass
@@ -338,5 +338,5 @@ def test_an_abort_in_real_time_is_recorded_until_the_drive_is_silent(rig, tmp_pa
     assert np.max(np.abs(drive[-round(0.01 * rate_hz) :])) < SILENT_V
     measured_s = (np.flatnonzero(np.abs(drive) > SILENT_V)[-1] - stopped) / rate_hz
     told_s = float(said.removeprefix("abort: ").partition(" ")[0])
-    assert told_s > 0.6  # the stop was seen that late
+    assert told_s > 0.6  # the delay until the stop was noticed
     assert told_s == pytest.approx(measured_s, abs=0.02)

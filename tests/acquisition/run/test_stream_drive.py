@@ -1,4 +1,4 @@
-"""The run as a state machine on an analogue output: what is heard, sample by sample, and every way out."""
+"""The states of a run on an analogue output, sample by sample, and every way to end it."""
 
 import numpy as np
 import pytest
@@ -51,8 +51,8 @@ def drive(bench):
     return bench.recorder.channel(0) * bench.channels[0].units_per_volt
 
 
-def planned(bench, count):
-    """The source of the plan at full level [V], from the first sample of the ramp on."""
+def planned_v(bench, count):
+    """Return the planned noise at full level [V], from the first sample of the ramp on."""
     full_v = 0.5 * bench.rig.generator.terminal_factor()
     return full_v * NOISE.excitation.source.samples(0, count, RATE)
 
@@ -62,9 +62,9 @@ def ramp_first(bench):
 
 
 def envelope(bench, first):
-    """Level of the noise at the samples that tell it, and where those lie; ``first`` begins the source."""
+    """Return the samples whose source is large enough, and the level of the noise there."""
     heard = drive(bench)[first:]
-    source = planned(bench, heard.size)
+    source = planned_v(bench, heard.size)
     telling = np.flatnonzero(np.abs(source) > 0.05)
     return telling, heard[telling] / source[telling]
 
@@ -86,14 +86,14 @@ def assert_silent_and_finished(bench, state):
 
 
 def assert_faded_without_a_step(bench, ramp=RAMP):
-    """No level between two samples changes faster than on the half cosine of a ramp of that many samples."""
+    """Require that no level changes faster than on the half cosine of a ramp of ``ramp`` samples."""
     at, level = envelope(bench, ramp_first(bench))
     steepest = np.pi / 2 / ramp
     assert np.max(np.abs(np.diff(level)) / np.diff(at)) <= 1.01 * steepest
     assert level[-1] < 0.01
 
 
-class TestThePlanIsCarriedOut:
+class TestCompleteRuns:
     @pytest.mark.parametrize("check", list(LowLevelCheck))
     def test_streamed_noise_is_played_as_planned_and_recorded_in_segments(
         self, streaming_bench, tmp_path, check
@@ -105,7 +105,7 @@ class TestThePlanIsCarriedOut:
         hold = round(1.35 * RATE)
         level = np.concatenate([half_cosine(RAMP), np.ones(hold), 1 - half_cosine(RAMP)])
         np.testing.assert_allclose(
-            drive(streaming_bench)[begin:], level * planned(streaming_bench, level.size), atol=1e-12
+            drive(streaming_bench)[begin:], level * planned_v(streaming_bench, level.size), atol=1e-12
         )
 
         found = {
@@ -121,7 +121,7 @@ class TestThePlanIsCarriedOut:
         run = run_of(streaming_bench, tmp_path)
         settings = {progress.state: progress.amplitude_vpp for progress in run}
         seen = list(settings)
-        # With an output, to be armed takes the time of what is written ahead.
+        # Arming an output takes as long as the samples that are written ahead.
         assert seen == [RunState.CHECKING, RunState.ARMED, *HEARD_STATES]
         assert streaming_bench.recorder.states() == ["armed", *(state.value for state in HEARD_STATES)]
         assert run.state is RunState.FINISHED
@@ -145,7 +145,7 @@ class TestThePlanIsCarriedOut:
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
 
 
-class TestEveryWayOut:
+class TestEndsOfARun:
     @every_state
     def test_a_cancel_fades_the_stream_out_after_the_written_samples(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
@@ -186,7 +186,7 @@ class TestEveryWayOut:
         list(run)
         assert run.outcome.state is RunState.STOPPED
         assert "cannot be held" in run.outcome.reason
-        assert run.switch.request.reason == run.outcome.reason  # a campaign ends as stopped
+        assert run.switch.request.reason == run.outcome.reason  # in a campaign this counts as a stop
         assert not run.switch.refusal_to_hold()
         assert_faded_without_a_step(streaming_bench)
 
@@ -194,7 +194,7 @@ class TestEveryWayOut:
     def test_a_stop_at_level_off_discards_samples_already_written(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
-        (listened,) = list(run)  # to what is there after the cut: silence
+        (listened,) = list(run)  # until the silence after the cut
         assert listened.amplitude_vpp == 0.0
         assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
 
@@ -227,10 +227,10 @@ class TestEveryWayOut:
             streaming_bench,
             RecordingState.STOPPED if fault is KeyboardInterrupt else RecordingState.FAILED,
         )
-        # The fade is 0.1 s long, and it had been played when the output was stopped.
+        # The fade of 0.1 s had been played when the output was stopped.
         begin = round(CHECK_S * RATE) + AHEAD
         written = np.array(world.streamed)[begin:]
-        source = planned(streaming_bench, written.size)
+        source = planned_v(streaming_bench, written.size)
         telling = np.flatnonzero(np.abs(source) > 0.05)
         level = written[telling] / source[telling]
         assert np.max(np.abs(np.diff(level)) / np.diff(telling)) <= 1.01 * np.pi / 2 / (0.1 * RATE)

@@ -1,7 +1,7 @@
-"""What goes wrong while an output streams: one clear error, silence, and a kept recording that says why.
+"""Faults while an output streams: one clear error, silence, and a kept recording with the reason.
 
-Silence is looked at behind the amplifier's input, in the simulated world, with the output's own task
-taken along through time: what a driver believes does not count.
+Silence is checked at the amplifier's input in the simulated world, while the output's task continues: the
+state of a driver does not count.
 """
 
 import re
@@ -51,25 +51,25 @@ def rig():
     return load_rig("virtual_rig_streaming")
 
 
-def passes(virtual, duration_s):
-    """Let rig time pass, with everything that still runs."""
+def advance(virtual, duration_s):
+    """Advance rig time, together with all running tasks."""
     rig = virtual._running_state.daq._rig
     with rig.changed:
         rig.advance_to(rig.now_s + duration_s)
 
 
-def at_the_amplifier_v(virtual, duration_s=0.1):
-    """Largest voltage at the amplifier's input from now on, by a probe of its own."""
+def amplifier_input_v(virtual, duration_s=0.1):
+    """Return the largest voltage at the amplifier's input from now on, measured by a separate probe."""
     probe = virtual.world.sample((Input("Dev1/ai0", 10.0, Coupling.DC),), RATE_HZ)
-    passes(virtual, duration_s)
+    advance(virtual, duration_s)
     heard = probe.read(round(duration_s * RATE_HZ))
     probe.close()
-    # The converter's filter looks back: its first samples show what was before.
+    # The first samples contain the past because of the converter's filter.
     return float(np.max(np.abs(heard[0, 100:])))
 
 
 def one_sentence(failure):
-    """No more than a line: what happened, what was done, what to do."""
+    """Return the text of an error, which must be a single line."""
     text = str(failure.value)
     assert "\n" not in text
     return text
@@ -77,15 +77,15 @@ def one_sentence(failure):
 
 def test_an_exceeded_limit_fades_the_output_out_and_is_named(laboratory, tmp_path):
     virtual, connected = laboratory()
-    # The noise itself reaches some 100 m/s2: allowed are 736.
+    # The noise reaches some 100 m/s2; 736 m/s2 are allowed.
     tight = PLAN.model_copy(update={"limits": InRunLimits(base_acceleration=0.05)})
     with bench_on(connected) as bench:
         with pytest.raises(LimitExceeded) as failure:
             run_measurement(bench, tight, tmp_path / "run.h5")
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     assert re.search(r"base acceleration reached .* allowed is 36\.8 m/s2", one_sentence(failure))
     drive = kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "base acceleration reached")
-    # What was written ahead was still heard, then a ramp to nothing.
+    # The samples written ahead were played, then a ramp to zero.
     assert np.max(np.abs(drive[-200:])) < 0.01
 
 
@@ -97,18 +97,18 @@ def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
         with pytest.raises(DataLost, match=r"ran out of samples.*To do: write further ahead") as failure:
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
         virtual.faults.heal()
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     one_sentence(failure)
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
 def test_a_computer_that_pauses_for_too_long_underflows_and_ends_silent(laboratory, tmp_path):
     virtual, connected = laboratory()
-    pause = when_recording(lambda: passes(virtual, 1.0))
+    pause = when_recording(lambda: advance(virtual, 1.0))
     with bench_on(connected) as bench:
         with pytest.raises(DataLost, match="ran out of samples"):
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=pause)
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
@@ -119,10 +119,10 @@ def test_a_dead_server_plays_at_most_the_written_samples(laboratory, tmp_path):
         run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=die)
     assert "at most 0.5 s" in one_sentence(failure)
     assert "switch the amplifier off" in str(failure.value)
-    # The message is true: it plays on, and nobody is left who could stop it; then it runs dry.
-    assert at_the_amplifier_v(virtual) > 0.1
-    passes(virtual, 0.5)
-    assert at_the_amplifier_v(virtual) < SILENT_V
+    # The message is true: the output continues and nobody can stop it until its samples run out.
+    assert amplifier_input_v(virtual) > 0.1
+    advance(virtual, 0.5)
+    assert amplifier_input_v(virtual) < SILENT_V
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost.*MAY STILL BE PLAYING")
 
 
@@ -136,7 +136,7 @@ def test_a_failing_input_fades_the_output_out(laboratory, tmp_path, code, kind):
         with pytest.raises(kind) as failure:
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
         virtual.faults.heal()
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     one_sentence(failure)
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
 
@@ -152,7 +152,7 @@ def test_ctrl_c_fades_out_after_written_samples_and_a_ramp(laboratory, tmp_path)
 
     with bench_on(connected) as bench:
         outcome = run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=watch)
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     assert outcome.state is RunState.STOPPED
     drive = kept_drive(tmp_path / "run.h5", RecordingState.STOPPED, "^SIGINT: stopped")
     assert drive.size / RATE_HZ - elapsed_s[0] <= 0.5 + 0.3 + 0.1 + 1e-3
@@ -165,12 +165,12 @@ def test_a_second_ctrl_c_does_not_wait_for_the_ramp_and_ends_silent(laboratory, 
     with bench_on(connected) as bench:
         with pytest.raises(KeyboardInterrupt):
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=insist)
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     kept_drive(tmp_path / "run.h5", RecordingState.STOPPED, "abandoned|keyboard")
 
 
 class FillingDisk:
-    """A recording whose disk takes no more once something is safe, and has room again for the ending."""
+    """A recording whose disk is full after the first commit, and has room again at the end."""
 
     def __init__(self, path, header):
         self._writer = create_recording(path, header)
@@ -196,7 +196,7 @@ def test_a_full_disk_fades_the_output_out_and_keeps_the_recording(laboratory, tm
     with bench_on(connected) as bench:
         with pytest.raises(RecordingError, match="Writing to the disk failed") as failure:
             run_measurement(bench, long, tmp_path / "run.h5", create=FillingDisk)
-        assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) < SILENT_V
     one_sentence(failure)
     with open_recording(tmp_path / "run.h5") as recording:
         assert recording.state is RecordingState.FAILED
@@ -211,5 +211,5 @@ def test_leaving_the_bench_silences_a_playing_output(laboratory):
         bench.output.arm()
         bench.digitizer.start()
         bench.digitizer.read(5120)
-        assert at_the_amplifier_v(virtual) == pytest.approx(1.0, rel=0.01)
-    assert at_the_amplifier_v(virtual) < SILENT_V
+        assert amplifier_input_v(virtual) == pytest.approx(1.0, rel=0.01)
+    assert amplifier_input_v(virtual) < SILENT_V

@@ -1,4 +1,4 @@
-"""Streamed noise on the whole path: plan, unmodified nidaqmx, a simulated USB-4431, the file."""
+"""Streamed noise on the virtual rig: plan, real nidaqmx, a simulated USB-4431, and the file."""
 
 from dataclasses import dataclass
 
@@ -31,15 +31,15 @@ PLAN = Measurement(
 )
 
 
-def paced(pace):
-    """The rig at a pace; on the wall clock a busy computer may pause for two seconds, as on a real one."""
+def rig_at_pace(pace):
+    """Return the rig at a pace; in real time the output buffers two seconds for a busy computer."""
     output = RIG.daq.output.model_copy(update={"ahead_s": {"free": 0.5, "wall": 2.0}[pace]})
     return changed(RIG, virtual={"pace": pace, "speed": 1.0}, daq={"output": output})
 
 
 @dataclass(frozen=True, eq=False)
 class Streamed:
-    """What came back of the plan."""
+    """The recorded drive of the plan, with segments, state and notes."""
 
     drive_v: np.ndarray
     segments: dict[str, slice]
@@ -51,7 +51,7 @@ class Streamed:
 @pytest.fixture(scope="module", params=["free", "wall"])
 def streamed(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("streamed") / "run.h5"
-    with open_bench(paced(request.param)) as bench:
+    with open_bench(rig_at_pace(request.param)) as bench:
         outcome = run_measurement(bench, PLAN, path)
     assert outcome.state is RunState.FINISHED
     with open_recording(path) as recording:
@@ -65,14 +65,14 @@ def streamed(request, tmp_path_factory):
 
 
 def delayed(volts, samples):
-    """The signal a fraction of a sample late, and as a hold of one sample shows it."""
+    """Return the signal delayed by a fraction of a sample and held for one sample."""
     cycles = np.fft.rfftfreq(volts.size)
     shown = np.fft.rfft(volts) * np.exp(-2j * np.pi * cycles * samples) * np.sinc(cycles)
     return np.fft.irfft(shown, volts.size)
 
 
-def played(streamed):
-    """What the plan previews from the first sample of the ramp on, under its envelope [V]."""
+def previewed_v(streamed):
+    """Return the previewed signal from the first sample of the ramp on, with its envelope [V]."""
     ramp, hold = round(PLAN.ramp_s * RATE_HZ), round(PLAN.excitation.playing_s * RATE_HZ)
     rise = 0.5 * (1 - np.cos(np.pi * np.arange(ramp) / ramp))
     envelope = np.concatenate([rise, np.ones(hold), 1 - rise])
@@ -83,15 +83,15 @@ def played(streamed):
 
 @pytest.mark.thorough
 def test_the_recording_matches_the_preview_within_converter_noise(streamed):
-    expected = played(streamed)
+    expected = previewed_v(streamed)
     begin = streamed.segments["ramp_up"].start
     assert streamed.segments["ramp_down"].stop - begin == expected.size
     silence = np.zeros(1000)
     whole = np.concatenate([silence, expected, silence])
     heard = streamed.drive_v[begin - silence.size :]
-    # The recording ends with the ramp: what its own delay holds back is not in it.
+    # The recording ends with the ramp; samples still in the delay of the output are missing.
     left = (heard - delayed(whole, DELAY)[: heard.size])[: -GROUP_DELAY_SAMPLES - 1]
-    # The rest, 5e-5 of the signal, is the ripple of the converter's filter.
+    # The remaining 5e-5 of the signal are the ripple of the converter's filter.
     assert np.sqrt(np.mean(left**2)) < 1.25 * NOISE_V
     assert np.max(np.abs(left)) < 10 * NOISE_V
 
@@ -127,7 +127,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     with open_recording(tmp_path / "run.h5") as recording:
         drive = recording.read("drive_voltage")
         (swept,) = [each for each in recording.segments if each.label == "sweep"]
-    # The phase is the sum of the frequencies, from the ramp on; every change lies on the nearest sample.
+    # The phase is the sum of the frequencies since the ramp; every change is at the nearest sample.
     steps = list(sweep.steps())
     ends = np.cumsum([plan.ramp_s + steps[0].duration_s, *(step.record_s for step in steps[1:])])
     ends = np.round(ends * RATE_HZ).astype(int)

@@ -1,4 +1,4 @@
-"""Ten minutes of four channels at 51.2 kS/s: nothing is lost, and memory does not grow."""
+"""Ten minutes of four channels at 51.2 kS/s lose no sample, and memory does not grow."""
 
 from pathlib import Path
 
@@ -43,7 +43,7 @@ def test_a_ten_minute_recording_loses_no_sample_and_memory_stays_constant(tmp_pa
         dwell = next(each for each in recording.segments if each.label == "dwell")
         rate = recording.sample_rate_hz
         assert dwell.last_sample + 1 - dwell.first_sample == round(60 * MINUTES * rate)
-        # A lost or doubled sample would turn the phase of the drive by 1.8 degrees, for good.
+        # A lost or repeated sample would shift the phase of the drive by 1.8 degrees from then on.
         phases = []
         second = round(rate)
         for first in range(dwell.first_sample, dwell.last_sample - second, second):
@@ -55,6 +55,6 @@ def test_a_ten_minute_recording_loses_no_sample_and_memory_stays_constant(tmp_pa
             drive = recording.read("drive_voltage", first, first + second)
             phases.append(np.angle(np.vdot(np.exp(2j * np.pi * turns), drive)))
     steps = np.degrees(np.diff(np.unwrap(phases)))
-    # The two clocks differ by 17 ppm: the phase moves on steadily by 360 x 260 x 17e-6 degrees a second.
+    # The clocks differ by 17 ppm: the phase drifts by 360 x 260 x 17e-6 degrees per second.
     assert np.median(steps) == pytest.approx(360 * FREQUENCY_HZ * 17e-6, rel=0.02)
     assert np.max(np.abs(steps - np.median(steps))) < 0.1

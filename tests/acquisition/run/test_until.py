@@ -1,4 +1,4 @@
-"""Recordings that last until their results are known: the virtual rig, and the analysis beside the run."""
+"""Recordings that last until their results are known, on the virtual rig with analysis during the run."""
 
 import pytest
 
@@ -22,12 +22,12 @@ from vibench.analysis import analyse
 
 @pytest.fixture
 def rig():
-    """Sampled seldom, so that looks are quick, and on the wall's clock, so that the run waits for none."""
+    """Return the virtual rig in real time, so that the analysis keeps up with the run."""
     rig = load_rig("virtual_rig")
     return changed(rig, virtual={"pace": "wall", "speed": 1.0})
 
 
-def measured(rig, folder, excitation, until, **more):
+def record(rig, folder, excitation, until, **more):
     plan = Measurement(name="run", excitation=excitation, ramp_s=0.4, ramp_step_s=0.02, until=until)
     seen = []
     with open_bench(rig) as bench:
@@ -51,7 +51,7 @@ def seconds(recording, label):
 @pytest.mark.thorough
 def test_a_dwell_ends_when_its_response_meets_the_bound(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=120)
-    outcome, recording, seen = measured(rig, tmp_path, dwell, Until(response_ii=0.01))
+    outcome, recording, seen = record(rig, tmp_path, dwell, Until(response_ii=0.01))
     with recording:
         (note,), (recorded_s,) = notes(recording), seconds(recording, "dwell")
         assert recording.reason == outcome.reason
@@ -69,7 +69,7 @@ def test_a_dwell_ends_when_its_response_meets_the_bound(rig, tmp_path):
 @pytest.mark.thorough
 def test_a_dwell_with_an_unmet_bound_ends_at_its_longest_time(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=3)
-    outcome, recording, _ = measured(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))
+    outcome, recording, _ = record(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))
     with recording:
         (note,) = notes(recording)
         assert seconds(recording, "dwell") == [pytest.approx(3.0)]
@@ -81,7 +81,7 @@ def test_a_dwell_with_an_unmet_bound_ends_at_its_longest_time(rig, tmp_path):
 @pytest.mark.thorough
 def test_each_frequency_step_ends_when_its_bound_is_met(rig, tmp_path):
     steps = SteppedSine(amplitude_vpp=0.1, frequencies_hz=(150, 160), settle_s=0.3, record_s=60)
-    _, recording, _ = measured(rig, tmp_path, steps, Until(response_ii=0.02, shortest_s=1.0))
+    _, recording, _ = record(rig, tmp_path, steps, Until(response_ii=0.02, shortest_s=1.0))
     with recording:
         found = notes(recording)
         assert seconds(recording, "step") == [pytest.approx(each.recorded_s) for each in found]
@@ -95,7 +95,7 @@ def test_noise_ends_after_a_whole_realisation_and_the_ramp_down(rig, tmp_path):
         amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800, repetition_hz=2, settle_s=0.5, realisations=40
     )
     wish = Until(resonance_hz=0.01, transmissibility=0.2)
-    _, recording, _ = measured(rig, tmp_path, noise, wish)
+    _, recording, _ = record(rig, tmp_path, noise, wish)
     with recording:
         (note,) = notes(recording)
         recorded, labels = seconds(recording, "realisation"), [each.label for each in recording.segments]
@@ -103,7 +103,7 @@ def test_noise_ends_after_a_whole_realisation_and_the_ramp_down(rig, tmp_path):
     assert set(note.bounds) == {"resonance_hz", "transmissibility"}
     assert 4 <= len(recorded) < 40
     assert recorded == [pytest.approx(1.0)] * len(recorded)
-    # The bound may be known while the next realisation is already ramping up.
+    # The bound may be met while the next realisation is already ramping up.
     assert labels[-1] == "ramp_down"
     assert note.recorded_s == pytest.approx(len(recorded))
 
@@ -114,7 +114,7 @@ def test_a_stream_with_buffered_samples_ends_when_its_bound_is_met(tmp_path):
     output = rig.daq.output.model_copy(update={"ahead_s": 2.0})
     rig = changed(rig, virtual={"pace": "wall", "speed": 1.0}, daq={"output": output})
     noise = StreamedNoise(amplitude_vpp=0.1, band_start_hz=50, band_stop_hz=600, duration_s=120, settle_s=0.5)
-    outcome, recording, _ = measured(rig, tmp_path, noise, Until(resonance_hz=0.05, shortest_s=5.0))
+    outcome, recording, _ = record(rig, tmp_path, noise, Until(resonance_hz=0.05, shortest_s=5.0))
     with recording:
         (note,), (recorded_s,) = notes(recording), seconds(recording, "noise")
         assert recording.segments[-1].label == "ramp_down"
@@ -155,7 +155,7 @@ def test_the_recording_continues_if_the_analysis_process_dies(rig, tmp_path, mon
 
     monkeypatch.setattr(UntilWatch, "wait_until_ready", kill_when_ready)
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=2)
-    outcome, recording, _ = measured(rig, tmp_path, dwell, Until(response_ii=0.01, shortest_s=0.5))
+    outcome, recording, _ = record(rig, tmp_path, dwell, Until(response_ii=0.01, shortest_s=0.5))
     with recording:
         assert seconds(recording, "dwell") == [pytest.approx(2.0)]
     assert outcome.state is RunState.FINISHED

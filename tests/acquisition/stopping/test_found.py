@@ -1,4 +1,4 @@
-"""What drives a bench is found and stopped, whatever lies in the state folder and happens to it."""
+"""Programs that drive a bench are found and stopped, whatever the state folder contains."""
 
 import os
 import subprocess
@@ -41,33 +41,33 @@ def until(is_so):
         Event().wait(0.01)
 
 
-def no_text(folder):
+def binary_announcement(folder):
     (folder / "7.json").write_bytes(b"\xff\xfe{")
 
 
-def a_pipe(folder):
+def pipe(folder):
     os.mkfifo(folder / "7.json")
 
 
-def a_folder(folder):
+def subfolder(folder):
     (folder / "7.json").mkdir()
 
 
-def a_circle(folder):
+def circular_link(folder):
     (folder / "7.json").symlink_to("7.json")
 
 
-def a_power_of_two(folder):
+def non_numeric_name(folder):
     (folder / "²").touch()
 
 
-def a_name_that_is_no_text(folder):
+def undecodable_name(folder):
     Path(os.fsdecode(os.fsencode(folder) + b"/\xff.json")).touch()
 
 
 @pytest.mark.timeout(15)
 @pytest.mark.parametrize(
-    "litter", [no_text, a_pipe, a_folder, a_circle, a_power_of_two, a_name_that_is_no_text]
+    "litter", [binary_announcement, pipe, subfolder, circular_link, non_numeric_name, undecodable_name]
 )
 def test_foreign_files_do_not_hide_announcements(litter):
     switch = StopSwitch()
@@ -143,8 +143,8 @@ def test_a_running_program_that_refuses_connections_is_stopped():
 
 
 @pytest.fixture
-def of_nobody(monkeypatch):
-    """A state folder of a user who cannot read what root writes there."""
+def state_of_other_user(monkeypatch):
+    """Yield a state folder of a user who cannot read files that root writes there."""
     if os.geteuid() != 0:
         pytest.skip("only root can be another user")
     with TemporaryDirectory() as state:
@@ -155,7 +155,7 @@ def of_nobody(monkeypatch):
         os.seteuid(0)
 
 
-def test_a_user_can_stop_a_program_of_root_in_their_folder(of_nobody):
+def test_a_user_can_stop_a_program_of_root_in_their_folder(state_of_other_user):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         os.seteuid(NOBODY)
@@ -164,14 +164,14 @@ def test_a_user_can_stop_a_program_of_root_in_their_folder(of_nobody):
     assert switch.request.reason == "smoke"
 
 
-def test_an_unreadable_folder_is_not_treated_as_empty(of_nobody):
+def test_an_unreadable_folder_is_not_treated_as_empty(state_of_other_user):
     os.chown(engines_folder(), 0, 0)
     os.seteuid(NOBODY)
     with pytest.raises(AcquisitionError, match="the state folder cannot be searched"):
         programs_to_stop(None)[0]
 
 
-def test_wrong_permissions_of_the_state_folder_are_corrected(of_nobody):
+def test_wrong_permissions_of_the_state_folder_are_corrected(state_of_other_user):
     engines_folder().chmod(0o300)
     os.seteuid(NOBODY)
     with stop_on_signal(StopSwitch(), "dwell"):

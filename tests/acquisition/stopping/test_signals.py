@@ -1,4 +1,4 @@
-"""Every signal that would end or stop a program is a stop, as far as it can be caught."""
+"""Every signal that would end or suspend a program requests a stop, if it can be caught."""
 
 import signal
 import subprocess
@@ -20,8 +20,8 @@ print("lives")
 
 
 @pytest.fixture
-def default():
-    """Python's own dispositions: pytest has handlers for some signals."""
+def default_handlers():
+    """Restore Python's default handlers, since pytest replaces some."""
     before = {number: signal.getsignal(number) for number in VALID if signal_name(number) not in UNCATCHABLE}
     python = {"SIGINT": signal.default_int_handler, "SIGPIPE": signal.SIG_IGN, "SIGXFSZ": signal.SIG_IGN}
     for number in before:
@@ -37,7 +37,7 @@ UNCATCHABLE = ("SIGKILL", "SIGSTOP")
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 @pytest.mark.parametrize("number", VALID, ids=signal_name)
-def test_terminating_and_stopping_signals_abort_the_run(number, default, tmp_path, monkeypatch):
+def test_terminating_and_stopping_signals_abort_the_run(number, default_handlers, tmp_path, monkeypatch):
     if signal_name(number) in LEFT_TO_THE_DEAD_MAN:
         assert number not in heeded_signals()
         return
@@ -46,14 +46,14 @@ def test_terminating_and_stopping_signals_abort_the_run(number, default, tmp_pat
     with stop_on_signal(switch, "dwell"):
         signal.raise_signal(number)
     if switch.request is None:
-        assert lives_through(number), f"{signal_name(number)} ends or stops a process, and was not heeded"
+        assert survives(number), f"{signal_name(number)} ends or stops a process, and was not heeded"
     else:
         is_ctrl_c = number == signal.SIGINT
         assert switch.request.cause is (Cause.KEYBOARD if is_ctrl_c else Cause.TERMINATED)
 
 
-def lives_through(number):
-    """Whether a Python program goes on after a signal that it does nothing about."""
+def survives(number):
+    """Return whether a Python program continues after a signal that it does not handle."""
     told = subprocess.run(
         [sys.executable, "-c", UNHEEDED.format(number=number)], capture_output=True, text=True, check=False
     )
@@ -61,7 +61,7 @@ def lives_through(number):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_a_second_ctrl_z_does_not_stop_faster(default, tmp_path, monkeypatch):
+def test_a_second_ctrl_z_does_not_stop_faster(default_handlers, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
@@ -72,7 +72,7 @@ def test_a_second_ctrl_z_does_not_stop_faster(default, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_a_signal_stops_the_innermost_of_two_nested_runs(default, tmp_path, monkeypatch):
+def test_a_signal_stops_the_innermost_of_two_nested_runs(default_handlers, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     outer, inner = StopSwitch(), StopSwitch()
     with stop_on_signal(outer, "campaign"), stop_on_signal(inner, "dwell"):
@@ -81,7 +81,7 @@ def test_a_signal_stops_the_innermost_of_two_nested_runs(default, tmp_path, monk
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_signals_handled_by_the_program_are_not_taken_over(default, tmp_path, monkeypatch):
+def test_signals_handled_by_the_program_are_not_taken_over(default_handlers, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     taken, switch = [], StopSwitch()
     signal.signal(signal.SIGUSR2, lambda number, frame: taken.append(number))

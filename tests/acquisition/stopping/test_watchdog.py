@@ -1,4 +1,4 @@
-"""What is looked at all the time is looked at again, whatever a look ran into."""
+"""The watchdog repeats its check even if a check has failed."""
 
 from threading import Event
 
