@@ -1,8 +1,8 @@
-"""The first day at a bench, as tests: `pytest -m hardware`, with the bench of VIBENCH_BENCH.
+"""Tests of a real bench on its first day: `pytest -m hardware`, with the bench of VIBENCH_BENCH.
 
-Without one the virtual rig stands in, at the wall's pace and with the laboratory's pause after each setting.
-VIBENCH_CONFIRMED_BY names the person who has compared the knobs with the file; without a name a real bench is
-left alone. Everything that is played is at most two per cent of the bench's amplitude limit.
+Without VIBENCH_BENCH the virtual rig is used in real time, with the pause of a real generator after each
+setting. VIBENCH_CONFIRMED_BY names the person who has compared the knobs with the file; without a name a real
+bench is not used. Signals are at most 2 % of the bench's amplitude limit.
 """
 
 import os
@@ -28,7 +28,7 @@ SHARE = 0.02
 
 
 def rig():
-    """Read the configured bench, or make the virtual one behave in time as a real one does."""
+    """Read the configured bench, or return the virtual rig in real time."""
     given = os.environ.get("VIBENCH_BENCH")
     if given is not None:
         return load_rig(Path(given))
@@ -36,28 +36,28 @@ def rig():
     return changed(found, generator={"settle_s": LABORATORY_SETTLE_S}, virtual={"pace": "wall"})
 
 
-def confirmed(knobs):
-    """Take the name of whoever has looked at the knobs."""
+def confirm_knobs(knobs):
+    """Return a knob sheet in the name of the person who has checked the knobs."""
     name = os.environ.get("VIBENCH_CONFIRMED_BY")
     assert name, "name in VIBENCH_CONFIRMED_BY who has compared the knobs of this bench with its file"
-    return KnobSheet(operator=name, confirmed=datetime.now(UTC), knobs=knobs)
+    return KnobSheet(operator=name, confirm_knobs=datetime.now(UTC), knobs=knobs)
 
 
 @pytest.fixture(scope="module")
 def bench():
     configured = rig()
-    with open_bench(configured, confirmed if configured.virtual is None else None) as opened:
+    with open_bench(configured, confirm_knobs if configured.virtual is None else None) as opened:
         yield opened
 
 
-def measured(bench, excitation, tmp_path):
+def record(bench, excitation, tmp_path):
     plan = Measurement(name="first_day", excitation=excitation, ramp_s=0.5, ramp_step_s=0.1)
     path = run_measurement(bench, plan, tmp_path / "first_day.h5").path
     with open_recording(path) as recording:
         assert recording.state.value == "complete"
         assert not recording.gaps
         late = [each.text for each in recording.events if each.kind == "late"]
-        # Cycles that a sweep lost to commands which take their time are noted too: less than one of them.
+        # A sweep also notes cycles that it lost to slow commands: less than one is allowed.
         lost = [text for text in late if "cycles from its plan" in text]
         assert late == lost
         assert all(abs(float(re.search(r"[+-][\d.e+-]+", text)[0])) < 1.0 for text in lost)
@@ -69,7 +69,7 @@ def level(bench):
 
 
 def test_the_real_bench_passes_its_check(bench, tmp_path):
-    # Noise floor, offsets, polarity, gain against the knob, clocks, latency, and whether silence is silent.
+    # Noise floor, offsets, polarity, gain, clocks, latency, and silence after a stop.
     result = check_bench(bench, tmp_path)
     failed = [f"{each.name}: {each.value}" for each in result.findings if each.verdict is Verdict.FAIL]
     assert not failed
@@ -77,7 +77,7 @@ def test_the_real_bench_passes_its_check(bench, tmp_path):
 
 def test_the_drive_is_silent_before_a_dwell(bench, tmp_path):
     excitation = Dwell(amplitude_vpp=level(bench), frequency_hz=160, settle_s=0.5, duration_s=1.0)
-    path = measured(bench, excitation, tmp_path)
+    path = record(bench, excitation, tmp_path)
     with open_recording(path) as recording:
         drive = recording.read("drive_voltage")
         quiet = drive[: round(0.05 * recording.sample_rate_hz)]
@@ -87,7 +87,7 @@ def test_the_drive_is_silent_before_a_dwell(bench, tmp_path):
 
 def test_a_dwell_is_recorded_at_its_frequency(bench, tmp_path):
     excitation = Dwell(amplitude_vpp=level(bench), frequency_hz=260, settle_s=1.0, duration_s=4.0)
-    found = analyse(measured(bench, excitation, tmp_path))
+    found = analyse(record(bench, excitation, tmp_path))
     assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=300e-6)
 
 
@@ -95,7 +95,7 @@ def test_a_sweep_is_recorded_as_planned(bench, tmp_path):
     excitation = SineSweep(
         amplitude_vpp=level(bench), start_hz=200, stop_hz=300, duration_s=8, step_s=0.25, settle_s=0.5
     )
-    found = analyse(measured(bench, excitation, tmp_path))
+    found = analyse(record(bench, excitation, tmp_path))
     assert {each.what: each.verdict.value for each in found.checks}["Sweep as planned"] == "passed"
 
 
@@ -104,6 +104,6 @@ def test_noise_is_recorded_without_lost_realisations(bench, tmp_path):
         amplitude_vpp=level(bench), band_start_hz=50, band_stop_hz=600, repetition_hz=2, periods=4,
         realisations=2, settle_s=1.0,
     )  # fmt: skip
-    found = analyse(measured(bench, excitation, tmp_path))
+    found = analyse(record(bench, excitation, tmp_path))
     assert found.response.left_out == 0
     assert found.response.used_s == pytest.approx(4.0, rel=1e-3)

@@ -1,8 +1,8 @@
-"""``python -m tests.robot --seed N --minutes M``: a robot that does random things to the whole window.
+"""``python -m tests.robot --seed N --minutes M``: a robot that does random things in the whole window.
 
-Keys, clicks, nasty values, files deleted and written meanwhile, engines killed and stopped. It looks for
-exceptions, pages that stay dead, a number that belongs to other inputs, a STOP later than its bound.
-The same seed does the same things as far as the clock lets it; ``--beside-work`` keeps every core busy.
+It presses keys, clicks, types invalid values, deletes and writes files, and kills and suspends engines. It
+looks for exceptions, pages that no longer respond, results of other inputs, and a STOP that takes too long.
+The same seed gives the same actions, apart from timing; ``--beside-work`` keeps every core busy.
 """
 
 import argparse
@@ -18,7 +18,7 @@ SPIN = "while True: pass"
 
 
 def main() -> int:
-    """Let it work; the exit code is 1 when it found something."""
+    """Run the robot; the exit code is 1 if it found something."""
     options = _options()
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     with tempfile.TemporaryDirectory(prefix="vibench_robot_") as folder:
@@ -28,7 +28,7 @@ def main() -> int:
         others = [subprocess.Popen([sys.executable, "-c", SPIN]) for _ in range(count)]
         try:
             with Path(folder, "stderr").open("wb") as errors:
-                os.dup2(errors.fileno(), sys.stderr.fileno())  # of this process and of all that it starts
+                os.dup2(errors.fileno(), sys.stderr.fileno())  # also for child processes
             robot = Robot(options.seed, Path(folder))
             robot.work(60.0 * options.minutes)
             told = robot.close()
@@ -48,5 +48,5 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-if __name__ == "__main__":  # the window's own workers import this file
+if __name__ == "__main__":  # the worker processes of the window import this file
     sys.exit(main())

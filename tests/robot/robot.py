@@ -1,4 +1,4 @@
-"""The robot: what it does, and what it holds against the window after every deed."""
+"""The robot: its actions, and the checks after every action."""
 
 import os
 import signal
@@ -109,7 +109,7 @@ DWELL = Dwell(amplitude_vpp=0.5, frequency_hz=180.0, settle_s=0.2, duration_s=60
 
 
 class Robot:
-    """One window, one seed."""
+    """One window with a seed for random actions."""
 
     def __init__(self, seed, folder):
         self.random = Random(seed)
@@ -129,7 +129,7 @@ class Robot:
         self.window.close = lambda: False
         self.window.show()
         self._modals = QTimer(interval=300)
-        # Apart from the timer, which would wait for a slot that itself opens a dialog ("no such folder").
+        # A separate single shot, since the timer would wait for a slot that itself opens a dialog.
         self._modals.timeout.connect(lambda: QTimer.singleShot(0, self._close_modal))
         self._modals.start()
         self.deeds = {
@@ -140,7 +140,7 @@ class Robot:
         }  # fmt: skip
 
     def work(self, duration_s):
-        """Do random things for so long; every other minute each page must still answer."""
+        """Do random things for a duration; every two minutes check that each page responds."""
         until_s = time.monotonic() + duration_s
         answered_s = time.monotonic() + 60.0
         while time.monotonic() < until_s and len(self.findings) < 5:
@@ -152,13 +152,13 @@ class Robot:
         self.every_page_answers()
 
     def do(self, deed):
-        """Do one thing, let the window live, and look."""
+        """Do one thing, process events, and check the window."""
         begun_s = time.monotonic()
         self.recent.append(deed.__name__)
         self.done[deed.__name__] += 1
         try:
             deed()
-        except RuntimeError as error:  # a widget that went while it was being clicked
+        except RuntimeError as error:  # the widget was deleted while it was being clicked
             if "deleted" not in str(error):
                 raise
         self.live(20)
@@ -171,13 +171,13 @@ class Robot:
         self.look()
 
     def read_errors(self):
-        """No process may say that it has not foreseen something: engines and workers have no window."""
+        """Report unexpected errors of any process, also of engines and worker processes."""
         said = self.errors.read()
         if TRACEBACK in said:
             self.find(said[said.index(TRACEBACK) :][-1500:])
 
     def look(self):
-        """No number may belong to other inputs."""
+        """Report results that belong to other inputs."""
         for name, page in self.window.pages.items():
             for shown in page.displayed_results:
                 if not shown.is_current:
@@ -187,13 +187,13 @@ class Robot:
                     )
 
     def find(self, what):
-        """Note something that must not be."""
+        """Record a finding."""
         if not any(what.partition(" shows ")[0] in each for each in self.findings):
             self.findings.append(f"{what}\n    after {', '.join(self.recent)}")
             print(f"FOUND: {self.findings[-1]}", flush=True)
 
     def close(self):
-        """End the window; gives what was found."""
+        """Close the window and return the findings as text."""
         self._modals.stop()
         self.context.bridge.close()
         self.context.background.close()
@@ -206,12 +206,12 @@ class Robot:
         return "\n".join([*said, *(f"  FOUND: {each}" for each in self.findings or ["nothing"])])
 
     def live(self, duration_ms):
-        """Let the window live."""
+        """Process events for a duration."""
         loop = QEventLoop()
         QTimer.singleShot(duration_ms, loop.quit)
         loop.exec()
 
-    # What it does
+    # Actions
 
     def press_key(self):
         self._press(self.random.choice(KEYS), Qt.KeyboardModifier.NoModifier)
@@ -311,7 +311,7 @@ class Robot:
             self.window.user_actions.start()
 
     def stop(self):
-        """STOP or Esc, and the end of the run within its bound."""
+        """Press STOP or Esc, and require the end of the run in time."""
         bridge = self.context.bridge
         if bridge.state not in (EngineState.RUNNING, EngineState.HELD):
             return
@@ -336,13 +336,13 @@ class Robot:
         if pid is not None:
             os.kill(pid, signal.SIGSTOP)
             self.live(self.random.choice((300, 1500)))
-            with suppress(ProcessLookupError):  # its attendant may have ended it meanwhile
+            with suppress(ProcessLookupError):  # the keep-alive process may have ended the engine meanwhile
                 os.kill(pid, signal.SIGCONT)
 
-    # What every page must still do
+    # Requirements of every page
 
     def every_page_answers(self):
-        """A test that is allowed is previewed, and a bench opens: no page stays dead."""
+        """Require that the Test page shows a preview, the Queue page a summary, and a bench opens."""
         self.recent.append("every_page_answers")
         page, before = self.window.pages[TEST], self.context.bridge.state
         self.window.pages["Rig"].choice.choose(shipped("hardware_configs/virtual_rig.toml"))
@@ -368,7 +368,7 @@ class Robot:
                 self.find(what)
                 return
 
-    # Means
+    # Tools
 
     def _seen(self, kind):
         top = QApplication.activeModalWidget() or self.window
@@ -382,7 +382,7 @@ class Robot:
         QTest.keyClick(self._target(), key, modifier)
 
     def _close_modal(self):
-        """Nothing may stay in front: dialogs get a value now and then, and are closed."""
+        """Close popups and dialogs; file dialogs sometimes get a value first."""
         popup = QApplication.activePopupWidget()
         if popup is not None:
             popup.close()

@@ -1,4 +1,4 @@
-"""The robot finds what it is there for: a number of other inputs, and an exception in a slot."""
+"""The robot finds results of other inputs, errors of other processes, and exceptions in slots."""
 
 import subprocess
 import sys

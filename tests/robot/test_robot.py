@@ -1,4 +1,4 @@
-"""A minute of the robot, the same each time; hours are ``python -m tests.robot``."""
+"""One minute of reproducible random actions; longer runs: ``python -m tests.robot``."""
 
 import subprocess
 import sys

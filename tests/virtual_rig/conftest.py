@@ -1,4 +1,4 @@
-"""A small analogue world that behaves, and programs connected to a simulated DAQ that samples it."""
+"""A small analogue world in a loop, and programs connected to a simulated DAQ that samples it."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -20,14 +20,14 @@ LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}
 
 
 def signal(physical_channel: str, time_s):
-    """What a channel without a cable to an output sees: a sine of its own, on 0.5 V."""
+    """Return the voltage of a channel without a cable to an output: a sine on an offset of 0.5 V."""
     number = int(physical_channel.rpartition("ai")[2])
     return OFFSET_V + (number + 1) * np.sin(2 * np.pi * 40 * (number + 1) * time_s)
 
 
 @dataclass
 class Played:
-    """Samples an output holds for one period each, from a moment on."""
+    """Samples that an output plays from a given time on."""
 
     start_s: float
     rate_hz: float
@@ -40,7 +40,7 @@ class Played:
 
 @dataclass
 class Sampling:
-    """Ideal conversion: no noise, no delay; clips at the range, AC coupling takes the offset away."""
+    """Ideal conversion without noise and delay; clips at the range, and AC coupling removes the offset."""
 
     world: "LoopbackWorld"
     inputs: tuple[Input, ...]
@@ -69,7 +69,7 @@ class Sampling:
 
 @dataclass
 class LoopbackWorld:
-    """Every input sees its own sine, except those with a cable to an output."""
+    """A world in which every input shows a different sine, except inputs wired to an output."""
 
     time_s: float = 0.0
     gain: float = 1.0
@@ -120,7 +120,7 @@ class LoopbackWorld:
 
 @dataclass
 class Daq:
-    """A running server, the world behind it, and a client's way to it."""
+    """A running server, the world behind it, and the options with which a client connects."""
 
     server: DaqServer
     world: LoopbackWorld
@@ -128,13 +128,13 @@ class Daq:
     resources: ExitStack
 
     def task(self, name: str = "") -> Task:
-        """A task that is closed with the test."""
+        """Create a task that is closed with the test."""
         return self.resources.enter_context(Task(name, grpc_options=self.options))
 
     def inputs(
         self, channels: str, rate_hz: float | None = None, samples: int | None = None, **limits
     ) -> Task:
-        """A task of inputs: on demand without a rate, continuous unless it ends after ``samples``."""
+        """Create a task of inputs: on demand without a rate, continuous unless ``samples`` are given."""
         task = self.task()
         task.ai_channels.add_ai_voltage_chan(channels, **limits)
         if samples is not None:
@@ -151,7 +151,7 @@ class Daq:
 
 @contextmanager
 def refused(code, match: str | None = None, kind: type[DaqError] = DaqError) -> Iterator:
-    """Expect an error of the driver with that code; gives what was caught."""
+    """Require a driver error with this code; yields the exception info."""
     with pytest.raises(kind, match=match) as caught:
         yield caught
     assert caught.value.error_code == code
@@ -159,7 +159,7 @@ def refused(code, match: str | None = None, kind: type[DaqError] = DaqError) -> 
 
 @pytest.fixture
 def connect() -> Iterator:
-    """Serve a fresh world at the given pace and connect to it."""
+    """Return a function that serves a new world at a pace and connects to it."""
     with ExitStack() as resources:
 
         def open_daq(pace: Pace | None = None, **options) -> Daq:
@@ -175,5 +175,5 @@ def connect() -> Iterator:
 
 @pytest.fixture
 def daq(connect) -> Daq:
-    """A simulated DAQ whose samples exist when asked for."""
+    """A simulated DAQ that delivers samples immediately."""
     return connect()

@@ -1,4 +1,4 @@
-"""The rig of the tests of acquisition."""
+"""Fixtures of the tests of acquisition."""
 
 from tests.acquisition.conftest import rig
 

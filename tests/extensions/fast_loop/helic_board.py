@@ -1,9 +1,9 @@
-"""A HELIC-DAQ board as its documents describe it, between the sensors and the amplifier of a virtual rig.
+"""A simulated HELIC-DAQ board between the sensors and the amplifier of a virtual rig.
 
-docs/protocol.md (version 3), docs/standard_control_and_pll.md and docs/user_guide.md of the project, release
-0.3.0: one client over TCP, a registry of parameters, at most two commands a tick, one master phase, a PID of
-one input, a safety gate that closes when the connection ends, samples over UDP every 5 ms. What it plays it
-computes by the compiled sample of the simulated controller, which is told what a PID is in that form.
+It follows docs/protocol.md (version 3), docs/standard_control_and_pll.md and docs/user_guide.md of the
+project, release 0.3.0: one TCP client, a registry of parameters, at most two commands per tick, one master
+phase, a PID of one input, a safety gate that closes with the connection, samples over UDP every 5 ms. Its
+signal is computed by the compiled sample of the simulated controller.
 """
 
 import binascii
@@ -72,12 +72,12 @@ SOURCES |= {"out": "V", "cmd_epoch": "count"}
 QUEUED = {"freq", "target_coeffs", "forcing_coeffs", "ctrl_kp", "ctrl_ki", "ctrl_kd", "ctrl_tau_d"}
 
 
-class Refused(Exception):
-    """Answered with an error code."""
+class RefusedByBoard(Exception):
+    """The board answers with this error code."""
 
 
 class HelicBoard:
-    """The board; `on_rig` puts it into a virtual rig."""
+    """The board; `on_rig` connects it to a virtual rig."""
 
     def __init__(self, rate_hz, grid_rate_hz, latency_s=1e-4, clamp_v=5.0):
         self.rate_hz = rate_hz
@@ -100,7 +100,7 @@ class HelicBoard:
         self._phase = self._epoch = 0
         self._stream, self._to, self._number = (), None, 0
         self._records = []
-        # A block is over after each sample: its mean is what was sampled and played.
+        # A block ends after each sample, so that its mean is that sample.
         self._now = native_engine().new(
             "Controller",
             is_on=1,
@@ -131,7 +131,7 @@ class HelicBoard:
         return self._armed
 
     def drop(self):
-        """The cable is pulled."""
+        """Close the connection, as a pulled cable does."""
         if self._client is not None:
             self._client.shutdown(socket.SHUT_RDWR)
 
@@ -141,7 +141,7 @@ class HelicBoard:
         self._server.close()
         self._samples.close()
 
-    # What the world asks of a controller.
+    # Interface to the simulated world.
 
     @property
     def is_on(self):
@@ -159,7 +159,7 @@ class HelicBoard:
                 self._tick(*self._now["coefficients"][:, 0].real.tolist())
 
     def _tick(self, out, base, m0):
-        """Keep the record of a sample, and get the next one ready."""
+        """Record a sample, and prepare the next sample."""
         ticks = self._values["ticks"][0]
         if self._to is not None:
             record = {
@@ -197,7 +197,7 @@ class HelicBoard:
             kp, ki, kd, tau = (self._values[f"ctrl_{each}"][0] for each in ("kp", "ki", "kd", "tau_d"))
             step = 1 / self.rate_hz
             share = step / (tau + step)
-            # Integral, filtered rate, and error of before; the error is the target, zero, less adc1.
+            # Integral, filtered rate, and previous error; the error is the target (zero) minus adc1.
             self._now["step"][:3, :3] = (1, 0, 0), (0, 1 - share, -share / step), (0, 0, 0)
             self._now["inlet"][:3, 1] = -ki * step, -share / step, -1
             self._now["output"][:3] = 1, kd * (1 - share), -kd * share / step
@@ -216,7 +216,7 @@ class HelicBoard:
             self._samples.sendto(head + np.array(part, dtype="<f4").tobytes(), self._to)
             self._number += 1
 
-    # What its client asks of it.
+    # Interface to the client.
 
     def _serve(self):
         while not self._closing.is_set():
@@ -232,7 +232,7 @@ class HelicBoard:
                 except OSError:
                     pass
             with self._turn:
-                # The connection is gone: the gate closes, the stream ends.
+                # The connection is closed: the gate closes and the stream ends.
                 self._armed, self._to, self._client = False, None, None
             self.is_left.set()
 
@@ -246,14 +246,14 @@ class HelicBoard:
             return False
         try:
             with self._turn:
-                told = self._asked(kind, rest[:-2], host)
-        except Refused as refused:
+                told = self._reply(kind, rest[:-2], host)
+        except RefusedByBoard as refused:
             kind, told = 255, bytes([refused.args[0], kind])
         body = struct.pack("<BBH", kind, sequence, len(told)) + told
         client.sendall(MAGIC + body + crc(body))
         return True
 
-    def _asked(self, kind, payload, host):  # noqa: C901 - one case a message
+    def _reply(self, kind, payload, host):  # noqa: C901 - one case a message
         match kind:
             case 1:
                 return self._page(*struct.unpack("<H", payload))
@@ -266,9 +266,9 @@ class HelicBoard:
             case 7:
                 decimation, count, width = struct.unpack_from("<HIB", payload)
                 if self._to is not None:
-                    raise Refused(BUSY)
+                    raise RefusedByBoard(BUSY)
                 if decimation != 1 or count or width != len(payload) - 7 or max(payload[7:]) >= len(SOURCES):
-                    raise Refused(BAD_VALUE)
+                    raise RefusedByBoard(BAD_VALUE)
                 self._stream = tuple(list(SOURCES)[each] for each in payload[7:])
                 return b""
             case 8:
@@ -283,11 +283,11 @@ class HelicBoard:
                 return struct.pack(
                     "<BHBfI", self.version, len(REGISTRY), len(SOURCES), self.rate_hz, uptime_ms
                 )
-        raise Refused(BAD_TYPE)
+        raise RefusedByBoard(BAD_TYPE)
 
     def _page(self, start):
         if start > len(REGISTRY):
-            raise Refused(BAD_INDEX)
+            raise RefusedByBoard(BAD_INDEX)
         told, end = b"", start
         for name, kind, count, access in REGISTRY[start:]:
             entry = name.encode() + b"\0" + struct.pack("<cHB", kind.encode(), count, access)
@@ -299,7 +299,7 @@ class HelicBoard:
     def _value(self, index):
         name, kind, count, _ = self._entry(index)
         if name == "table":
-            raise Refused(BAD_LENGTH)
+            raise RefusedByBoard(BAD_LENGTH)
         values = self._values[name]
         if name == "arm":
             values = (int(self._armed and self.is_gated),)
@@ -310,27 +310,27 @@ class HelicBoard:
     def _set(self, index, data):
         name, kind, count, access = self._entry(index)
         if access is not WRITE:
-            raise Refused(READ_ONLY)
+            raise RefusedByBoard(READ_ONLY)
         if name in self.refuses:
-            raise Refused(self.refuses[name])
+            raise RefusedByBoard(self.refuses[name])
         if len(data) != struct.calcsize(layout(kind, count)):
-            raise Refused(BAD_LENGTH)
+            raise RefusedByBoard(BAD_LENGTH)
         values = struct.unpack(layout(kind, count), data)
         if not all(map(math.isfinite, values)) or (name == "ctrl_tau_d" and values[0] < 0):
-            raise Refused(BAD_VALUE)
+            raise RefusedByBoard(BAD_VALUE)
         if name == "arm":
             self._armed = bool(values[0])
         elif name not in QUEUED:
             self._values[name] = values
         elif len(self._commands) == QUEUE:
-            raise Refused(BUSY)
+            raise RefusedByBoard(BUSY)
         else:
             self._commands.append((name, values))
         return b""
 
     def _entry(self, index):
         if index >= len(REGISTRY):
-            raise Refused(BAD_INDEX)
+            raise RefusedByBoard(BAD_INDEX)
         return REGISTRY[index]
 
 
@@ -353,7 +353,7 @@ def received(client, count):
 
 
 def listening():
-    """A port for commands, and the one after it for samples."""
+    """Open a port for commands, and the next port for samples."""
     while True:
         server = socket.create_server(("127.0.0.1", 0))
         samples = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -368,7 +368,7 @@ def listening():
 
 @contextmanager
 def on_rig(rig):
-    """A virtual rig with a board at its amplifier, and the rig as a host finds it: nothing virtual in it."""
+    """Yield a board at the amplifier of a virtual rig, and the configuration of this rig as a real one."""
     board = HelicBoard(rig.controller.rate_hz, rig.virtual.grid_rate_hz, rig.controller.latency_s)
     virtual = VirtualRig(rig.model_copy(update={"controller": None}))
     virtual.world = World(virtual.rig, virtual.generator, loop=LoopCables(board))

@@ -1,4 +1,4 @@
-"""Control-based continuation: on a curve that folds, and on the whole virtual rig."""
+"""Control-based continuation of a curve with folds, and on the virtual rig."""
 
 from contextlib import ExitStack
 from dataclasses import replace
@@ -43,7 +43,7 @@ K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
 
 
 def hardening(rig, latency_s=3e-4, **virtual):
-    """The rig with a controller, and a spring of p^3 in the stops' place: 0.1 k1 p at 100 µm."""
+    """Return the rig with a controller and a cubic spring instead of stops: 0.1 k1 p at 100 µm."""
     specimen = rig.specimen.model_copy(
         update={"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}
     )
@@ -62,8 +62,8 @@ def measurement(plan):
     return Measurement(name="branch", excitation=plan, ramp_s=0.4)
 
 
-def followed(rig, plan, path, true=None):
-    """Follow a branch on a rig; ``true``: what is really there, where the rig's configuration is wrong."""
+def follow_branch(rig, plan, path, true=None):
+    """Follow a branch on a rig; ``true`` is the real rig if the configuration is wrong."""
     with ExitStack() as stack:
         if true is not None:
             virtual = stack.enter_context(VirtualRig(true))
@@ -82,11 +82,11 @@ def followed(rig, plan, path, true=None):
 
 
 def hardening_resonator(setting):
-    """Level of the base, and m0 over it, of a resonator that a law damps: B = P (0.12 |P|^2 - d + 0.4 i)."""
+    """Return base level and m0 over base of a damped resonator: B = P (0.12 |P|^2 - d + 0.4 i)."""
     detuning = setting.frequency_hz - 100.0
     size = np.linspace(1e-3, 9, 200_001)
     stiff = 0.12 * size**2 - detuning
-    # The law adds damping to what is told, and so unfolds it.
+    # The feedback law adds damping, and so removes the folds.
     told = size * np.hypot(stiff, 2.4)
     at = int(np.searchsorted(told, abs(setting.reference_v[0])))
     base = size[at] * complex(stiff[at], 0.4)
@@ -98,36 +98,36 @@ def test_the_solver_follows_a_curve_through_both_folds():
     start = LoopSetting(98.0, np.array([level + 0j]))
     solver = BranchSolver(start, np.array([1.0 + 0j]), 0.0, level, step_hz=0.25)
 
-    def seen(unknowns):
+    def measured_at(unknowns):
         found, ratio = hardening_resonator(solver.setting(unknowns))
         one = MeasuredPoint(unknowns, np.array([found / level - 1]), ratio, np.zeros(3))
         solver.learn(one)
         return one
 
-    def corrected(foreseen):
-        one = seen(foreseen.unknowns)
+    def correct_point(foreseen):
+        one = measured_at(foreseen.unknowns)
         for _ in range(12):
             if abs(one.residual[0]) < 2e-3 and is_new(one, foreseen):
                 return one
-            one = seen(solver.correct(one, foreseen))
+            one = measured_at(solver.correct(one, foreseen))
         return None
 
-    points, length = [corrected(solver.first())], 1.0
+    points, length = [correct_point(solver.first())], 1.0
     while len(points) < 80 and length > 1e-2:
-        one = corrected(solver.next(tuple(points[-2:]), length, 1.0))
+        one = correct_point(solver.next(tuple(points[-2:]), length, 1.0))
         if one is None:
             length /= 2
-            here = seen(points[-1].unknowns)
+            here = measured_at(points[-1].unknowns)
             for column in (0, 1):
                 beside = points[-1].unknowns.copy()
                 beside[column] -= 0.05
-                solver.probe(column, here, seen(beside))
+                solver.probe(column, here, measured_at(beside))
         else:
             points.append(one)
             length = min(1.5 * length, 1.0)
     hertz = 0.25 * np.array([each.unknowns[0] for each in points])
     assert all(abs(each.residual[0]) < 2e-3 for each in points)
-    # The tip: |P| = 2 / 0.4, at a detuning of 0.12 |P|^2 = 3 Hz; there and back.
+    # The fold is at |P| = 2 / 0.4, at a detuning of 0.12 |P|^2 = 3 Hz; frequencies up and down.
     turns = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
     assert len(turns) == 2
     assert hertz[turns[0]] == pytest.approx(103.0, abs=0.1)
@@ -136,7 +136,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
 
 
 def test_the_step_direction_ignores_points_closer_than_their_noise():
-    """Two of a noisy arc lie close to each other, as where a step was halved at a fold."""
+    """Two points of a noisy arc are close together, as after a halved step at a fold."""
     rng = np.random.default_rng(22)
     solver = BranchSolver(LoopSetting(98.0, np.array([1.0 + 0j])), np.array([1.0 + 0j]), 0.0, 1.0, 0.25)
     for _ in range(100):
@@ -157,7 +157,7 @@ def test_the_step_direction_ignores_points_closer_than_their_noise():
 
 
 def model_of(rig):
-    """Branch of the rig's specimen, and what lies between its folds."""
+    """Return the computed branch of the rig's specimen, and its folds."""
     structure, spring = structure_of(specimen_of(rig)), spring_of(specimen_of(rig))
     start = balance(structure, spring, 90.0, LEVEL_M)
     branch = balance_branch_within(structure, spring, start, FrequencyPath((LEVEL_M,)), 89.0, 120.0)
@@ -167,7 +167,7 @@ def model_of(rig):
 @pytest.mark.thorough
 def test_a_branch_starts_from_rest_with_a_sinusoidal_base_of_the_set_level(rig, tmp_path):
     hard = hardening(rig)
-    points, notes = followed(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
+    points, notes = follow_branch(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
     branch, _ = model_of(hard)
     assert [each.point for each in points] == [0, 1]
     assert notes[-1] == BranchEndNote(points=2, end=BranchEnd.POINTS)
@@ -182,7 +182,7 @@ def test_a_branch_starts_from_rest_with_a_sinusoidal_base_of_the_set_level(rig, 
 def test_small_perturbations_show_stability_without_leaving_the_point(rig, tmp_path):
     hard = hardening(rig)
     path = tmp_path / "perturbed.h5"
-    points, notes = followed(hard, continuation(start_hz=94, most_points=1, perturbation=0.02), path)
+    points, notes = follow_branch(hard, continuation(start_hz=94, most_points=1, perturbation=0.02), path)
     told = [each for each in notes if isinstance(each, BranchStabilityNote)]
     branch, _ = model_of(hard)
     size = np.interp(94.0, branch.frequencies_hz[:60], np.abs(branch.multipliers[:60, 0]))
@@ -229,8 +229,8 @@ def test_a_latency_that_makes_the_loop_unstable_is_refused_before_output(rig, tm
     assert not (tmp_path / "late.h5").exists()
 
 
-def among_stops(**more):
-    """The paper's specimen on a rig with a controller, and a plan from above under 1 µm."""
+def rig_and_plan_with_stops(**more):
+    """Return a rig with controller and the paper's specimen, and a plan from above at 1 µm."""
     stops = load_rig(Path("virtual_rig_controller"))
     stops = stops.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
     usual = {"start_hz": 97.5, "low_hz": 96.85, "high_hz": 100, "begin_from": "above", "step_hz": 0.25}
@@ -248,7 +248,7 @@ def test_motions_near_grazing_are_refused_with_the_loop_multiplier(rig):
 
 
 def test_a_branch_without_start_or_force_in_the_model_is_refused():
-    stops, plan = among_stops(start_hz=95, low_hz=94, high_hz=96, begin_from="rest")
+    stops, plan = rig_and_plan_with_stops(start_hz=95, low_hz=94, high_hz=96, begin_from="rest")
     with pytest.raises(LimitExceeded, match="finds no motion that repeats every period at start_hz = 95"):
         require_held(fast_loop(stops), plan)
     rigid = stops.specimen.model_copy(update={"contact": "rigid:0.8"})
@@ -260,11 +260,11 @@ def test_a_branch_without_start_or_force_in_the_model_is_refused():
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("rate_hz", [10_240.0, 5120.0])
 def test_unstable_motions_with_impacts_are_held_beyond_their_fold(tmp_path, rate_hz):
-    """The paper's specimen: begun from above, at least 10 unstable motions, up to a multiplier of 2."""
-    stops, plan = among_stops()
+    """The paper's specimen, from above: at least 10 unstable motions, up to a multiplier of 2."""
+    stops, plan = rig_and_plan_with_stops()
     stops = changed(stops, daq={"sample_rate_hz": rate_hz})
-    points, notes = followed(stops, plan, tmp_path / "stops.h5")
-    # Where the model's multiplier is 2 and more, how far it is held depends on the noise.
+    points, notes = follow_branch(stops, plan, tmp_path / "stops.h5")
+    # Where the model's multiplier is 2 or more, noise decides how far the branch is held.
     assert notes[-1].end in (BranchEnd.RANGE, BranchEnd.LOST), notes
     branch = impact_branch(specimen_of(stops), 1e-6, 97.5, (96.4, 100.0), "above")
     fold = next(each for each in branch.events if each.kind.value == "fold")
@@ -287,15 +287,15 @@ NOISES += ("vibrometer_noise_m_per_s_per_rthz", "converter_noise_v")
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("noise", [1.0, 10.0])
 def test_a_feedback_law_from_a_wrong_model_holds_a_branch_through_both_folds(rig, tmp_path, noise):
-    """Minutes of rig time: at least 15 unstable points, folds within 0.3 Hz, m0 within 2 %."""
+    """Takes minutes: at least 15 unstable points, folds within 0.3 Hz, m0 within 2 %."""
     true = hardening(rig, **{each: noise * getattr(rig.virtual, each) for each in NOISES})
-    # The host believes in springs that are 10 % stiffer, and in a coil that pushes by 10 % more.
+    # The configuration has springs that are 10 % too stiff, and a coil force that is 10 % too large.
     stiffer = tuple(1.1**0.5 * each for each in true.specimen.single_frequencies_hz)
     believed = changed(
         true, shaker={"force_constant_n_per_a": 1.1 * 6.78}, specimen={"single_frequencies_hz": stiffer}
     )
     plan = continuation(most_points=110, perturbation=0.02)
-    points, notes = followed(believed, plan, tmp_path / "branch.h5", true)
+    points, notes = follow_branch(believed, plan, tmp_path / "branch.h5", true)
     branch, folds = model_of(true)
     hertz = np.array([each.frequency_hz for each in points])
     assert isinstance(notes[-1], BranchEndNote)

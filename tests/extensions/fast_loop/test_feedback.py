@@ -1,4 +1,4 @@
-"""The sampled plant against the compiled one, multipliers against those of the branch, the law's purpose."""
+"""The sampled plant against the compiled simulation, loop multipliers, and the purpose of the law."""
 
 from dataclasses import replace
 from functools import cache
@@ -79,7 +79,7 @@ def test_the_sampled_plant_model_matches_the_compiled_simulation(latency_s):
 def test_multipliers_on_a_very_heavy_table_match_the_branch():
     found = branch()
     points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
-    # The table's own multiplier is one: it stays where it is.
+    # The free table adds a multiplier of one.
     exact = np.maximum(np.abs(found.multipliers[points, 0]), 1.0)
     assert exact.max() > 1.15
     seen = branch_multipliers(plant(mass_kg=1e7), NO_LAW, found, points)
@@ -111,7 +111,7 @@ def test_the_law_stabilises_all_motions_of_a_branch_even_with_a_wrong_model():
             assert loop_multiplier(each, law, *slopes) < 0.99
 
 
-def test_pd_gains_on_m0_hold_the_branch_and_pd_gains_on_the_base_do_not():
+def test_pd_gains_on_m0_hold_the_branch_but_pd_gains_on_the_base_do_not():
     unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     of_m0, of_base = pd_law(plant(), 1), pd_law(plant(), 0)
     assert of_m0.direct[0, 0] == of_base.direct[0, 1] == 0.0
@@ -122,7 +122,7 @@ def test_pd_gains_on_m0_hold_the_branch_and_pd_gains_on_the_base_do_not():
 
 @pytest.mark.thorough
 def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
-    """All that is weighed, by simulation under its noises."""
+    """The cost is simulated with the noises that the design assumes."""
     model, rng = plant(specimen=LINEAR), np.random.default_rng(5)
     step, volt = model.step
     into, relative = model.spring

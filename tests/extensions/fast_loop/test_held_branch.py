@@ -1,4 +1,4 @@
-"""What a fast loop noted of a branch, as numbers and sentences."""
+"""Notes of a fast loop about a branch, as numbers and sentences."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def point(number, hertz):
     )  # fmt: skip
 
 
-def told(number, stability, multiplier):
+def note(number, stability, multiplier):
     return BranchStabilityNote(
         point=number, stability=stability, multiplier=multiplier,
         multiplier_u=None if multiplier is None else 0.01, perturbation=0.02, moved=1e-4,
@@ -26,8 +26,8 @@ POINTS = [point(number, hertz) for number, hertz in enumerate(HERTZ)]
 
 
 def test_stability_notes_are_assigned_to_their_points_in_any_order():
-    # The third was asked in vain, and the last not at all: the run ended.
-    notes = [told(1, Stability.STABLE, 0.96), told(0, Stability.UNSTABLE, 1.1), told(2, Stability.OPEN, None)]
+    # Point 2 gave no result, and the run ended before point 3 was tested.
+    notes = [note(1, Stability.STABLE, 0.96), note(0, Stability.UNSTABLE, 1.1), note(2, Stability.OPEN, None)]
     found = held_branch([*POINTS, *notes])
     assert found.stability == ("unstable", "stable", "not determined", "")
     np.testing.assert_array_equal(found.multiplier, [1.1, 0.96, np.nan, np.nan])

@@ -1,4 +1,4 @@
-"""The example of a real-time controller, against a board that was made after its documents."""
+"""The example driver of a real-time controller, on a board simulated from its documentation."""
 
 import subprocess
 import sys
@@ -32,7 +32,7 @@ PLAYED_V = float(np.hypot(0.1, 0.05))
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """Install the example package where nothing else is, and let this process find it."""
+    """Install the example package into a separate folder, and make it importable here."""
     target = tmp_path_factory.mktemp("installed")
     options = ("--quiet", "install", "--no-deps", "--no-build-isolation", "--target", target, PACKAGE)
     done = run("-m", "pip", *options)
@@ -44,7 +44,7 @@ def installed(tmp_path_factory):
 
 @pytest.fixture
 def rig(installed):
-    """The example's bench on the virtual rig, its board at half the rate."""
+    """Return the example's bench on the virtual rig, with its board at half the sample rate."""
     rig, shipped = load_rig(PACKAGE / "bench.toml"), load_rig("virtual_rig_controller")
     quiet = {name: 0.2 * value for name, value in shipped.virtual if "_noise_" in name}
     return rig.model_copy(
@@ -57,26 +57,26 @@ def rig(installed):
 
 
 @pytest.fixture
-def found(rig):
-    """A board that is switched on, and the rig as its host finds it."""
-    with on_rig(rig) as (board, found):
-        yield board, found
+def board_and_rig(rig):
+    """Yield a board, and the configuration of a rig with this board."""
+    with on_rig(rig) as (board, board_and_rig):
+        yield board, board_and_rig
 
 
 @pytest.fixture
-def played(found):
-    """A board that plays, and the bench that it does so on."""
-    board, rig = found
+def playing_board(board_and_rig):
+    """Yield a playing board, and the open bench."""
+    board, rig = board_and_rig
     with open_bench(rig, confirm=confirm_simulated) as bench:
         bench.digitizer.start()
         bench.controller.play(SERIES)
-        contract.listened(bench, 0.3)
+        contract.read_with_requests(bench, 0.3)
         assert board.is_armed
         yield board, bench
 
 
 def pd(kp, kd, tau_s, step_s):
-    """The law in the form in which vibench tells it, in memory of the filtered rate and the sample before."""
+    """Return a proportional-derivative law with memory of the filtered rate and the previous sample."""
     share = step_s / (tau_s + step_s)
     rate = (1 - share, -share / step_s)
     return LoopFeedback(
@@ -119,15 +119,15 @@ def test_a_pd_law_is_recovered_exactly_and_other_laws_are_refused(installed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("promise", [name for name in dir(contract) if name.startswith("test_")])
-def test_the_controller_board_passes_the_contract_tests(found, promise):
-    _, rig = found
+def test_the_controller_board_passes_the_contract_tests(board_and_rig, promise):
+    _, rig = board_and_rig
     with open_bench(rig, confirm=confirm_simulated) as bench:
         getattr(contract, promise)(bench)
 
 
 @pytest.mark.thorough
-def test_an_incompatible_ungated_or_occupied_board_is_refused(found):
-    board, rig = found
+def test_an_incompatible_ungated_or_occupied_board_is_refused(board_and_rig):
+    board, rig = board_and_rig
     board.version = 4
     with pytest.raises(
         InstrumentError, match=r"has version 4 .* this driver needs version 3\. Nothing was played"
@@ -151,8 +151,8 @@ def test_an_incompatible_ungated_or_occupied_board_is_refused(found):
 
 
 @pytest.mark.thorough
-def test_a_lost_connection_is_reported_and_closes_the_safety_gate(played):
-    board, bench = played
+def test_a_lost_connection_is_reported_and_closes_the_safety_gate(playing_board):
+    board, bench = playing_board
     board.drop()
     assert board.is_left.wait(10)
     assert not board.is_armed
@@ -162,8 +162,8 @@ def test_a_lost_connection_is_reported_and_closes_the_safety_gate(played):
 
 
 @pytest.mark.thorough
-def test_a_stream_that_ends_is_reported_and_silenced(played):
-    board, bench = played
+def test_a_stream_that_ends_is_reported_and_silenced(playing_board):
+    board, bench = playing_board
     board.is_mute = True
     bench.digitizer.read(6400)
     with pytest.raises(InstrumentError, match=r"its samples no longer arrive\. It was silenced"):
@@ -172,11 +172,11 @@ def test_a_stream_that_ends_is_reported_and_silenced(played):
 
 
 @pytest.mark.thorough
-def test_a_command_refused_by_the_board_silences_it_with_its_message(played):
-    board, bench = played
+def test_a_command_refused_by_the_board_silences_it_with_its_message(playing_board):
+    board, bench = playing_board
     board.refuses = {"forcing_coeffs": BUSY}
     bench.controller.play(SERIES.model_copy(update={"reference_v": ((0.2, 0.0),)}))
-    contract.listened(bench, 0.2)
+    contract.read_with_requests(bench, 0.2)
     told = bench.controller.report()
     assert told.state is LoopState.SILENT
     assert "refused" in told.reason
@@ -189,8 +189,8 @@ def test_a_command_refused_by_the_board_silences_it_with_its_message(played):
 
 
 @pytest.mark.thorough
-def test_a_tripped_safety_gate_ends_the_run(found, tmp_path):
-    board, rig = found
+def test_a_tripped_safety_gate_ends_the_run(board_and_rig, tmp_path):
+    board, rig = board_and_rig
     plan = BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=90, high_hz=118
     )
@@ -218,8 +218,8 @@ sys.stdin.read()
 
 
 @pytest.mark.thorough
-def test_a_board_whose_host_is_killed_closes_its_gate_at_once(found, installed, monkeypatch):
-    board, rig = found
+def test_a_board_whose_host_is_killed_closes_its_gate_at_once(board_and_rig, installed, monkeypatch):
+    board, rig = board_and_rig
     monkeypatch.setenv("PYTHONPATH", str(installed), prepend=":")
     command = [sys.executable, "-c", HOST, rig.controller.model_dump_json()]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as host:

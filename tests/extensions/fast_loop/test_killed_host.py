@@ -1,4 +1,4 @@
-"""The watchdog of the controller, when the process that talks to it is killed."""
+"""The watchdog of the controller silences it when the process that uses it is killed."""
 
 import subprocess
 import sys
@@ -41,7 +41,7 @@ def test_a_controller_goes_silent_when_its_host_is_killed():
         alive = sampler.read(5_120)[0]
         host.kill()
         host.wait()
-        # Nothing that was said is left: all of the watchdog's time is still to pass.
+        # This request restarts the watchdog, so that its whole time is still to pass.
         virtual.controller.execute(b'{"ask": "report"}')
         until = sampler.read(9_000)[0]
         after = sampler.read(5_120)[0]

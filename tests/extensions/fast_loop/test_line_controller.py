@@ -1,4 +1,4 @@
-"""A controller on a socket whose lines are not those of the protocol."""
+"""A controller on a socket that sends invalid lines."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from vibench_fast_loop.line_controller import LineController
 
 
 class Link:
-    """A session with one line for every question."""
+    """A session that answers every request with one line."""
 
     def __init__(self, line):
         self.line = line

@@ -1,4 +1,4 @@
-"""Stability told by small changes: known multipliers of held motions, found under noise, or not told."""
+"""Stability from small perturbations: known multipliers of held motions, with noise."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ TARGET = 0.02
 
 
 def modulations(rng, draws, per_period, count):
-    """Corners of a square at random, twice, the second time with the other sign, along half cosines."""
+    """Return a random square modulation, repeated with the opposite sign, with half-cosine transitions."""
     corners = np.exp(1j * np.pi * (0.25 + 0.5 * rng.integers(0, 4, (CHANGES, 2, draws))))
     course = np.concatenate([np.zeros((1, 2, draws)), -corners[-LEAD:], corners, -corners, corners[:2]])
     place = np.arange(count) / per_period / HOLD
@@ -32,8 +32,8 @@ def modulations(rng, draws, per_period, count):
     return (wave[:, 0] * turn + wave[:, 1] * turn**3).real
 
 
-def held(index, draws, rng):
-    """Answers of base and m0 to changes of a volt, and to noise: shape (samples, 2, draws) each."""
+def held_responses(index, draws, rng):
+    """Return responses of base and m0 to perturbations of a volt, and to noise: shape (samples, 2, draws)."""
     table, (wave, _, periods, _) = plant(), motion_slopes(HARDENING, branch(), index, RATE_HZ)
     law, per_period = design_law(table), len(wave) / periods
     count = round((LEAD + 2 * CHANGES + 1) * HOLD * per_period)
@@ -54,17 +54,17 @@ def held(index, draws, rng):
     return per_period, shown[:, :, :draws], shown[:, :, draws:]
 
 
-def told(index, draws, noise, seed):
-    """Multipliers by the fit, and the model's."""
+def fitted_multipliers(index, draws, noise, seed):
+    """Return the fitted multipliers, and the multiplier of the model."""
     found, rng = branch(), np.random.default_rng(seed)
-    per_period, answer, rest = held(index, draws, rng)
+    per_period, answer, rest = held_responses(index, draws, rng)
     turn = np.cos(2 * np.pi * np.arange(len(answer)) / per_period)
     omega = 2 * np.pi * found.frequencies_hz[index]
     motion = np.array([3e-6 * omega**2, 3e-6 * found.response_ii[index, 0] * omega])
     waves = turn[:, None, None] * motion[:, None]
     seen = [envelope_deviation((waves + answer)[:, 1, each], per_period) for each in range(draws)]
     whole = waves + answer * (TARGET / np.array(seen)) + noise * rest
-    # Clocks that differ by twenty parts in a million.
+    # The clocks differ by 20 ppm.
     fitted = [
         open_loop_multiplier(
             PerturbedMotion(
@@ -88,7 +88,7 @@ def covers(each, size):
 @pytest.mark.thorough
 @pytest.mark.parametrize("index", [60, 300])
 def test_the_stability_of_a_held_motion_follows_from_base_and_m0(index):
-    fitted, size = told(index, 6, 1.0, 1)
+    fitted, size = fitted_multipliers(index, 6, 1.0, 1)
     assert sum(covers(each, size) for each in fitted) >= 5
     for each in fitted:
         low, high = each.bounds
@@ -112,11 +112,11 @@ def test_multiplier_bounds_are_two_sided():
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_multiplier_bounds_have_their_coverage_and_verdicts_are_right():
-    """240 draws of 10 motions with low and high noise: 95 % of the bounds, and no wrong side among them."""
+    """240 simulations of 10 motions with low and high noise: at least 92 % in the 95 % bounds."""
     inside, wrong, draws = 0, 0, 0
     for noise in (1.0, 4.0):
         for index in (20, 60, 120, 198, 222, 260, 300, 330, 343, 400):
-            fitted, size = told(index, 12, noise, 1000 * index)
+            fitted, size = fitted_multipliers(index, 12, noise, 1000 * index)
             draws += len(fitted)
             inside += sum(covers(each, size) for each in fitted)
             low, high = np.array([each.bounds for each in fitted]).T

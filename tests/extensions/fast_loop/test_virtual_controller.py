@@ -1,4 +1,4 @@
-"""The simulated controller: what comes back of what went down, and when it falls silent by itself."""
+"""The simulated controller: returned coefficients, feedback, and silence without requests."""
 
 import json
 
@@ -24,7 +24,7 @@ FULL_SCALE = 1e3
 
 
 class Wire:
-    """A sensor that shows what it is given, one step at a time."""
+    """A sensor that shows a given value, one step at a time."""
 
     def __init__(self):
         self.shown = np.zeros(1)
@@ -45,8 +45,8 @@ class Wire:
         )
 
 
-class Wired:
-    """A controller whose inputs are what it played three samples ago, and a constant."""
+class WiredController:
+    """A controller whose inputs are its output three samples ago, and a constant."""
 
     def __init__(self, gain=1.0):
         self.samples = 0
@@ -88,7 +88,7 @@ class Wired:
 
 @pytest.fixture
 def wired():
-    return Wired()
+    return WiredController()
 
 
 SERIES = ((0.5, 0.0), (0.1, -0.2), (0.0, 0.05))
@@ -103,7 +103,7 @@ def test_returned_fourier_coefficients_match_the_played_signal(wired):
     output = np.array([complex(*each) for each in block.output])
     assert np.abs(output[1:4] - [complex(*each) for each in SERIES]).max() < 1e-4
     assert np.abs(np.append(output[4:], output[0])).max() < 1e-4
-    # The input lags by three samples: a phase of every order.
+    # The input lags by three samples: a phase shift in every order.
     late = np.exp(-2j * np.pi * np.arange(10) * frequency_hz * 3 / RATE_HZ)
     base = np.array([complex(*each) for each in block.base])
     assert np.abs(base - output * late).max() < 1e-4
@@ -115,7 +115,7 @@ def test_a_feedback_law_acts_on_samples_and_its_internal_state(wired):
     program = LoopProgram(frequency_hz=100, reference_v=((0.0, 0.0),), feedback=feedback)
     wired.tell("play", program=program)
     wired.run(5 / RATE_HZ)
-    # Memory 0, .25, .375, ...; twice that less the input.
+    # Memory is 0, .25, .375, ...; the output is twice the memory minus the input.
     memory = [0.25 * (2 - 0.5 ** (k - 1)) if k else 0.0 for k in range(5)]
     assert wired.played[3:] == pytest.approx([2 * each - 0.25 for each in memory])
 
@@ -143,7 +143,7 @@ def test_without_its_host_the_controller_goes_silent_and_states_the_reason(wired
 
 
 def test_an_unstable_law_is_ended_by_the_controller():
-    wired = Wired(gain=1.0)
+    wired = WiredController(gain=1.0)
     feedback = LoopFeedback(step=((0.0,),), inlet=((0.0, 0.0),), output=(0.0,), direct=(1.3, 0.0))
     program = LoopProgram(frequency_hz=100, reference_v=((0.1, 0.0),), feedback=feedback)
     wired.tell("play", program=program)

@@ -1,4 +1,4 @@
-"""Without vibench-fast-loop its plans, benches and recordings are refused with one sentence that names it."""
+"""Without vibench-fast-loop its plans, benches and recordings are refused with a sentence that names it."""
 
 import json
 import os
@@ -22,8 +22,8 @@ SENTENCE = (
 
 
 @pytest.fixture(scope="module")
-def bare(tmp_path_factory):
-    """Everything that is installed, but for the package: links, and no site that would add it again."""
+def path_without_package(tmp_path_factory):
+    """Return a module search path with all installed packages except vibench-fast-loop."""
     folder = tmp_path_factory.mktemp("packages")
     for path in Path(pytest.__file__).parents[1].iterdir():
         if not path.name.startswith(("vibench_fast_loop", "_vibench")):
@@ -32,12 +32,12 @@ def bare(tmp_path_factory):
 
 
 @pytest.fixture
-def run(bare, tmp_path):
+def run(path_without_package, tmp_path):
     def run(*arguments):
         return subprocess.run(
             [sys.executable, "-S", *map(str, arguments)],
             cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": bare},
+            env={**os.environ, "PYTHONPATH": path_without_package},
             capture_output=True,
             text=True,
             check=False,
@@ -48,7 +48,7 @@ def run(bare, tmp_path):
 
 @pytest.fixture
 def recording(tmp_path):
-    """Two points of a branch."""
+    """Return a recording of two points of a branch."""
     frequencies = (95.0, 96.0)
     motions = [synthetic.sine(4.0, each, 0.5e-6) for each in frequencies]
     base = synthetic.Motion(

@@ -1,4 +1,4 @@
-"""Channels of a simulated task: ranges, coupling, excitation, and what a device refuses."""
+"""Channels of a simulated task: ranges, coupling, excitation, and settings that a device refuses."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_a_voltage_channel_has_no_excitation_by_default(task, daq):
     assert daq.world.wirings[-1][0].iepe_current_a == 0.002
 
 
-def excited(task, current_a, module=MODULE):
+def excited_channel(task, current_a, module=MODULE):
     channel = task.ai_channels.add_ai_voltage_chan(module)
     channel.ai_excit_src = ExcitationSource.INTERNAL
     channel.ai_excit_val = current_a
@@ -49,19 +49,19 @@ def excited(task, current_a, module=MODULE):
 
 
 def test_turning_on_excitation_sets_ac_coupling(task, daq):
-    assert excited(task, 0.002).ai_coupling is Coupling.AC
+    assert excited_channel(task, 0.002).ai_coupling is Coupling.AC
     task.read(10)
     assert (daq.world.wirings[-1][0].iepe_current_a, daq.world.wirings[-1][0].coupling) == (0.002, "AC")
 
 
 def test_excitation_needs_ac_coupling(task):
-    excited(task, 0.002).ai_coupling = Coupling.DC
+    excited_channel(task, 0.002).ai_coupling = Coupling.DC
     with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "IEPE"):
         verify(task)
 
 
 def test_an_unsupported_sensor_current_is_refused_with_the_supported_values(task):
-    excited(task, 0.004)
+    excited_channel(task, 0.004)
     with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"0\.004\nPossible Values: 0, 0\.002"):
         verify(task)
 
@@ -83,7 +83,7 @@ def test_limits_beyond_every_input_range_are_refused_with_the_allowed_ranges(tas
 
 
 def test_sensors_need_a_device_with_excitation(task):
-    excited(task, 0.002, "Dev2/ai0")
+    excited_channel(task, 0.002, "Dev2/ai0")
     with pytest.raises(DaqError, match="0 A on Dev2/ai0"):
         verify(task)
 

@@ -1,4 +1,4 @@
-"""What a program finds when it looks at the simulated DAQmx system."""
+"""Devices, features and rates of the simulated DAQmx system."""
 
 import numpy as np
 import pytest
@@ -99,11 +99,11 @@ def test_the_usb_6211_rate_is_its_timebase_over_an_integer():
         ("", ()),
     ],
 )
-def test_lists_and_ranges_of_names_are_understood(text, names):
+def test_lists_and_ranges_of_channel_names_are_expanded(text, names):
     assert expand(text) == names
 
 
-def test_one_name_given_to_several_channels_is_numbered():
+def test_one_name_assigned_to_several_channels_is_numbered():
     assert channel_names("force", ("a", "b")) == ("force0", "force1")
     assert channel_names("x, y", ("a", "b")) == ("x", "y")
     assert channel_names("", ("a", "b")) == ("a", "b")

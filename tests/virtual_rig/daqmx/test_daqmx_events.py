@@ -51,7 +51,7 @@ def test_a_callback_that_does_not_read_is_not_called_repeatedly(task):
     assert calls.empty()
 
 
-def test_a_task_can_be_closed_while_its_events_are_listened_to(daq):
+def test_a_task_can_be_closed_while_a_callback_is_registered(daq):
     for number in range(3):
         task = Task(grpc_options=daq.options)
         task.ai_channels.add_ai_voltage_chan("Dev1/ai1")

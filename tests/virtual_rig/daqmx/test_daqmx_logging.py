@@ -26,7 +26,7 @@ def logging(task, path, mode=LoggingMode.LOG_AND_READ, operation=LoggingOperatio
     task.in_stream.configure_logging(str(path), mode, operation=operation, **more)
 
 
-def logged(path, group="shaken"):
+def read_log(path, group="shaken"):
     with TdmsFile.open(path) as file:
         return {channel.name: (channel[:], dict(channel.properties)) for channel in file[group].channels()}
 
@@ -37,7 +37,7 @@ def test_the_log_file_contains_samples_units_interval_and_start(task, tmp_path):
     before = datetime.now(UTC)
     read = np.hstack([task.read(700), task.read(64)])
     task.stop()
-    found = logged(tmp_path / "read.tdms")
+    found = read_log(tmp_path / "read.tdms")
     assert list(found) == ["Dev1/ai1", "Dev1/ai2"]
     for (volts, properties), row in zip(found.values(), read, strict=True):
         np.testing.assert_array_equal(volts, row)
@@ -53,7 +53,7 @@ def test_log_files_are_replaced_and_other_modes_refused(task, tmp_path):
         task.start()
         task.read(samples)
         task.stop()
-        assert len(logged(path)["Dev1/ai1"][0]) == samples
+        assert len(read_log(path)["Dev1/ai1"][0]) == samples
     for refusal in (
         lambda: logging(task, path, LoggingMode.LOG),
         lambda: logging(task, path, operation=LoggingOperation.OPEN),

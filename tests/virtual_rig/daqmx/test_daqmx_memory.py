@@ -1,4 +1,4 @@
-"""Numbers of samples that no computer holds are refused, and samples that nobody reads grow no further."""
+"""Requests larger than the memory are refused, and unread samples use limited memory."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_buffers_and_reads_larger_than_the_memory_are_refused(daq, task):
 
 
 class NoTiming:
-    """How the client says that waveforms shall be samples only."""
+    """The client's setting for waveforms without timing information."""
 
     value = 0
 
@@ -56,13 +56,13 @@ def test_unread_samples_are_lost_when_memory_is_full(daq, task, monkeypatch):
 def test_a_failed_simulation_is_reported_to_every_reader(connect, pace):
     daq = connect(pace)
 
-    def stand_still(*_):
+    def fail(*_):
         raise AcquisitionError("The specimen's motion was lost")
 
     task = daq.inputs("Dev1/ai1", 10_000)
     task.start()
     assert np.size(task.read(500)) == 500
-    daq.world.voltage = stand_still
+    daq.world.voltage = fail
     for _ in range(2):
         with refused(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, "motion was lost"):
             task.read(5000)

@@ -20,8 +20,8 @@ from tests.virtual_rig.conftest import refused
 RATE_HZ = 10240.0
 
 
-def expected(numbers, first, count, rate_hz=RATE_HZ):
-    """The closed form of what channels of that number show, from a sample on."""
+def closed_form(numbers, first, count, rate_hz=RATE_HZ):
+    """Return the closed form of the sines of these channels, from a sample on."""
     time_s = (first + np.arange(count)) / rate_hz
     return np.stack([0.5 + (n + 1) * np.sin(2 * np.pi * 40 * (n + 1) * time_s) for n in numbers])
 
@@ -35,7 +35,7 @@ def task(daq):
 
 def test_the_reported_rate_is_the_actual_sampling_rate(task):
     assert task.timing.samp_clk_rate == RATE_HZ
-    np.testing.assert_allclose(task.read(300), expected((1, 2, 3), 0, 300), atol=1e-9)
+    np.testing.assert_allclose(task.read(300), closed_form((1, 2, 3), 0, 300), atol=1e-9)
 
 
 @pytest.mark.parametrize("samples", [1, 512, 5120, 51200])
@@ -44,7 +44,7 @@ def test_no_sample_is_lost_or_repeated_between_reads_of_any_size(task, samples):
     block = np.empty((3, samples))
     for number in range(4):
         reader.read_many_sample(block, samples)
-        np.testing.assert_allclose(block, expected((1, 2, 3), number * samples, samples), atol=1e-7)
+        np.testing.assert_allclose(block, closed_form((1, 2, 3), number * samples, samples), atol=1e-7)
 
 
 def test_a_long_run_keeps_its_read_position(daq):
@@ -55,7 +55,7 @@ def test_a_long_run_keeps_its_read_position(daq):
     block = np.empty((2, 51200))
     for _ in range(100):
         reader.read_many_sample(block, 51200)
-    np.testing.assert_allclose(block, expected((1, 2), 99 * 51200, 51200, 51200.0), atol=1e-7)
+    np.testing.assert_allclose(block, closed_form((1, 2), 99 * 51200, 51200, 51200.0), atol=1e-7)
 
 
 def test_two_runs_of_the_simulated_daq_are_equal_bit_for_bit(connect):
@@ -72,8 +72,8 @@ def test_samples_have_the_requested_layout(task, daq):
     interpreter = task._interpreter
     interpreter.read_analog_f64(task._handle, 10, 1.0, FillMode.GROUP_BY_CHANNEL.value, by_channel)
     interpreter.read_analog_f64(task._handle, 10, 1.0, FillMode.GROUP_BY_SCAN_NUMBER.value, by_scan)
-    np.testing.assert_allclose(by_channel, expected((1, 2, 3), 0, 10), atol=1e-9)
-    np.testing.assert_allclose(by_scan.T, expected((1, 2, 3), 10, 10), atol=1e-9)
+    np.testing.assert_allclose(by_channel, closed_form((1, 2, 3), 0, 10), atol=1e-9)
+    np.testing.assert_allclose(by_scan.T, closed_form((1, 2, 3), 10, 10), atol=1e-9)
 
 
 def test_a_finite_task_gives_its_samples_and_no_more(daq):
@@ -82,7 +82,7 @@ def test_a_finite_task_gives_its_samples_and_no_more(daq):
     task.wait_until_done()
     assert task.is_task_done()
     assert task.in_stream.avail_samp_per_chan == 200
-    np.testing.assert_allclose(task.read(READ_ALL_AVAILABLE), expected((1,), 0, 200)[0], atol=1e-9)
+    np.testing.assert_allclose(task.read(READ_ALL_AVAILABLE), closed_form((1,), 0, 200)[0], atol=1e-9)
     with refused(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE):
         task.read(1)
 
@@ -91,8 +91,8 @@ def test_a_finite_task_started_by_a_read_can_be_read_repeatedly(daq):
     task = daq.inputs("Dev1/ai1", RATE_HZ, samples=200)
     first = task.read(200)
     second = task.read(200)
-    np.testing.assert_allclose(first, expected((1,), 0, 200)[0], atol=1e-9)
-    np.testing.assert_allclose(second, expected((1,), 200, 200)[0], atol=1e-9)
+    np.testing.assert_allclose(first, closed_form((1,), 0, 200)[0], atol=1e-9)
+    np.testing.assert_allclose(second, closed_form((1,), 200, 200)[0], atol=1e-9)
 
 
 def test_polling_for_samples_advances_the_simulated_time(task):
@@ -135,12 +135,12 @@ def test_raw_counts_scale_back_to_volts(daq):
     AnalogUnscaledReader(task.in_stream).read_int32(counts, 50)
     step_v = channel.ai_dev_scaling_coeff[1]
     assert step_v == 5 / 2**23
-    np.testing.assert_allclose(counts * step_v, expected((1,), 0, 50), atol=step_v)
+    np.testing.assert_allclose(counts * step_v, closed_form((1,), 0, 50), atol=step_v)
 
 
-def test_waveforms_contain_samples_times_names_and_units(task):
+def test_a_waveform_contains_samples_times_name_and_unit(task):
     waveforms = task.read_waveform(64)
-    np.testing.assert_allclose([w.scaled_data for w in waveforms], expected((1, 2, 3), 0, 64), atol=1e-9)
+    np.testing.assert_allclose([w.scaled_data for w in waveforms], closed_form((1, 2, 3), 0, 64), atol=1e-9)
     later = task.read_waveform(10)[0].timing
     timing = waveforms[0].timing
     assert timing.sample_interval.total_seconds() == pytest.approx(1 / RATE_HZ)
@@ -151,7 +151,7 @@ def test_waveforms_contain_samples_times_names_and_units(task):
     ]
 
 
-def test_a_waveform_has_no_more_than_was_requested(task):
+def test_a_waveform_has_at_most_the_requested_number_of_samples(task):
     task.in_stream.waveform_attribute_mode = WaveformAttributeMode.NONE
     waveform = task.read_waveform(8)[0]
     assert not waveform.timing.has_start_time
@@ -164,7 +164,7 @@ def test_restarting_a_task_begins_at_sample_zero(task):
     task.stop()
     task.stop()
     task.start()
-    np.testing.assert_allclose(task.read(10), expected((1, 2, 3), 100, 10), atol=1e-9)
+    np.testing.assert_allclose(task.read(10), closed_form((1, 2, 3), 100, 10), atol=1e-9)
 
 
 def test_a_committed_task_stays_reserved_after_a_stop(task, daq):

@@ -1,4 +1,4 @@
-"""Samples from before and after an edge on a line."""
+"""Reference triggers keep samples before and after an edge on a digital line."""
 
 import threading
 

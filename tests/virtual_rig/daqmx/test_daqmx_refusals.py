@@ -1,4 +1,4 @@
-"""Errors of the simulated driver: natural ones in the states that cause them, and injected ones."""
+"""Errors of the simulated driver: those of a wrong state, and injected ones."""
 
 import grpc
 import numpy as np
@@ -77,7 +77,7 @@ def test_a_second_task_with_the_same_name_is_refused_or_attached(daq, task):
     join = options(SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION)
     with Task("measure", grpc_options=join) as joined:
         assert joined.channel_names == task.channel_names
-    assert task.channel_names  # leaving the second one has not cleared the first
+    assert task.channel_names  # leaving the second task has not cleared the first task
     with refused(DAQmxErrors.INVALID_TASK):
         Task("nothing", grpc_options=join)
 

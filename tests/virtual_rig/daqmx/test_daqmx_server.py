@@ -1,4 +1,4 @@
-"""The simulated DAQ as a server: other services beside it, vanished clients, other processes, and its end."""
+"""The simulated DAQ as a server: shared port, disconnected clients, restarts, and closing."""
 
 import threading
 
@@ -18,7 +18,7 @@ PATIENCE_S = 20.0
 
 
 def restart(daq):
-    """Let the server be gone for a moment; its tasks end with the next call."""
+    """Remove the server for a moment; its tasks end with the next call."""
     gone = ServerGone()
     daq.server.faults.add(gone)
     daq.server.faults.remove(gone)
@@ -29,7 +29,7 @@ def test_tasks_of_a_disconnected_client_remain_until_the_restart(daq):
     leaked.ai_channels.add_ai_voltage_chan("Dev1/ai0")
     leaked.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
     leaked.start()
-    leaked._close_on_exit, leaked._handle = False, None  # the program is gone; its task is not
+    leaked._close_on_exit, leaked._handle = False, None  # the client is gone, but its task remains
     with Task("rival", grpc_options=daq.options) as rival:
         rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
         with pytest.raises(DaqError, match="held by task leaked"):
@@ -75,7 +75,7 @@ def test_a_restart_of_the_server_ends_a_blocked_read(connect):
     daq.task()
     reader.join(PATIENCE_S)
     assert not reader.is_alive()
-    # Whether the restart came during the read or just before it is a race that both outcomes may win.
+    # The restart may come during the read or just before it; both are allowed.
     assert ends[0] in (DAQmxErrors.RUNTIME_ABORTED_ROUTING, DAQmxErrors.INVALID_TASK)
     task._close_on_exit, task._handle = False, None
 

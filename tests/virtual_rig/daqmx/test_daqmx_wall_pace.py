@@ -1,4 +1,4 @@
-"""A simulated DAQ on a clock: samples come in their time, late readers lose them, early ones wait."""
+"""A simulated DAQ in real time: samples become available in time, and late readers lose samples."""
 
 import threading
 
@@ -13,7 +13,7 @@ from vibench.virtual_rig.daqmx.rig import WallPace
 
 
 class HandClock:
-    """A clock that a test moves."""
+    """A clock that the test advances."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -34,7 +34,7 @@ def continuous(daq, rate_hz=1000.0, samples=1000):
 
 
 def wait_for(daq, samples, task):
-    """Wait until the server has caught up with its clock."""
+    """Wait until the server has produced this number of samples."""
     rig = daq.server._rig
     with rig.changed:
         assert rig.changed.wait_for(lambda: rig._acquisitions[0].transferred >= samples, 10.0)
@@ -85,7 +85,7 @@ def test_a_reader_that_is_too_late_gets_a_lost_samples_error(connect, clock):
     clock.now_s += 0.5
     wait_for(daq, 500, task)
     assert len(task.read(READ_ALL_AVAILABLE)) == 500
-    clock.now_s += 10.5  # the buffer has ten seconds
+    clock.now_s += 10.5  # the buffer holds ten seconds
     rig = daq.server._rig
     with rig.changed:
         assert rig.changed.wait_for(lambda: rig._acquisitions[0].failure is not None, 10.0)

@@ -20,7 +20,7 @@ def ramp(samples):
 
 @pytest.fixture
 def pair(daq):
-    """An output that waits for the input's start, and the input wired to it."""
+    """Return an input task, and an output task that is wired to the input and triggered by its start."""
     inputs, outputs = daq.task(), daq.task()
     inputs.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-10, max_val=10)
     outputs.ao_channels.add_ao_voltage_chan(OUTPUT, min_val=-3.5, max_val=3.5)

@@ -1,4 +1,4 @@
-"""A rig that other computers can hear lets nobody in without its token."""
+"""A rig that is reachable from other computers refuses clients without its token."""
 
 import grpc
 import nidaqmx
@@ -22,7 +22,7 @@ def served(pytestconfig):
         yield virtual, virtual.daq_address.replace("0.0.0.0", "127.0.0.1")
 
 
-def connected(virtual, address):
+def remote_rig(virtual, address):
     return changed(virtual.rig, virtual=None, daq={"server": address})
 
 
@@ -50,7 +50,7 @@ def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served):
 def test_a_bench_with_the_token_is_accepted(served, monkeypatch):
     virtual, address = served
     monkeypatch.setenv(TOKEN_VARIABLE, virtual.token)
-    with bench_on(connected(virtual, address)) as bench:
+    with bench_on(remote_rig(virtual, address)) as bench:
         assert bench.digitizer.identity.model == "NI 9234"
     remote = RemoteUsbDevice(address)
     assert remote.identification.product == "AFG1022"

@@ -1,4 +1,4 @@
-"""Whatever stands behind a header of a simulated generator is obeyed or queued as an error."""
+"""Every parameter of every command of a simulated generator is obeyed or queued as an error."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a client sends or asks for without end grows the memory of a simulated generator no further."""
+"""Unlimited messages and requests use limited memory in a simulated generator."""
 
 import numpy as np
 import pytest
@@ -14,20 +14,20 @@ def afg():
     return AFG1022(lambda: 0.0)
 
 
-def asked(generator, message):
+def reply_to(generator, message):
     return generator.execute(message).data
 
 
 def test_a_message_with_too_many_queries_loses_its_answers_with_error_430(afg):
     query = b"DATA:DATA? EMEM"
-    one = len(asked(afg, query))
+    one = len(reply_to(afg, query))
     many = LONGEST_REPLY // one
-    assert len(asked(afg, b";:".join([query] * many))) >= many * (one - 1)
-    assert asked(afg, b";:".join([query] * 20 * many) + b";:FREQ 77") == b""
-    assert asked(afg, b"SYST:ERR?").startswith(b"-430")
-    assert asked(afg, b"SYST:ERR?").startswith(b"0,"), "told once"
-    assert float(asked(afg, b"FREQ?")) == 77
-    assert asked(afg, b"*IDN?").startswith(b"TEKTRONIX")
+    assert len(reply_to(afg, b";:".join([query] * many))) >= many * (one - 1)
+    assert reply_to(afg, b";:".join([query] * 20 * many) + b";:FREQ 77") == b""
+    assert reply_to(afg, b"SYST:ERR?").startswith(b"-430")
+    assert reply_to(afg, b"SYST:ERR?").startswith(b"0,"), "told once"
+    assert float(reply_to(afg, b"FREQ?")) == 77
+    assert reply_to(afg, b"*IDN?").startswith(b"TEKTRONIX")
 
 
 def test_new_waveforms_are_refused_when_the_memory_is_full():
@@ -35,12 +35,12 @@ def test_new_waveforms_are_refused_when_the_memory_is_full():
     codes = np.zeros(400_000, dtype=">i2").tobytes()
     told = []
     for number in range(4):
-        asked(generator, b"DATA:ARB:DAC W%d,#6%d" % (number, len(codes)) + codes)
-        told.append(int(asked(generator, b"SYST:ERR?").split(b",")[0]))
+        reply_to(generator, b"DATA:ARB:DAC W%d,#6%d" % (number, len(codes)) + codes)
+        told.append(int(reply_to(generator, b"SYST:ERR?").split(b",")[0]))
     assert told == [0, 0, -225, -225]
-    asked(generator, b"DATA:VOL:CLE")
-    asked(generator, b"DATA:ARB:DAC W9,#6%d" % len(codes) + codes)
-    assert asked(generator, b"DATA:ATTR:POIN? W9") == b"4.0E+05\n"
+    reply_to(generator, b"DATA:VOL:CLE")
+    reply_to(generator, b"DATA:ARB:DAC W9,#6%d" % len(codes) + codes)
+    assert reply_to(generator, b"DATA:ATTR:POIN? W9") == b"4.0E+05\n"
 
 
 def test_the_longest_supported_waveform_arrives_through_usb():
@@ -50,4 +50,4 @@ def test_the_longest_supported_waveform_arrives_through_usb():
     message = b"DATA:ARB:DAC LONGEST,#7%d" % len(codes) + codes
     header = bytes([1, 1, 254, 0]) + len(message).to_bytes(4, "little") + bytes([1, 0, 0, 0])
     instrument.bulk_out(header + message + bytes(-len(message) % 4))
-    assert float(asked(generator, b"DATA:ATTR:POIN? LONGEST")) == 1_048_576
+    assert float(reply_to(generator, b"DATA:ATTR:POIN? LONGEST")) == 1_048_576

@@ -23,18 +23,18 @@ def mean(shape, start, span):
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @given(start=STARTS, span=SPANS)
-def test_a_mean_of_a_shape_agrees_with_many_values(shape, start, span):
+def test_the_mean_of_a_shape_agrees_with_a_midpoint_sum(shape, start, span):
     points = 20_001
     phase = (start + span * (np.arange(points) + 0.5) / points) % 1.0
     brute = shape.mean(phase, np.zeros(points)).mean()
-    # A midpoint sum misplaces each of the jumps (37 a cycle) by at most half a step of height 2.
+    # A midpoint sum misplaces each of the 37 jumps per cycle by at most half a step of height 2.
     allowed = 2 * 40 * (span + 1) / points
     assert mean(shape, start, span) == pytest.approx(brute, abs=allowed)
 
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @given(start=STARTS, first=SPANS, second=SPANS)
-def test_means_over_two_parts_add_up_to_the_mean_over_both(shape, start, first, second):
+def test_means_over_two_adjacent_parts_add_up_to_the_mean_over_both_parts(shape, start, first, second):
     middle = (start + first) % 1.0
     parts = first * mean(shape, start, first) + second * mean(shape, middle, second)
     assert (first + second) * mean(shape, start, first + second) == pytest.approx(parts, abs=1e-9)

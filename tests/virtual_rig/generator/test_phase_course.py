@@ -13,7 +13,7 @@ FREQUENCIES = st.integers(1, 25_000_000_000_000)
 
 
 def turn(first, second):
-    """Smallest distance between two phases, in cycles."""
+    """Return the smallest distance between two phases [cycles]."""
     return abs((first - second + 0.5) % 1.0 - 0.5)
 
 
@@ -27,7 +27,7 @@ def test_a_day_at_25_mhz_loses_less_than_a_millionth_of_a_cycle(frequency_uhz, t
 def test_a_change_of_frequency_keeps_the_phase(first, second, time_s):
     before = SteadyPhase(first, 0.3)
     after = SteadyPhase.through(second, before.phase(time_s), time_s)
-    # 25 million cycles within a second, in double precision, leave 4e-9 of one.
+    # 25 million cycles within a second have an error of 4e-9 cycles in double precision.
     assert turn(before.phase(time_s), after.phase(time_s)) < 2e-8
 
 

@@ -12,7 +12,7 @@ OPEN = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0.0)
 
 
 class Rig:
-    """A generator whose clock is what has been rendered so far, as in the virtual rig."""
+    """A generator whose clock is the time rendered so far, as in the virtual rig."""
 
     def __init__(self, terminal=OPEN):
         self.time_s = 0.0
@@ -34,7 +34,7 @@ class Rig:
 
 
 def sine_means(amplitude_v, frequency_hz, start_s, count, interval_s=INTERVAL_S, phase=0.0):
-    """Closed form of the mean of a sine over each interval."""
+    """Return the mean of a sine over each interval, in closed form."""
     edges = phase + 2 * np.pi * frequency_hz * (start_s + interval_s * np.arange(count + 1))
     return -amplitude_v * np.diff(np.cos(edges)) / (2 * np.pi * frequency_hz * interval_s)
 
@@ -95,7 +95,7 @@ def test_samples_already_rendered_do_not_change():
     rig.upload([0, 0])
     rig.send("FUNC EMEM;:VOLT 0.002;:VOLT:OFFS 1.001;:OUTP ON")
     rig.render(4)
-    rig.time_s = INTERVAL_S  # a clock that lags behind the rendering
+    rig.time_s = INTERVAL_S  # the clock lags behind the rendered samples
     rig.send("VOLT:OFFS 3.001")
     rig.time_s = 4 * INTERVAL_S
     assert rig.render(3) == pytest.approx([3, 3, 3])
@@ -119,7 +119,7 @@ def test_interval_means_over_whole_waveform_points_are_exact():
     codes = np.random.default_rng(2).integers(0, 16384, 8192)
     rig.upload(codes)
     rig.send("FUNC EMEM;:FREQ 1;:VOLT 2;:PHAS:INIT;:OUTP ON")
-    interval_s = 4 / 8192  # a power of two: no rounding of time
+    interval_s = 4 / 8192  # a power of two avoids rounding of the time
     expected = 2 * codes.reshape(2048, 4).mean(axis=1) / 16383 - 1
     assert np.abs(rig.render(2048, interval_s) - expected).max() < 1e-12
 
@@ -161,7 +161,7 @@ def test_the_terminal_noise_has_the_rms_of_its_density_up_to_nyquist(seed, densi
     rig.send("FUNC DC;:OUTP ON")
     noise = rig.render(20_000)
     expected = density * math.sqrt(1 / (2 * INTERVAL_S))
-    # The rms of 20 000 normal samples scatters by 0.5 %; six of that never happens.
+    # The rms of 20,000 normal samples has a standard deviation of 0.5 %; 3 % is six times that.
     assert noise.std() == pytest.approx(expected, rel=0.03)
 
 

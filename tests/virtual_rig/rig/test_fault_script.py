@@ -1,4 +1,4 @@
-"""A script of faults: each begins at its rig time, heals after its time, and has its effect."""
+"""Fault scripts: each fault begins at its rig time, ends after its duration, and has its effect."""
 
 import itertools
 from pathlib import Path
@@ -46,13 +46,13 @@ def fault(name, at_s, **parameters):
 
 
 def read_for(bench, duration_s):
-    """Read in tenths of a second, as a run does."""
+    """Read blocks of 0.1 s, as a run does."""
     rate_hz = bench.digitizer.sample_rate_hz
     for _ in range(round(duration_s / 0.1)):
         bench.digitizer.read(round(0.1 * rate_hz))
 
 
-class TestTheScript:
+class TestScripts:
     def test_the_shipped_night_script_has_20_faults_that_end_within_8_hours(self):
         faults = load_fault_script(NIGHT).faults
         assert len(faults) == 20
@@ -79,7 +79,7 @@ class TestTheScript:
         with pytest.raises(ConfigurationError, match=rf"faults\.toml.*{said}"):
             load_fault_script(path)
 
-    def test_a_configuration_names_its_script_from_its_own_folder(self, tmp_path):
+    def test_a_fault_script_path_is_relative_to_the_folder_of_its_configuration(self, tmp_path):
         (tmp_path / "bad.toml").write_text(fault("overrun", 1), encoding="utf-8")
         text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
         (tmp_path / "rig.toml").write_text(text + '\nfaults = "bad.toml"\n', encoding="utf-8")
@@ -145,7 +145,7 @@ class TestEffects:
             kept.bench.digitizer.start()
             with pytest.raises(error):
                 read_for(kept.bench, 1.0)
-            kept.reopen()  # in another second of rig time
+            kept.reopen()  # after another second of rig time
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.5)
 
@@ -159,7 +159,7 @@ class TestEffects:
                 except DataLost:
                     failures += 1
                 bench.digitizer.stop()
-        # The first at once, half a second each after it, and nothing else lets the time of this rig pass.
+        # The first retry fails at once; rig time advances only by half a second in each further retry.
         assert failures == 5
 
     def test_a_disk_full_fault_ends_during_retries(self, scripted):
@@ -171,12 +171,12 @@ class TestEffects:
                     meet_trouble()
                 except OSError:
                     refusals += 1
-            assert refusals == 4  # the first at once, a second each after it
+            assert refusals == 4  # the first refusal at once, then one per second of rig time
 
     def test_a_device_used_by_another_program_is_reported_until_it_is_released(self, scripted):
         with ReconnectingBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:
             kept.bench.digitizer.start()
-            read_for(kept.bench, 0.5)  # a task that runs goes on
+            read_for(kept.bench, 0.5)  # a running task continues
             with pytest.raises(InstrumentBusy, match="another program"):
                 kept.reopen()
             kept.reopen()

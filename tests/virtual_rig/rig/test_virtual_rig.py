@@ -1,4 +1,4 @@
-"""The whole virtual rig, used as a stranger's program would: pyvisa sets, nidaqmx reads."""
+"""The virtual rig used by another program: pyvisa sets, nidaqmx reads."""
 
 from contextlib import ExitStack
 
@@ -72,13 +72,13 @@ class Program:
 
 @pytest.fixture
 def switch_on():
-    """Switch a virtual rig on and connect a program to it."""
+    """Return a function that switches a virtual rig on and connects a program to it."""
     with ExitStack() as resources:
 
-        def connected(rig=RIG, **options):
+        def connect(rig=RIG, **options):
             return Program(resources.enter_context(VirtualRig(rig, **options)), resources)
 
-        yield connected
+        yield connect
 
 
 def serials_on_the_bus():
@@ -86,7 +86,7 @@ def serials_on_the_bus():
 
 
 def amplitude(volts):
-    """Of a sine with a whole number of periods in the samples, or nearly so."""
+    """Return the amplitude of a sine with nearly an integer number of periods in the samples."""
     return np.std(volts) * np.sqrt(2)
 
 

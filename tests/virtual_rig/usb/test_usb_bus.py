@@ -1,4 +1,4 @@
-"""The real pyvisa, pyvisa-py and PyUSB against the virtual bus."""
+"""The real pyvisa, pyvisa-py and PyUSB on the virtual USB bus."""
 
 import subprocess
 import sys
@@ -18,8 +18,8 @@ from vibench.virtual_rig.usb.bus import plug_in, unplug
 from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 
-def listing(test):
-    """Let pyvisa-py recommend two packages, and leak a socket, while it looks for network instruments."""
+def ignore_discovery_warnings(test):
+    """Ignore warnings of pyvisa-py about optional packages and an unclosed socket during discovery."""
     for warning in (
         "ignore:TCPIP:UserWarning",
         "ignore:unclosed <socket:ResourceWarning",
@@ -30,7 +30,7 @@ def listing(test):
 
 
 class Plugged:
-    """A generator on the bus and the program's side of it."""
+    """A generator on the bus, and a pyvisa session with it."""
 
     def __init__(self, serial="C010101", quirks=None):
         terminal = Terminal(noise_v_per_rt_hz=0.0)
@@ -53,9 +53,9 @@ def plugged():
     one.close()
 
 
-@listing
+@ignore_discovery_warnings
 def test_a_plain_pyvisa_script_lists_opens_queries_and_uploads(plugged):
-    # Nothing below knows that the instrument is simulated.
+    # The code below does not know that the instrument is simulated.
     rm = pyvisa.ResourceManager("@py")
     (name,) = [name for name in rm.list_resources() if "::1689::851::" in name]
     plugged.instrument.close()
@@ -77,7 +77,7 @@ def test_a_plain_pyvisa_script_lists_opens_queries_and_uploads(plugged):
     assert afg.query("SYSTem:ERRor?").strip() == '0,"No error"'
     volts = plugged.generator.render(0.0, 1e-5, 1000)
     afg.close()
-    # Set for 50 ohm, played into the amplifier's 15 kohm: 4 V peak to peak, not 2.
+    # The setting for 50 ohm gives 4 V peak to peak at the amplifier's 15 kohm input, not 2 V.
     assert np.ptp(volts) == pytest.approx(4.0 * 15_000 / 15_050, rel=1e-3)
 
 
@@ -129,7 +129,7 @@ def test_a_reconnected_cable_works_with_the_open_session(plugged):
     assert plugged.instrument.query("*OPC?").strip() == "1"
 
 
-@listing
+@ignore_discovery_warnings
 def test_several_generators_on_one_bus_are_independent(plugged):
     other = Plugged(serial="C020202")
     try:

@@ -1,4 +1,4 @@
-"""A generator in this process, opened by a program in another one."""
+"""A generator of this process, opened by another program."""
 
 import errno
 from concurrent.futures import ThreadPoolExecutor

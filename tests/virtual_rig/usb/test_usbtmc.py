@@ -12,7 +12,7 @@ CLASS_IN_INTERFACE, CLASS_IN_ENDPOINT = 0xA1, 0xA2
 
 
 class Host:
-    """The host's side of USBTMC, written from the standard and not from the simulation."""
+    """The host's side of USBTMC, written independently from the standard."""
 
     def __init__(self):
         self.generator = AFG1022(lambda: 0.0)
@@ -31,7 +31,7 @@ class Host:
         self.device.bulk_out(self.header(2, length, 0))
 
     def read(self, length=1024, buffer=2048):
-        """One transfer: payload and whether the message ends with it."""
+        """Read one transfer: its payload, and whether the message ends with it."""
         self.request(length)
         transfer = self.device.bulk_in(buffer, TIMEOUT_MS)
         message_id, tag, inverse, _, size, attributes = struct.unpack_from("<BBBBIB", transfer)
@@ -98,7 +98,7 @@ def test_a_late_reply_times_out_and_arrives_at_a_later_read():
     host = Host()
     host.generator.delay_next_reply(5.0)
     host.write(b"*OPC?")
-    for _ in range(2):  # 2 s and 2 s of the 5 s
+    for _ in range(2):  # twice 2 s of the 5 s delay
         with pytest.raises(TimeoutError):
             host.read()
     assert host.read() == (b"1\n", True)

@@ -1,4 +1,4 @@
-"""Sensor dynamics on the grid against the analogue response."""
+"""The discrete filter of a sensor matches its analogue response."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ STEP_S = 1 / 102_400
 
 
 def response(running, frequency_hz):
-    """Complex gain of a filter as it runs."""
+    """Return the complex gain of the running filter."""
     z = np.exp(-2j * np.pi * frequency_hz * STEP_S)
     return np.polyval(running.numerator[::-1], z) / np.polyval(running.denominator[::-1], z)
 

@@ -1,4 +1,4 @@
-"""An analogue output plays what is queued, once, without a gap, and exactly in the mean."""
+"""An analogue output plays queued samples once, without a gap, and with the exact mean."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A coarser grid of the virtual rig: what it costs in accuracy, and which ones are refused."""
+"""Coarser time grids of the virtual rig: their error, and grids that are refused."""
 
 import numpy as np
 import pytest
@@ -23,12 +23,12 @@ def rig_with(sample_rate_hz, **virtual):
     return validated(content, Rig, "rig.toml")
 
 
-def switched_on(grid):
+def new_plant(grid):
     return LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), grid.step_s)
 
 
-def moved(frequency_hz, amplitude_v, grid):
-    """Complex amplitude of base and m0 in the fifth second, shape (2,) [m]."""
+def phasors(frequency_hz, amplitude_v, grid):
+    """Return the complex amplitude of base and m0 in the fifth second, shape (2,) [m]."""
     plant, count = (
         LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), grid.step_s),
         int(grid.rate_hz),
@@ -42,8 +42,8 @@ def moved(frequency_hz, amplitude_v, grid):
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0, WATCHED_HZ])
 def test_the_coarsest_grid_keeps_its_stated_error_of_base_and_specimen(frequency_hz):
-    coarse, fine = (moved(frequency_hz, 5e-3, TimeGrid(rate_hz)) for rate_hz in (COARSE.rate_hz, 409_600.0))
-    # Near 266 Hz the specimen pushes back with its whole resonance.
+    coarse, fine = (phasors(frequency_hz, 5e-3, TimeGrid(rate_hz)) for rate_hz in (COARSE.rate_hz, 409_600.0))
+    # Near 266 Hz the reaction force of the specimen at resonance adds to the error.
     allowed = max(level_error(frequency_hz, COARSE.rate_hz), 6e-3)
     assert abs(coarse[0]) == pytest.approx(abs(fine[0]), rel=allowed)
     assert coarse[1] / coarse[0] == pytest.approx(fine[1] / fine[0], rel=1e-4)
@@ -64,7 +64,7 @@ def test_a_resonance_beyond_the_grid_is_left_out_and_not_folded_into_the_band():
 def test_impacts_are_resolved_inside_a_coarse_step():
     rates = []
     for grid in (TimeGrid(), COARSE):
-        plant = switched_on(grid)
+        plant = new_plant(grid)
         count = 3 * int(grid.rate_hz)
         plant.move(0.75 * np.sin(2 * np.pi * 250 * grid.step_s * np.arange(count)), np.zeros(count))
         rates.append(plant.impacts / 3)
@@ -80,7 +80,7 @@ def test_a_grid_whose_error_is_too_large_is_refused_with_the_error(rate_hz):
         rig_with(5120.0, grid_rate_hz=rate_hz)
 
 
-def test_a_coarse_grid_is_refused_for_a_sample_rate_that_it_does_not_carry():
+def test_a_sample_rate_too_high_for_a_coarse_grid_is_refused():
     with pytest.raises(ConfigurationError, match=r"allows at most 6400 samples a second.*51200"):
         rig_with(51_200.0, grid_rate_hz=COARSE.rate_hz)
     world = World(rig_with(6400.0, grid_rate_hz=COARSE.rate_hz), terminal=None)

@@ -1,4 +1,4 @@
-"""The anti-alias filter: what passes, what does not, and when."""
+"""The anti-alias filter: pass band, alias suppression, and delay."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def means_of_a_sine(cycles_per_step, first, count):
     return -np.diff(np.cos(edges)) / (2 * np.pi * cycles_per_step)
 
 
-def converted(ratio, delay_steps, cycles_per_sample, count=300):
+def decimated_sine(ratio, delay_steps, cycles_per_sample, count=300):
     cycles_per_step = cycles_per_sample / ratio
     history = history_steps(ratio, delay_steps)
     means = means_of_a_sine(cycles_per_step, -history, history + int(np.ceil(count * ratio)))
@@ -33,15 +33,15 @@ def converted(ratio, delay_steps, cycles_per_sample, count=300):
     ],
 )
 def test_a_sine_in_the_pass_band_keeps_amplitude_and_phase(ratio, delay_steps, cycles_per_sample):
-    samples, expected = converted(ratio, delay_steps, cycles_per_sample)
-    tolerance = 1e-4 if cycles_per_sample / ratio < 0.23 else 5e-2  # the droop is corrected that far
+    samples, expected = decimated_sine(ratio, delay_steps, cycles_per_sample)
+    tolerance = 1e-4 if cycles_per_sample / ratio < 0.23 else 5e-2  # the droop is corrected up to here
     assert np.max(np.abs(samples - expected)) < tolerance
 
 
 @pytest.mark.parametrize("ratio", [2.0, 4.0, 62.0, 2.32, 7.9])
 @pytest.mark.parametrize("cycles_per_sample", [0.56, 0.6, 0.75, 0.95])
 def test_aliases_are_suppressed_by_more_than_80_db(ratio, cycles_per_sample):
-    samples, _ = converted(ratio, 0.0, cycles_per_sample)
+    samples, _ = decimated_sine(ratio, 0.0, cycles_per_sample)
     assert 20 * np.log10(np.max(np.abs(samples))) < -80
 
 
@@ -54,7 +54,7 @@ def test_decimation_keeps_a_constant_unchanged(ratio):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("delay_steps", [EARLIEST_STEPS, 0.0, 300.0])
-def test_decimated_samples_need_no_future_and_no_missing_history(ratio, delay_steps):
+def test_decimated_samples_are_complete_without_future_or_missing_input(ratio, delay_steps):
     filtered = decimator(ratio, 1000, delay_steps)
     assert filtered.first_step(0) >= 1000 - history_steps(ratio, delay_steps)
     for sample in range(50):

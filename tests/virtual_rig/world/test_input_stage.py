@@ -1,4 +1,4 @@
-"""What reaches the converter: excitation, coupling, clipping."""
+"""The signal at the converter: sensor supply, coupling, clipping."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
-"""The default rig's levels: at the paper's voltages the specimen does what the paper's did.
+"""Levels of the default rig: at the paper's voltages impacts occur as in the paper.
 
-Gong et al. 2025, section 5: white noise from 0.05 to 10 V. The setting is taken as peak to peak, the
-peak of noise as all of it. The demo's tests look at the resonances and at dwells.
+Gong et al. 2025, section 5: white noise from 0.05 to 10 V. The setting is taken as the peak-to-peak value,
+also of noise. Tests of the demo check the resonances and dwells.
 """
 
 import numpy as np
@@ -18,16 +18,16 @@ BAND_HZ = np.arange(50, 601)
 WEAK_VPP, STRONG_VPP = 0.05, 10.0
 
 
-def switched_on():
+def new_plant():
     return LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), STEP_S)
 
 
-def moved(plant, drive):
+def motion_of(plant, drive):
     return plant.move(drive, np.zeros(len(drive)), len(drive))
 
 
 def noise(amplitude_vpp, realisation):
-    """One second of flat random-phase noise whose peak is the full setting, lines every hertz."""
+    """Return one second of random-phase noise with lines every hertz; its peak is the full setting."""
     lines = np.zeros(SECOND // 2 + 1, dtype=complex)
     lines[BAND_HZ] = np.exp(2j * np.pi * np.random.default_rng(realisation).random(len(BAND_HZ)))
     drive = np.fft.irfft(lines)
@@ -47,9 +47,9 @@ def test_the_strongest_sine_stays_within_the_shakers_limits_from_fifty_hertz_up(
 
 
 def test_weak_noise_causes_no_impact_and_strong_noise_hundreds():
-    weak, strong = switched_on(), switched_on()
-    truth = moved(weak, noise(WEAK_VPP, 1)).ends
-    moved(strong, noise(STRONG_VPP, 1))
+    weak, strong = new_plant(), new_plant()
+    truth = motion_of(weak, noise(WEAK_VPP, 1)).ends
+    motion_of(strong, noise(STRONG_VPP, 1))
     p = truth[:, MOTION_COLUMNS.index("y")] - truth[:, MOTION_COLUMNS.index("z")]
     assert weak.impacts == 0
     assert np.max(np.abs(p)) < 0.3 * RIG.specimen.gap_m

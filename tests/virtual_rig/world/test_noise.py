@@ -1,4 +1,4 @@
-"""Noise by position: the same whatever way it is asked for."""
+"""Noise is determined by its position, for any block size."""
 
 import numpy as np
 import pytest

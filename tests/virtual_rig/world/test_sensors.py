@@ -1,4 +1,4 @@
-"""The vibrometer and the accelerometer: scale, noise, full scale, dropouts."""
+"""Vibrometer and accelerometer: scale, noise, full scale, drop-outs."""
 
 import numpy as np
 import pytest

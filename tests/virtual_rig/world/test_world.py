@@ -1,4 +1,4 @@
-"""The analogue world through its sockets: the same for any block size, right in amplitude and time."""
+"""The analogue world at its inputs and outputs: independent of block size, right in amplitude and time."""
 
 import threading
 
@@ -38,7 +38,7 @@ DRIVE, AMPLIFIER, BASE, LASER = range(4)
 
 
 class Tone:
-    """A terminal that plays a sine, exact in the mean over every interval, whatever the blocks."""
+    """A terminal that plays a sine, exact in the mean over every interval for any block size."""
 
     def __init__(self, frequency_hz, amplitude_v):
         self.omega, self.amplitude_v = 2 * np.pi * frequency_hz, amplitude_v
@@ -57,7 +57,7 @@ class Silence:
 
 
 def phasor(volts, frequency_hz, sample_rate_hz, first_sample=0):
-    """Complex amplitude of a sine by least squares; time zero is the beginning of the conversion."""
+    """Return the complex amplitude of a sine by least squares; time begins with the conversion."""
     time_s = (first_sample + np.arange(len(volts)) + 1 - GROUP_DELAY_SAMPLES) / sample_rate_hz
     angle = 2 * np.pi * frequency_hz * time_s
     matrix = np.column_stack([np.sin(angle), np.cos(angle), np.ones_like(angle)])
@@ -85,7 +85,7 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_states(frequency
     delay = np.exp(-s * RIG.vibrometer.delay_s)
     velocity = laser / delay * RIG.vibrometer.units_per_volt("m s-1")
     moved = base_transmissibility(specimen_of(QUIET), frequency_hz)[0, 0]
-    # The coupling capacitor of the accelerometer's channel leads by its cut over the frequency.
+    # The coupling capacitor of the accelerometer's channel causes a phase lead of cut-off over frequency.
     coupling = s / (s + 2 * np.pi * 0.5)
     resonance = 1 / (1 - (frequency_hz / RIG.accelerometer.resonance_hz) ** 2)
     assert acceleration / coupling / resonance == pytest.approx(moved_table, rel=2e-3)
@@ -262,7 +262,7 @@ def test_threads_sharing_a_simulated_rig_read_the_same_samples():
     assert np.array_equal(results[1], alone)
 
 
-def test_a_conversion_can_be_closed_twice_before_the_rig_advances():
+def test_closing_a_conversion_twice_is_allowed():
     world = World(QUIET, Silence())
     sampler = world.sample(INPUTS, 51_200.0)
     sampler.close()
@@ -272,7 +272,7 @@ def test_a_conversion_can_be_closed_twice_before_the_rig_advances():
 
 
 class Broken:
-    """A terminal whose voltage is not a number from half a second on."""
+    """A terminal whose voltage is NaN after half a second."""
 
     def render(self, start_s, interval_s, count):
         return np.where(start_s + interval_s * np.arange(count) < 0.5, 0.0, np.nan)
