@@ -1,4 +1,4 @@
-"""Run the command line in separate processes, or in this one where that makes no difference."""
+"""Run the command line in separate processes, or in this process where that makes no difference."""
 
 import json
 import os
@@ -21,7 +21,7 @@ Vibench = Callable[..., "subprocess.CompletedProcess[str]"]
 
 @pytest.fixture(scope="session")
 def vibench() -> Vibench:
-    """Run ``vibench`` with arguments in a folder, and wait for its end."""
+    """Return a function that runs ``vibench`` in a folder, in a new process."""
 
     def run(*arguments, cwd, timeout_s=110, environment=None):
         return subprocess.run(
@@ -39,7 +39,7 @@ def vibench() -> Vibench:
 
 @pytest.fixture(scope="session")
 def vibench_here() -> Vibench:
-    """Run ``vibench`` as `vibench` does, without the seconds in which a new process imports."""
+    """Return a function that runs ``vibench`` in this process, without the seconds that imports take."""
 
     def run(*arguments, cwd, environment=None):
         words = ["vibench", *map(str, arguments)]
@@ -48,7 +48,7 @@ def vibench_here() -> Vibench:
             patch.setattr(sys, "argv", words)
             for name, value in {"COLUMNS": "200", **(environment or {})}.items():
                 patch.setenv(name, value)
-            # A command with --json leaves the console on the standard error of its process.
+            # A command with --json sets the console to standard error for its whole process.
             patch.setattr(console, "_file", None)
             with pytest.raises(SystemExit) as ended:
                 main()
@@ -59,7 +59,7 @@ def vibench_here() -> Vibench:
 
 @pytest.fixture
 def answered(vibench_here, tmp_path):
-    """Run a command that succeeds in the test's folder; return its JSON, or what it printed without it."""
+    """Run a command that must succeed in the test's folder; return its JSON, or its standard output."""
 
     def run(*arguments):
         ran = vibench_here(*arguments, cwd=tmp_path)
@@ -71,12 +71,12 @@ def answered(vibench_here, tmp_path):
 
 @pytest.fixture
 def refusal(vibench_here, tmp_path):
-    """Run a command that is refused in the test's folder; return its one sentence."""
+    """Run a command that must be refused in the test's folder; return its one sentence."""
 
     def run(*arguments):
         ran = vibench_here(*arguments, cwd=tmp_path)
         assert ran.returncode == 1
-        # `measure` prints first how long the campaign takes.
+        # `measure` first prints the duration of the campaign.
         assert ran.stdout == "" or (arguments[0] == "measure" and "--estimate" not in arguments)
         assert "Traceback" not in ran.stderr
         (sentence,) = [line for line in ran.stderr.splitlines() if line.startswith("error: ")]

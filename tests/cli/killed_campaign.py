@@ -22,7 +22,7 @@ CAMPAIGN = "points"
 
 
 def slow_rig(folder: Path) -> Path:
-    """The virtual rig with a slow converter: short points are quick to make."""
+    """Write a virtual rig with a low sample rate, so that short points are quick."""
     text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
     path = folder / "slow_rig.toml"
     path.write_text(text.replace("sample_rate_hz = 51200", "sample_rate_hz = 5120"), encoding="utf-8")
@@ -30,7 +30,7 @@ def slow_rig(folder: Path) -> Path:
 
 
 def short_points(folder: Path, count: int) -> Path:
-    """A campaign of ``count`` dwells too weak to collide."""
+    """Write a campaign of ``count`` dwells that are too weak for contact."""
     path = folder / "points.toml"
     path.write_text(
         f"""
@@ -50,7 +50,7 @@ excitation = {{ kind = "dwell", settle_s = 0.3, duration_s = 0.1 }}
 
 
 def branches(folder: Path) -> Path:
-    """A campaign up a range of frequencies with two motions each; at 190 Hz also without the way there."""
+    """Write a campaign through frequencies with two motions each; 190 Hz is also measured without lead-in."""
     path = folder / "branches.toml"
     path.write_text(
         """
@@ -79,19 +79,19 @@ measurement = { excitation = { kind = "dwell" } }
 
 
 def command(plan: Path, bench: Path, out: Path, *options: str) -> list[str]:
-    """``vibench measure`` as a process of its own."""
+    """Return the command of ``vibench measure`` in a new process."""
     paths = [str(plan), "--bench", str(bench), "--out", str(out)]
     return [sys.executable, "-m", "vibench.cli", "measure", *paths, *options]
 
 
-def killed(arguments: list[str], out: Path, points: int, chance: random.Random) -> int:
-    """Start a campaign, and kill it without a word at a random moment after ``points`` more are done.
+def kill_at(arguments: list[str], out: Path, points: int, chance: random.Random) -> int:
+    """Start a campaign, and kill it at a random moment after ``points`` more are done.
 
-    Returns how many were done then.
+    Return how many points were done then.
     """
-    before = told(out)
+    before = logged_points(out)
     with subprocess.Popen(arguments, env=ENVIRONMENT, stdout=subprocess.DEVNULL) as process:
-        while told(out) < before + points and process.poll() is None:
+        while logged_points(out) < before + points and process.poll() is None:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(LOOK_S)
         with suppress(subprocess.TimeoutExpired):
@@ -99,23 +99,23 @@ def killed(arguments: list[str], out: Path, points: int, chance: random.Random) 
         process.kill()
         process.wait()
         assert process.returncode == -signal.SIGKILL
-    return done(out)
+    return done_points(out)
 
 
-def told(out: Path) -> int:
-    """How many points the log calls done: cheap enough to be asked all the time."""
+def logged_points(out: Path) -> int:
+    """Return the number of points that the log lists as done, which is fast enough for polling."""
     log = out / f"{CAMPAIGN}.log.jsonl"
     return log.read_bytes().count(b'"point_done"') if log.exists() else 0
 
 
-def done(out: Path) -> int:
-    """How many points the journal calls done."""
+def done_points(out: Path) -> int:
+    """Return the number of points that the journal lists as done."""
     points = read_journal(journal_path(out, CAMPAIGN))
     return sum(point.state is JournalPointState.DONE for point in points)
 
 
 def amplitudes(out: Path) -> dict[str, float]:
-    """Velocity of m0 at every point [m/s]; each has one complete recording, and only one."""
+    """Return the velocity of m0 at every point [m/s]; each point must have exactly one complete recording."""
     found: dict[str, float] = {}
     for path in sorted((*out.glob("*.h5"), *out.glob("*.h5.part"))):
         with open_recording(path) as recording:

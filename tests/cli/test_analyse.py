@@ -19,7 +19,7 @@ PATIENCE_S = 60.0
 
 @pytest.fixture(scope="module")
 def noise():
-    """Streamed noise whose transmission is 2 at every frequency: plan, base, velocity, parts."""
+    """Return streamed noise with a transmissibility of 2 at every frequency: plan, base, velocity, parts."""
     plan = StreamedNoise(
         amplitude_vpp=0.1, band_start_hz=50, band_stop_hz=600, settle_s=0, duration_s=SECONDS, seed=1
     )
@@ -32,8 +32,8 @@ def good(noise, tmp_path_factory):
     return synthetic.write_recording(tmp_path_factory.mktemp("good"), *noise, name="good")
 
 
-def changed(good, folder, change):
-    """Copy a recording and change something inside, as if another version had written it: without a seal."""
+def changed_copy(good, folder, change):
+    """Copy a recording without its seal and change it, as another version could have written it."""
     path = folder / "changed.h5"
     shutil.copy(good, path)
     with h5py.File(path, "r+") as file:
@@ -111,26 +111,26 @@ def test_contradictory_options_are_refused_in_one_sentence(vibench_here, good, t
 
 
 def sentence(path):
-    """What the analysis says of a recording that it refuses."""
+    """Return the sentence with which the analysis refuses a recording."""
     (failure,) = analyse_files([path], "one", Simulation.LEFT_OUT).failures
     assert failure.what == "analysis"
     return failure.sentence
 
 
-def newer(file):
+def set_newer_version(file):
     file.attrs["format_version"] = 99
 
 
-def renamed(file):
+def rename_channel(file):
     file.move("m0_velocity", "laser")
     file.attrs["roles"] = np.bytes_(b"drive_voltage base_acceleration laser")
 
 
-def without_scale(file):
+def remove_scale(file):
     file["m0_velocity"].attrs["physical_per_volt"] = np.nan
 
 
-def without_plan(file):
+def remove_plan(file):
     del file["configuration/plan_json"]
     file["configuration/plan_json"] = np.bytes_(b"{}")
 
@@ -138,20 +138,20 @@ def without_plan(file):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (newer, "format version 99; this vibench reads version 1. Update"),
+        (set_newer_version, "format version 99; this vibench reads version 1. Update"),
         (
-            renamed,
+            rename_channel,
             "no channel measures the motion of m0: the recording has drive_voltage, base_acceleration, laser",
         ),
         (
-            without_scale,
+            remove_scale,
             "physical_per_volt of the channel 'm0_velocity': input should be a finite number; it is 'nan'",
         ),
-        (without_plan, "this version of vibench cannot read the plan in changed.h5"),
+        (remove_plan, "this version of vibench cannot read the plan in changed.h5"),
     ],
 )
 def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, change, said):
-    assert said in sentence(changed(good, tmp_path, change))
+    assert said in sentence(changed_copy(good, tmp_path, change))
 
 
 def test_dead_clipped_and_lost_channels_are_named_in_a_sentence(noise, tmp_path):
@@ -181,7 +181,7 @@ def test_a_sine_at_full_scale_is_analysed(tmp_path):
 
 
 def test_warnings_about_a_result_are_printed(vibench_here, tmp_path):
-    """It stood in the report alone."""
+    """Warnings are printed, and not only part of the report."""
     base = synthetic.sine(4.0, 260.0, 5e-7)
     velocity = 0.1 * np.sin(2 * np.pi * 260.0 * synthetic.times(4.0))
     plan = Dwell(amplitude_vpp=0.01, frequency_hz=262.0, settle_s=2.0, duration_s=2.0)

@@ -1,4 +1,4 @@
-"""`vibench analyse --fit`: the specimen that was measured, with intervals, as JSON and in words."""
+"""`vibench analyse --fit`: the identified specimen with intervals, as JSON and in words."""
 
 import json
 
@@ -15,7 +15,7 @@ NOISE = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "pe
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """One recording of weak noise, of a specimen with more damping than the bench says."""
+    """Return a folder with a recording of weak noise, of a specimen with more damping than configured."""
     place, rng = tmp_path_factory.mktemp("fit"), np.random.default_rng(4)
     lines = np.arange(NOISE["band_start_hz"], NOISE["band_stop_hz"] + 1, NOISE["repetition_hz"])
     motions = [synthetic.multisine(2.5, lines, 1e-9, number) for number in range(2)]
@@ -56,7 +56,7 @@ def test_a_fit_is_printed_in_words_and_saved_as_a_specimen_file(vibench_here, fo
     assert "Fitted c / k = 3" in result.stdout
     assert "described: 20.0" in result.stdout
     written = tmp_path / "report" / "specimen.toml"
-    # A terminal of this width may break the path anywhere.
+    # A narrow terminal may break the path anywhere.
     assert str(written) in result.stdout.replace("\n", "")
     fitted = load_specimen(written).specimen()
     assert fitted.dampings[0] / fitted.stiffnesses[0] == pytest.approx(DAMPING_S, rel=0.03)
@@ -87,7 +87,7 @@ settle_s = 1.5
 
 @pytest.mark.parametrize("level_vpp", [0.3, 1.0])
 def test_noise_with_collisions_is_refused(vibench_here, tmp_path, level_vpp):
-    """At 1 Vpp the motion is chaotic: realisations scatter no more than periods."""
+    """At 1 Vpp the motion is chaotic: realisations scatter no more than periods do."""
     (tmp_path / "levels.toml").write_text(LEVELS.format(level_vpp))
     measured = vibench_here("measure", "levels.toml", "--out", "levels", "--check", "waived", cwd=tmp_path)
     assert measured.returncode == 0, measured.stderr

@@ -1,4 +1,4 @@
-"""`vibench analyse --hidden`: hidden motion in numbers, figures and report, or why it is absent."""
+"""`vibench analyse --hidden`: hidden motion in numbers, figures and report, or the reason for its absence."""
 
 import csv
 import json
@@ -15,7 +15,7 @@ GAP_M = 45e-6
 
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory):
-    """A colliding dwell of the virtual world, recorded."""
+    """Return a recording of a dwell with impacts in the simulated world."""
     return world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
 
 

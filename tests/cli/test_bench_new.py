@@ -1,4 +1,4 @@
-"""`vibench bench new`: the configuration and page that it writes, and what it refuses."""
+"""`vibench bench new`: the configuration and the page that it writes, and refusals."""
 
 import re
 import shlex
@@ -32,13 +32,13 @@ current_limit_a = 1.8
 """
 
 
-def seen(*resources, device="cDAQ9Mod2", product="NI 9234"):
+def found_instruments(*resources, device="cDAQ9Mod2", product="NI 9234"):
     inputs = tuple(f"{device}/ai{number}" for number in range(4))
     return InstrumentList(resources, (FoundDevice(device, product, "1", inputs, ()),), ())
 
 
-def new(folder, name="mine.toml", template=VIRTUAL, answers=ANSWERS):
-    """Begin a configuration in a folder, with these answers in a file there, or with what is there."""
+def begin_configuration(folder, name="mine.toml", template=VIRTUAL, answers=ANSWERS):
+    """Begin a configuration in a folder, with these answers or an existing file of answers."""
     path = folder / "answers.toml"
     if answers is not None:
         path.write_text(answers)
@@ -48,7 +48,7 @@ def new(folder, name="mine.toml", template=VIRTUAL, answers=ANSWERS):
 
 @pytest.mark.thorough
 def test_a_bench_configuration_is_created_checked_and_documented(tmp_path, monkeypatch):
-    done = new(tmp_path)
+    done = begin_configuration(tmp_path)
     assert done.exit_code == 0, done.output
     rig = load_rig(tmp_path / "mine.toml")
     assert (rig.name, rig.amplifier.serial) == ("bench by the window", "12")
@@ -61,39 +61,39 @@ def test_a_bench_configuration_is_created_checked_and_documented(tmp_path, monke
     (told,) = re.findall("^    vibench (.*)", page, re.MULTILINE)
     monkeypatch.chdir(tmp_path)
     assert CliRunner().invoke(app, [*shlex.split(told), "--estimate"]).exit_code == 0
-    again = new(tmp_path)
+    again = begin_configuration(tmp_path)
     assert again.exit_code == 1
     assert "exists already" in str(again.exception)
 
 
 @pytest.mark.thorough
 def test_unconfirmed_wiring_ends_the_procedure_before_output(tmp_path):
-    done = new(tmp_path, answers='operator = "A. Student"')
+    done = begin_configuration(tmp_path, answers='operator = "A. Student"')
     assert done.exit_code == 1
     assert "Nothing was played" in str(done.exception)
     assert not list(tmp_path.glob("*.md"))
     assert f"--from {tmp_path / 'mine.toml'}" in str(done.exception)
-    again = new(tmp_path, "again.toml", tmp_path / "mine.toml")
+    again = begin_configuration(tmp_path, "again.toml", tmp_path / "mine.toml")
     assert again.exit_code == 0, again.output
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("wired", ["false", '"no"', '" No "', '""'])
 def test_a_missing_wire_ends_the_procedure(tmp_path, wired):
-    done = new(tmp_path, answers=f"wired = {wired}")
+    done = begin_configuration(tmp_path, answers=f"wired = {wired}")
     assert done.exit_code == 1
     assert "Nothing was played" in str(done.exception)
 
 
 def test_a_draft_file_beside_the_new_configuration_is_kept(tmp_path):
     (tmp_path / "lab.toml.draft").write_text("mine")
-    configure(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+    configure(LAB, tmp_path / "lab.toml", found_instruments(), lambda *_: "", "note")
     assert (tmp_path / "lab.toml.draft").read_text() == "mine"
 
 
 @pytest.mark.parametrize(("answer", "gain_db"), [(".5", 0.5), ("010", 10.0), ("1e1", 10.0), ("-3", -3.0)])
 def test_common_number_formats_are_accepted(tmp_path, answer, gain_db):
-    rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": [answer]})
+    rig, wrong = answer_repeatedly(tmp_path, {"amplifier.gain_db": [answer]})
     assert (rig.amplifier.gain_db, wrong) == (gain_db, [])
 
 
@@ -101,7 +101,7 @@ SENSITIVITY = "accelerometer.sensitivity_v_per_m_per_s2"
 
 
 def test_a_sensitivity_is_accepted_in_the_unit_of_its_certificate(tmp_path):
-    rig, wrong = asked_of_a_person(tmp_path, {SENSITIVITY: ["10 pC/g", "10 mV/m/s2", "much", "100 mV/g"]})
+    rig, wrong = answer_repeatedly(tmp_path, {SENSITIVITY: ["10 pC/g", "10 mV/m/s2", "much", "100 mV/g"]})
     assert rig.accelerometer.sensitivity_v_per_m_per_s2 == pytest.approx(0.1 / 9.80665)
     for part, told in zip(("charge", "two ways", "not a number"), wrong, strict=True):
         assert part in told
@@ -115,7 +115,7 @@ def test_a_plain_number_replaces_a_sensitivity_with_unit(tmp_path):
 
 @pytest.mark.parametrize("name", ["B\udce9nch", "a\x7fb", "two\nlines"])
 def test_a_question_is_repeated_after_input_that_cannot_be_decoded(tmp_path, name):
-    rig, wrong = asked_of_a_person(tmp_path, {"name": [name, "Bénch"]})
+    rig, wrong = answer_repeatedly(tmp_path, {"name": [name, "Bénch"]})
     assert rig.name == "Bénch"
     assert "is not printable" in wrong[0]
 
@@ -124,13 +124,13 @@ def test_a_question_is_repeated_after_input_that_cannot_be_decoded(tmp_path, nam
 def test_an_answers_file_that_cannot_be_used_gives_a_one_sentence_error(tmp_path, content):
     if content is not None:
         (tmp_path / "answers.toml").write_bytes(content)
-    done = new(tmp_path, answers=None)
-    assert isinstance(done.exception, (ConfigurationError, UnreadableTomlError))  # told in a sentence by main
+    done = begin_configuration(tmp_path, answers=None)
+    assert isinstance(done.exception, (ConfigurationError, UnreadableTomlError))
     assert not list(tmp_path.glob("mine*"))
 
 
 def test_ctrl_c_at_a_wiring_question_ends_the_procedure(monkeypatch):
-    """The handler of a check would only ask it to stop, and the question would go on waiting."""
+    """The signal handler of a check would only request a stop, while the question would go on waiting."""
     monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
     switch = StopSwitch()
     with (
@@ -142,42 +142,42 @@ def test_ctrl_c_at_a_wiring_question_ends_the_procedure(monkeypatch):
 
 
 def test_ctrl_c_at_a_question_stops_without_writing(tmp_path, monkeypatch):
-    def stopped(*_given, **_named):
+    def abort(*_given, **_named):
         raise typer.Abort
 
-    monkeypatch.setattr("typer.prompt", stopped)
+    monkeypatch.setattr("typer.prompt", abort)
     with pytest.raises(CheckStopped, match="nothing was written"):
-        _configure(LAB, tmp_path / "lab.toml", seen(), "note")
+        _configure(LAB, tmp_path / "lab.toml", found_instruments(), "note")
     with pytest.raises(CheckStopped, match="nothing was written"):
         _operator_at_terminal()
     assert not list(tmp_path.iterdir())
 
 
 def test_ctrl_c_at_a_knob_stops_before_output(monkeypatch):
-    def stopped(_question):
+    def abort(_question):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", stopped)
+    monkeypatch.setattr("builtins.input", abort)
     with pytest.raises(CheckStopped, match="nothing was energised"):
         confirm_at_terminal(())
 
 
 def test_a_question_is_repeated_after_a_number_too_large_to_use(tmp_path):
-    rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": ["1e300", "3"]})
+    rig, wrong = answer_repeatedly(tmp_path, {"amplifier.gain_db": ["1e300", "3"]})
     assert rig.amplifier.gain_db == 3.0
     assert "amplifier.gain_db" in wrong[0]
 
 
-def test_a_partly_written_configuration_is_removed(tmp_path):
-    """A full disk; begin again would find the name taken."""
+def test_a_configuration_that_cannot_be_written_completely_is_removed(tmp_path):
+    """On a full disk; otherwise a second attempt would find the name in use."""
     with full_disk(), pytest.raises(ConfigurationError, match="File too large"):
-        configure(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+        configure(LAB, tmp_path / "lab.toml", found_instruments(), lambda *_: "", "note")
     assert not list(tmp_path.iterdir())
 
 
 def test_a_target_that_is_not_a_folder_is_reported_before_any_question(tmp_path):
-    done = new(tmp_path, "no/mine.toml")
+    done = begin_configuration(tmp_path, "no/mine.toml")
     assert isinstance(done.exception, ConfigurationError)
     assert "is not a folder" in str(done.exception)
 
@@ -189,7 +189,7 @@ def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
     )
     scripted = VIRTUAL.read_text() + f"faults = '{tmp_path / 'faults.toml'}'\n"
     (tmp_path / "template.toml").write_text(scripted)
-    done = new(tmp_path, template=tmp_path / "template.toml")
+    done = begin_configuration(tmp_path, template=tmp_path / "template.toml")
     page = (tmp_path / "mine.first_day.md").read_text()
     assert done.exit_code == 1
     assert "set the gain of the Bruel & Kjaer 2706 to 10 dB" in page
@@ -198,7 +198,7 @@ def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
 
 
 def test_a_single_found_instrument_is_the_default_answer(tmp_path):
-    only = seen("USB0::2391::11271::MY5::0::INSTR")
+    only = found_instruments("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
     assert rig.generator.driver == "keysight33500b"
@@ -219,17 +219,17 @@ def test_an_impossible_bench_value_is_refused_without_writing(tmp_path, key, ans
         return answer if question.key == key else ""
 
     with pytest.raises(ConfigurationError, match=said):
-        configure(LAB, tmp_path / "lab.toml", seen(), ask, "note")
+        configure(LAB, tmp_path / "lab.toml", found_instruments(), ask, "note")
     assert not list(tmp_path.iterdir())
 
 
-def asked_of_a_person(tmp_path, given):
-    """Answer each question by its list of answers, one after the other, then as it is; hear what is wrong."""
+def answer_repeatedly(tmp_path, given):
+    """Answer each question from its list, then with the default; return the rig and the errors."""
     wrong = []
     rig = configure(
         LAB,
         tmp_path / "lab.toml",
-        seen(),
+        found_instruments(),
         lambda question, _choices, _held: given[question.key].pop(0) if given.get(question.key) else "",
         "note",
         refuse=lambda error: wrong.append(str(error)),
@@ -238,7 +238,7 @@ def asked_of_a_person(tmp_path, given):
 
 
 def test_a_question_is_repeated_immediately_after_a_wrong_answer(tmp_path):
-    rig, wrong = asked_of_a_person(
+    rig, wrong = answer_repeatedly(
         tmp_path, {"amplifier.gain_db": ["ten", "700", "12"], "generator.settle_s": ["-1", "0.2"]}
     )
     assert (rig.amplifier.gain_db, rig.generator.settle_s) == (12.0, 0.2)
@@ -250,7 +250,7 @@ def test_a_question_is_repeated_immediately_after_a_wrong_answer(tmp_path):
 
 def test_only_questions_with_contradictory_answers_are_repeated(tmp_path):
     place = "daq.channels.{}.physical".format
-    rig, wrong = asked_of_a_person(
+    rig, wrong = answer_repeatedly(
         tmp_path,
         {place("m0_velocity"): ["ai1", "ai3"], place("amplifier_voltage"): ["ai1"], "name": ["my bench"]},
     )
@@ -266,7 +266,7 @@ def test_a_broken_third_party_package_does_not_end_the_procedure(tmp_path, monke
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
     (metadata / "entry_points.txt").write_text("[vibench.generators]\nbroken = no_such_module:Driver\n")
     monkeypatch.syspath_prepend(tmp_path)
-    only = seen("USB0::2391::11271::MY5::0::INSTR")
+    only = found_instruments("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.driver == "keysight33500b"
 

@@ -1,4 +1,4 @@
-"""Campaigns on the command line: estimates, the catalogue, and who is told, as JSON and as sentences."""
+"""Campaigns on the command line: estimates, catalogue and notifications, as JSON and in sentences."""
 
 import json
 import sys
@@ -25,7 +25,7 @@ def test_an_estimate_is_one_json_document_and_writes_no_file(answered, tmp_path)
 
 
 @pytest.mark.thorough
-def test_a_campaign_is_catalogued_and_its_end_notified(vibench, tmp_path):
+def test_a_campaign_is_logged_catalogued_and_its_end_notified(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
     measure = ("measure", plan, "--bench", bench, "--out", "out", "--notify", keep)
@@ -76,7 +76,7 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     assert rest == "Silence between recordings: 0:02:00 (included)"
     assert second == "Lead-ins to points of chains: 0:01:00 (included)"
     assert third.startswith("The disk may be full before the end")
-    # Feedback ends when it has found what it searches for.
+    # A feedback measurement ends when its result is found.
     searching = estimate_text(replace(expected, searching=1))
     assert searching.startswith("3 recordings (2 kept), at most 1:02:03 (h:min:s) of rig time")
 
@@ -92,7 +92,7 @@ def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(refusal, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_an_estimate_reports_a_missing_output_of_the_bench(refusal, tmp_path):
+def test_an_estimate_reports_a_missing_real_time_controller_of_the_bench(refusal, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     said = refusal("measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate")
     assert "branch_3um needs a real-time controller, but this bench has none" in said

@@ -49,7 +49,7 @@ def test_a_steady_chain_gives_results_per_cell_and_a_file(tmp_path):
     assert "ever overwritten" in str(run(*options, "--out", tmp_path / "out").exception)
 
 
-def test_a_swept_chain_shows_its_gap_and_follows_the_transmission_without_contact():
+def test_a_swept_chain_shows_its_band_gap_and_matches_the_linear_transmission():
     swept = ("--amplitude", 1e-7, "--duration", 4)
     for ends in ("300:600", "600:300"):
         (point,) = answer("--cells", 4, *swept, "--frequency", ends)["runs"]
@@ -61,13 +61,13 @@ def test_a_swept_chain_shows_its_gap_and_follows_the_transmission_without_contac
         assert last[np.argmin(np.abs(over_hz - 405.0))] < 1e-3 * last[np.argmin(np.abs(over_hz - 520.0))]
 
 
-def test_chain_lengths_and_alternating_cells_can_be_studied():
+def test_several_chain_lengths_and_alternating_cells_can_be_computed():
     options = ("--amplitude", 20e-6, "--frequency", 220, "--duration", 0.1, "--settle", 0, "--gap", 20e-6)
     found = answer("--cells", "1,2,3", "--specimen", "gong2025", "--specimen", "heavy", *options)
     assert [each["cells"] for each in found["runs"]] == [1, 2, 3]
     assert len(found["bands_hz"]) == 6
     alone = steady_response(gong2025(gap_m=20e-6), Harmonic(220.0, 20e-6), "standard", 0.1, 0.1)
-    # Chaos: another code of the same motion is another draw.
+    # In chaos the same motion, computed differently, is another random sample.
     assert found["runs"][0]["transmission"][0][0] == pytest.approx(alone.response_ii, rel=0.2)
     assert found["options"]["others"][0]["name"] == "heavy"
 
@@ -92,7 +92,7 @@ def test_a_chain_run_too_short_for_an_error_reports_error_not_known():
     assert not re.search(r"\binf\b", found.output)
 
 
-def test_an_exponent_is_reported_with_its_error():
+def test_the_exponent_of_a_chain_is_reported():
     result = run(
         "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,
         "--exponent", 0.4,

@@ -1,4 +1,4 @@
-"""The command line as a user meets it: real processes, one sentence for every wrong input, exit codes."""
+"""The command line as a user runs it: real processes, one-sentence errors, exit codes."""
 
 import contextlib
 import json
@@ -143,7 +143,7 @@ def committed(part):
     try:
         with open_recording(part) as recording:
             return recording.samples
-    except OSError:  # not written far enough to be opened
+    except OSError:  # the file is not complete enough to be opened
         return 0
 
 
@@ -216,7 +216,7 @@ def test_an_invalid_option_value_is_refused_and_quoted(vibench_here, tmp_path, w
     ],
 )
 def test_empty_paths_and_names_are_refused(vibench_here, tmp_path, words, place):
-    """An empty variable of the shell filled the folder that the user stood in."""
+    """An empty shell variable would otherwise name the current folder."""
     result = vibench_here(*words, cwd=tmp_path)
     assert result.returncode == 1
     assert f"{place} was given as '', which is empty" in " ".join(result.stderr.replace("│", " ").split())
@@ -278,7 +278,7 @@ def test_names_that_look_like_markup_are_printed_unchanged(vibench_here, tmp_pat
     ],
 )
 def test_every_command_warns_if_micrometres_were_typed_as_metres(vibench_here, tmp_path, words):
-    """What would compute for minutes is refused here, after the doubt, by where its answer was to go."""
+    """The invalid output path stops the command after the warning, before a long computation."""
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     given = ("--amplitude", "5", "--gap", "45", "--out", "file")
     said = vibench_here(*words, *given, cwd=tmp_path).stderr

@@ -1,4 +1,4 @@
-"""The main job as a newcomer runs it, held against what the paper reports (Gong et al. 2025, section 5)."""
+"""The demo as a new user runs it, compared with the paper (Gong et al. 2025, section 5)."""
 
 import json
 
@@ -80,9 +80,9 @@ def test_pyuff_reads_response_coherence_and_densities_of_the_demo(demo, vibench_
     assert [response["func_type"], coherence["func_type"]] == [4, 6]
     for each in (response, coherence):
         np.testing.assert_allclose(each["x"], measured.frequency_hz, rtol=6e-6)
-    # v / a of the same displacements x0 / xb: the base's is divided by i times the angular frequency.
+    # Both spectra are of the displacements x0 / xb, so v / a is this ratio divided by i times omega.
     turned = measured.value / (2j * np.pi * measured.frequency_hz)
-    # Exported lines lie on even multiples of a line, which are a little beside those of the clock.
+    # Exported lines are multiples of the line spacing, slightly beside the lines of the measured clock.
     between = np.interp(response["x"], measured.frequency_hz, turned)
     np.testing.assert_allclose(response["data"], between, rtol=0, atol=1e-3 * np.abs(turned).max())
     np.testing.assert_allclose(coherence["data"], measured.coherence, rtol=1e-4)
@@ -93,7 +93,7 @@ def test_pyuff_reads_response_coherence_and_densities_of_the_demo(demo, vibench_
     assert [coherence[f"{axis}_spec_data_type"] for axis in axes] == [0, 0]
     assert [each["ordinate_axis_lab"].strip() for each in densities] == list(samples)
     for density, values in zip(densities, samples.values(), strict=True):
-        # All realisations are equally long: the mean over their segments is that of their densities.
+        # All realisations are equally long, so that the mean over segments is the mean over realisations.
         each_played = [
             welch(values[part.start : part.stop], rate, nperseg=rate, detrend=False) for part in played
         ]
@@ -109,17 +109,17 @@ def test_the_linear_transmission_matches_the_closed_form_within_tight_bounds(dem
     truth = base_transmissibility(gong2025(), measured.frequency_hz)[:, 0]
     exact = np.abs(truth)
     inside = (measured.magnitude_lower <= exact) & (exact <= measured.magnitude_upper)
-    # 95 % of the lines, within twice the standard error of a share of 551 independent lines.
+    # 95 % of the lines, within twice the standard error of a fraction of 551 independent lines.
     assert np.mean(inside) == pytest.approx(0.95, abs=2 * np.sqrt(0.95 * 0.05 / inside.size))
-    # The phase too: coupling, resonance and delay of the sensors are taken out of it.
+    # The phase too: coupling, resonance and delay of the sensors are corrected.
     turned = np.abs(np.angle(truth / measured.value)) <= phase_half_width(measured.half_width)
     assert np.mean(turned) == pytest.approx(0.95, abs=2 * np.sqrt(0.95 * 0.05 / inside.size))
     assert np.median(measured.half_width) < 0.002
     assert np.max(measured.half_width) < 0.03
 
 
-def test_every_demo_measurement_agrees_with_its_simulated_draws(results):
-    """One in a hundred quantities lies outside its own limit by chance, and some 15 are compared."""
+def test_every_demo_measurement_agrees_with_its_ensemble_of_simulations(results):
+    """One quantity in a hundred is outside its limit by chance, and some 15 quantities are compared."""
     for name, found in results.items():
         assert found["simulated"]["drive"] == "recorded amplifier voltage", name
     compared = [
@@ -129,7 +129,7 @@ def test_every_demo_measurement_agrees_with_its_simulated_draws(results):
     assert sum(not each["agrees"] for each in compared) <= 1
     limit_z = norm.ppf(1.0 - 0.5 * 0.01 / sum(each["compared"] for each in compared))
     assert max(abs(each["largest_z"]) for each in compared) < limit_z
-    # Whether a sweep loses its collisions before it ends is chance, in each of its runs.
+    # Whether the collisions cease before the end of a sweep is a matter of chance in each run.
     escape = results["sweep_moderate"]["simulated"]["escape"]
     assert escape is None or escape["what"] == "collisions"
 
@@ -139,7 +139,7 @@ def test_the_demo_collision_region_begins_where_the_simulation_predicts(results)
     (measured,) = sweep["measured"]["collision_regions"]
     (simulated,) = sweep["simulated"]["collision_regions"]
     assert measured["start"]["frequency_hz"] == pytest.approx(simulated["start"]["frequency_hz"], abs=3.0)
-    # Where it ends, chaos drops off its branch: a draw, in the sweep and in the simulation.
+    # The upper end, where chaos leaves its branch, is random in both sweep and simulation.
     for found in (measured, simulated):
         assert found["start"]["frequency_hz"] < 266 < 320 < found["stop"]["frequency_hz"]
 

@@ -22,8 +22,8 @@ def answer(*arguments):
     return json.loads(result.stdout)
 
 
-def refused(*arguments):
-    """The sentence with which a command refuses."""
+def refusal_of(*arguments):
+    """Return the sentence with which a command refuses."""
     result = run(*arguments)
     assert result.exit_code != 0
     return str(result.exception)
@@ -36,7 +36,7 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
     assert all(point["is_stable"] for point in branch["points"])
     names = {each.name for each in (tmp_path / "out").iterdir()}
     assert names >= {"branches.h5", "branches.png", "branches.svg", "branches.csv"}
-    assert "ever overwritten" in refused("branches", *options, "--out", tmp_path / "out")
+    assert "ever overwritten" in refusal_of("branches", *options, "--out", tmp_path / "out")
 
 
 def test_the_branch_search_ends_at_the_requested_time():
@@ -59,7 +59,7 @@ SHORT_LINE = (
 
 def test_branches_report_which_motions_a_bench_can_hold():
     found = answer(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig.toml"))
-    # Ten looks of ten periods or of a fifth of a second.
+    # Ten control steps of ten periods or of a fifth of a second.
     assert found["least_growth_time_s"] == pytest.approx(2.0, rel=0.05)
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
 
@@ -67,7 +67,7 @@ def test_branches_report_which_motions_a_bench_can_hold():
 def test_a_real_time_controller_extends_the_holdable_motions():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     found = answer(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"))
-    # Ten times 0.3 ms of latency and one and a half of 10,240 samples a second.
+    # Ten times the latency of 0.3 ms plus one and a half sample periods of 10,240 samples per second.
     assert found["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
 
 
@@ -116,7 +116,7 @@ def test_an_invalid_number_is_quoted_as_typed(command, value):
 
 @pytest.mark.parametrize("command", [("spectrum", *POINT, "--duration"), ("branches", *LINE, "--places")])
 def test_an_invalid_zero_is_quoted_as_typed(command):
-    assert f"{command[-1]} was given as 0" in refused(*command, "0")
+    assert f"{command[-1]} was given as 0" in refusal_of(*command, "0")
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_an_invalid_zero_is_quoted_as_typed(command):
     ],
 )
 def test_invalid_options_are_refused_in_one_sentence(arguments, said):
-    assert said in refused(*arguments)
+    assert said in refusal_of(*arguments)
 
 
 @pytest.mark.parametrize(
@@ -173,8 +173,8 @@ def test_invalid_options_are_refused_in_one_sentence(arguments, said):
 )
 @pytest.mark.timeout(30)
 def test_impossible_specimen_values_are_refused_at_once(arguments, told):
-    """They were tracebacks, warnings of numpy, or took minutes."""
-    assert told in refused(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))
+    """Such values once caused tracebacks, warnings of numpy, or minutes of computation."""
+    assert told in refusal_of(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))
 
 
 @pytest.mark.thorough
@@ -183,6 +183,6 @@ def test_branches_reach_a_requested_error_and_report_it(vibench_here, tmp_path):
     ran = vibench_here(*asked, "--method", "balance", "--error", "1 %", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert "motions reached an error of 1 %" in " ".join(ran.stdout.split())
-    refused = vibench_here(*asked, "--method", "first-order", "--error", "1 %", cwd=tmp_path)
-    assert refused.returncode != 0
-    assert "the error of one harmonic is fixed" in " ".join(refused.stderr.split())
+    refusal_of = vibench_here(*asked, "--method", "first-order", "--error", "1 %", cwd=tmp_path)
+    assert refusal_of.returncode != 0
+    assert "the error of one harmonic is fixed" in " ".join(refusal_of.stderr.split())

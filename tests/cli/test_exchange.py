@@ -1,4 +1,4 @@
-"""`vibench export` and `vibench import` as a user meets them."""
+"""`vibench export` and `vibench import` as a user runs them."""
 
 import json
 
@@ -42,7 +42,7 @@ def recorded(tmp_path):
 
 @pytest.fixture
 def run(recorded, monkeypatch):
-    """Run a command in the recording's folder, in this process: starting one takes seconds."""
+    """Run a command in the recording's folder, in this process: starting a new process takes seconds."""
     monkeypatch.chdir(recorded.parent)
     return lambda *arguments: CliRunner().invoke(app, arguments)
 
@@ -63,7 +63,7 @@ def test_a_recording_round_trips_through_export_and_import(run, recorded):
 
 @pytest.mark.parametrize("folder", [".", "made", "..", "made/", "new/", "other/new"])
 def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folder):
-    """Of "." the export was a traceback, of any other folder a name that is taken; of a new one a file."""
+    """An existing folder, "." and a new folder as target all get the default file name."""
     recorded.with_name("made").mkdir()
     place = recorded.parent / folder
     out = run("export", "run.h5", "--to", "csv", "--out", folder)

@@ -55,11 +55,11 @@ NO_NUMBERS = [
 ]
 
 
-def shown(words):
+def example_value(words):
     return " ".join(words)
 
 
-@pytest.mark.parametrize("words", [*NOT_ALLOWED, *NO_NUMBERS], ids=shown)
+@pytest.mark.parametrize("words", [*NOT_ALLOWED, *NO_NUMBERS], ids=example_value)
 def test_a_value_that_is_not_allowed_exits_1_in_every_command(vibench_here, tmp_path, words):
     ran = vibench_here(*words, cwd=tmp_path)
     assert ran.returncode == 1, ran.stderr
@@ -67,7 +67,7 @@ def test_a_value_that_is_not_allowed_exits_1_in_every_command(vibench_here, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", NOT_UNDERSTOOD, ids=shown)
+@pytest.mark.parametrize("words", NOT_UNDERSTOOD, ids=example_value)
 def test_an_incomplete_or_unknown_command_line_exits_2(vibench_here, tmp_path, words):
     assert vibench_here(*words, cwd=tmp_path).returncode == 2
 

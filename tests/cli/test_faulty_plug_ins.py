@@ -1,4 +1,4 @@
-"""Third-party instruments that raise or return wrong data: one sentence, no lost data, and silence."""
+"""Third-party instruments that fail give one sentence, silence, and a kept recording."""
 
 import re
 import sys
@@ -38,8 +38,8 @@ duration_s = 0.2
 """
 
 
-class Odd:
-    """Somebody's class around one of ours: does as it does, except for one member."""
+class FaultyObject:
+    """Wraps one of our objects and replaces one member by faulty behaviour."""
 
     def __init__(self, inside, faulty, does):
         self._inside, self._faulty, self._does = inside, faulty, does
@@ -51,49 +51,49 @@ class Odd:
         return (lambda *given: self._does(found, *given)) if callable(found) else self._does(lambda: found)
 
 
-class OddDriver(Odd):
-    """Opens an odd instrument; an instrument of ours is handed to our driver as it is."""
+class FaultyDriver(FaultyObject):
+    """A driver that opens a faulty instrument."""
 
     def open(self, *given):
         if self._faulty == "open":
             return self._does(self._inside.open, *given)
-        return Odd(self._inside.open(*given), self._faulty, self._does)
+        return FaultyObject(self._inside.open(*given), self._faulty, self._does)
 
 
-def raises(_found, *_given):
+def raise_error(_found, *_given):
     raise ZeroDivisionError("firmware 1.02")
 
 
-def gives_none(found, *given):
+def return_none(found, *given):
     found(*given)
 
 
-def does_then_raises(found, *given):
+def run_then_raise(found, *given):
     found(*given)
     raise KeyError("session")
 
 
-def not_a_number(found, *given):
+def return_nan(found, *given):
     block = found(*given)
     volts = block.volts.copy()
     volts[0, -1] = np.nan
     return Block(block.first_sample, volts, block.overloads)
 
 
-def fewer_rows(found, *given):
+def drop_a_row(found, *given):
     block = found(*given)
     return Block(block.first_sample, block.volts[1:], block.overloads)
 
 
 class Drivers:
-    """What the entry points of the stranger's package name; a test puts the drivers here."""
+    """The entry points of a third-party package; a test sets the drivers."""
 
     generator, digitizer, sensor = AFG1022_MODEL, DaqmxDigitizer, None
 
 
 @pytest.fixture
-def stranger(tmp_path, monkeypatch):
-    """Install a package that offers a generator, a digitizer and a sensor; give a rig that names them."""
+def bench_with(tmp_path, monkeypatch):
+    """Install a package that offers three instruments; return a function that makes a bench."""
     metadata = tmp_path / "odd-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
@@ -118,8 +118,8 @@ def stranger(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def told(vibench_here, tmp_path):
-    """Measure on a bench through the command line; an exception that it lets out ends the test."""
+def outcome(vibench_here, tmp_path):
+    """Return a function that measures on a bench by command; an uncaught exception ends the test."""
     (tmp_path / "plan.toml").write_text(PLAN)
 
     def run(bench, *more):
@@ -137,29 +137,29 @@ DIGITIZER = ("open", "identity", "sample_rate_hz", "roles", "volts_per_count", "
 @pytest.mark.parametrize(
     ("kind", "member", "does"),
     [
-        *(("generator", each, (raises, gives_none)[at % 2]) for at, each in enumerate(GENERATOR)),
-        *(("digitizer", each, (gives_none, raises)[at % 2]) for at, each in enumerate(DIGITIZER)),
-        ("generator", "open", raises),
-        ("generator", "start", gives_none),
-        ("digitizer", "read", raises),
+        *(("generator", each, (raise_error, return_none)[at % 2]) for at, each in enumerate(GENERATOR)),
+        *(("digitizer", each, (return_none, raise_error)[at % 2]) for at, each in enumerate(DIGITIZER)),
+        ("generator", "open", raise_error),
+        ("generator", "start", return_none),
+        ("digitizer", "read", raise_error),
     ],
 )
-def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(stranger, kind, member, does, told):
+def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(bench_with, kind, member, does, outcome):
     inside = AFG1022_MODEL if kind == "generator" else DaqmxDigitizer
-    path = stranger(kind, OddDriver(inside, member, does))
-    code, said = told(path)
-    if does is gives_none and member in {"load_sine", "start", "stop"}:
-        assert code == 0, said  # they promise nothing
+    path = bench_with(kind, FaultyDriver(inside, member, does))
+    code, said = outcome(path)
+    if does is return_none and member in {"load_sine", "start", "stop"}:
+        assert code == 0, said  # these members return nothing
         return
     assert code != 0
     assert f"'odd' of {GROUPS[kind]} failed in {member}:" in said or member == "open", said
     assert f"'odd' of {GROUPS[kind]} failed in" in said
-    assert ("ZeroDivisionError: firmware 1.02" in said) is (does is raises)
+    assert ("ZeroDivisionError: firmware 1.02" in said) is (does is raise_error)
 
 
-@pytest.mark.parametrize(("does", "words"), [(not_a_number, "not numbers"), (fewer_rows, "of shape")])
-def test_invalid_samples_end_check_and_run_with_a_sentence(stranger, does, words, tmp_path):
-    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", does))
+@pytest.mark.parametrize(("does", "words"), [(return_nan, "not numbers"), (drop_a_row, "of shape")])
+def test_invalid_samples_end_check_and_run_with_a_sentence(bench_with, does, words, tmp_path):
+    path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", does))
     with open_bench(path) as bench:
         with pytest.raises(AcquisitionError, match=words):
             check_bench(bench, tmp_path)
@@ -167,7 +167,7 @@ def test_invalid_samples_end_check_and_run_with_a_sentence(stranger, does, words
             run_measurement(bench, DWELL, tmp_path / "dwell.h5")
 
 
-def test_missing_samples_are_reported_and_prevent_playback(stranger, told, tmp_path):
+def test_missing_samples_are_reported_and_prevent_playback(bench_with, outcome, tmp_path):
     left = [20]
 
     def skips(found, *given):
@@ -176,8 +176,8 @@ def test_missing_samples_are_reported_and_prevent_playback(stranger, told, tmp_p
             found(*given)
         return found(*given)
 
-    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", skips))
-    code, said = told(path, "--check", "waived")
+    path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", skips))
+    code, said = outcome(path, "--check", "waived")
     assert code == 0, said
     assert re.search(r"the plan was carried out; the converter lost \d+ samples", said)
     rig = load_rig("virtual_rig")
@@ -190,39 +190,39 @@ def test_missing_samples_are_reported_and_prevent_playback(stranger, told, tmp_p
         deque(iter(lambda: player.read(5120), None), maxlen=0)
 
 
-def test_a_check_finds_a_converter_that_omits_samples(stranger, tmp_path):
+def test_a_check_finds_a_converter_that_omits_samples(bench_with, tmp_path):
     def skips(found, *given):
         found(*given)
         return found(*given)
 
-    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", skips))
+    path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", skips))
     with open_bench(path) as bench, pytest.raises(DataLost, match="instead of 0: it loses samples"):
         check_bench(bench, tmp_path)
 
 
-def test_a_failed_stop_warns_that_the_output_may_be_on(stranger, tmp_path):
-    path = stranger("generator", OddDriver(AFG1022_MODEL, "stop", raises))
+def test_a_failed_stop_warns_that_the_output_may_be_on(bench_with, tmp_path):
+    path = bench_with("generator", FaultyDriver(AFG1022_MODEL, "stop", raise_error))
     with pytest.raises(BrokenPromise, match="THE OUTPUT MAY STILL BE ON"), open_bench(path) as bench:
         check_bench(bench, tmp_path)
 
 
-def test_a_driver_that_raises_system_exit_is_reported(stranger, told):
-    def ends(_found, *_given):
+def test_a_driver_that_raises_system_exit_is_reported(bench_with, outcome):
+    def exit_program(_found, *_given):
         sys.exit(0)
 
-    code, said = told(stranger("generator", OddDriver(AFG1022_MODEL, "open", ends)))
+    code, said = outcome(bench_with("generator", FaultyDriver(AFG1022_MODEL, "open", exit_program)))
     assert code == 1
     assert "failed in open: SystemExit: 0" in said
 
 
-def test_a_failure_during_output_ends_silent_with_a_recorded_reason(stranger, tmp_path):
+def test_a_failure_during_output_ends_silent_with_a_recorded_reason(bench_with, tmp_path):
     left = [15]
 
-    def fails_later(found, *given):
+    def fail_later(found, *given):
         left[0] -= 1
-        return found(*given) if left[0] > 0 else raises(found)
+        return found(*given) if left[0] > 0 else raise_error(found)
 
-    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", fails_later))
+    path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", fail_later))
     with pytest.raises(BrokenPromise), open_bench(path) as bench:
         run_measurement(bench, DWELL, tmp_path / "dwell.h5")
     with open_recording(tmp_path / "dwell.h5") as recording:
@@ -234,10 +234,10 @@ def test_a_failure_during_output_ends_silent_with_a_recorded_reason(stranger, tm
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
 def test_a_failed_close_after_a_complete_recording_states_that_the_recording_is_complete(
-    stranger, kind, inside, told
+    bench_with, kind, inside, outcome
 ):
-    path = stranger(kind, OddDriver(inside, "close", does_then_raises))
-    code, said = told(path)
+    path = bench_with(kind, FaultyDriver(inside, "close", run_then_raise))
+    code, said = outcome(path)
     assert "recorded out/dwell.h5 (the plan was carried out)" in said
     assert "failed in close: KeyError: 'session'" in said
     assert code == 1
@@ -258,18 +258,18 @@ def test_a_failed_close_after_a_complete_recording_states_that_the_recording_is_
         (None, "None as SensorFacts"),
     ],
 )
-def test_an_impossible_sensor_is_refused(stranger, facts, words):
+def test_an_impossible_sensor_is_refused(bench_with, facts, words):
     usual = {"units_per_volt": 100.0, "full_scale_v": 5.0, "name": "odd"}
 
     def sensor(_rig, _config):
         return None if facts is None else SensorFacts("acceleration", "m s-2", **(usual | facts))
 
-    path = stranger("sensor", sensor)
+    path = bench_with("sensor", sensor)
     with pytest.raises(BrokenPromise, match=words), open_bench(path):
         pass
 
 
-def test_an_exception_in_a_sensor_plug_in_names_the_sensor(stranger):
-    path = stranger("sensor", raises)
+def test_an_exception_in_a_sensor_plug_in_names_the_sensor(bench_with):
+    path = bench_with("sensor", raise_error)
     with pytest.raises(BrokenPromise, match=r"'odd' of vibench\.sensors failed when called"):
         load_rig(path) and open_bench(path)

@@ -1,4 +1,4 @@
-"""`vibench figure`: options that its figures cannot be drawn with are refused before anything is computed."""
+"""`vibench figure` refuses impossible options before any computation."""
 
 import pytest
 from typer.testing import CliRunner
@@ -7,8 +7,8 @@ from vibench.analysis import InvalidRequest
 from vibench.cli.__main__ import app
 
 
-def refused(*arguments):
-    """The sentence with which `vibench figure` refuses."""
+def refusal_of(*arguments):
+    """Return the sentence with which `vibench figure` refuses."""
     result = CliRunner().invoke(app, ["figure", *(str(each) for each in arguments)])
     assert isinstance(result.exception, InvalidRequest), result.output
     return str(result.exception)
@@ -17,7 +17,7 @@ def refused(*arguments):
 @pytest.mark.parametrize("number", ["5", "all"])
 @pytest.mark.parametrize("none", ["0", "-0.0"])
 def test_figure_5_needs_a_damping_time_above_zero(tmp_path, number, none):
-    said = refused(number, "--out", tmp_path / "f", "--damping-time", none)
+    said = refusal_of(number, "--out", tmp_path / "f", "--damping-time", none)
     assert said == "figure 5 compares with an undamped specimen; give a damping time above 0 s"
     assert not (tmp_path / "f").exists()
 
@@ -32,5 +32,5 @@ def test_figure_5_needs_a_damping_time_above_zero(tmp_path, number, none):
     ],
 )
 def test_impossible_specimen_sizes_are_refused(tmp_path, option, value, told):
-    assert refused("1", "--out", tmp_path / "f", option, value) == told
+    assert refusal_of("1", "--out", tmp_path / "f", option, value) == told
     assert not (tmp_path / "f").exists()

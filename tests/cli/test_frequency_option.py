@@ -1,4 +1,4 @@
-"""`--frequency` as it is typed: what it lists, and what is said of what it cannot list."""
+"""`--frequency` accepts a number or a range and refuses other text with a reason."""
 
 import pytest
 

@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
         path = folder / f"{HOSTILE}{name}"
         path.write_bytes(good_recordings()[name])
         if name != "cut_off.h5.part":
-            written_over(path)
+            make_hostile(path)
     (folder / f"{HOSTILE}broken.h5").write_bytes(b"none")
     (folder / f"{HOSTILE}.campaign.sqlite").write_bytes(b"none")
     (folder / f"{HOSTILE}.toml").write_text(TOML.replace("\x7f", "\\u007f"), encoding="utf-8")
@@ -38,8 +38,8 @@ def folder(tmp_path_factory):
     return folder
 
 
-def written_over(path):
-    """Let all that a recording says be hostile, and seal it again."""
+def make_hostile(path):
+    """Put hostile text into all texts of a recording, and seal it again."""
     with h5py.File(path, "r+") as file:
         del file["seal"]
         file.attrs["reason"] = np.bytes_(HOSTILE.encode())
@@ -54,7 +54,7 @@ def written_over(path):
 
 
 def cases(folder):
-    """Every command, on the folder where it reads one; others are given a name that they do not know."""
+    """Return arguments for every command: the folder, or a hostile name for commands that read no folder."""
     recordings = [path for path in sorted(folder.iterdir()) if path.suffix in (".h5", ".part")]
     dwell = next(path for path in recordings if path.name.endswith("dwell.h5"))
     toml, new = folder / f"{HOSTILE}.toml", folder / "new"
@@ -85,8 +85,8 @@ def cases(folder):
     }
 
 
-def harmful(text):
-    """Characters that a terminal or a browser acts upon."""
+def harmful_characters(text):
+    """Return the characters that a terminal or a browser acts upon."""
     return sorted(
         {each for each in text if not (each.isprintable() or category(each) == "Zs" or each == "\n")}
     )
@@ -98,12 +98,12 @@ def test_no_command_prints_control_characters_of_a_name(vibench_here, folder, co
     for arguments in cases(folder)[command]:
         ended = vibench_here(command, *arguments, cwd=folder)
         for said in (ended.stdout, ended.stderr):
-            assert harmful(said) == [], (arguments, said)
+            assert harmful_characters(said) == [], (arguments, said)
             assert FORGED.search(said) is None, (arguments, said)
             assert "Traceback" not in said
         if "--json" in arguments:
             json.loads(ended.stdout)
-    assert not harmful("".join(path.read_text("utf-8") for path in folder.glob("new/*.html")))
+    assert not harmful_characters("".join(path.read_text("utf-8") for path in folder.glob("new/*.html")))
 
 
 def test_the_report_shows_hostile_names_and_notes_as_text(vibench_here, folder, tmp_path):
@@ -111,6 +111,6 @@ def test_the_report_shows_hostile_names_and_notes_as_text(vibench_here, folder, 
     ended = vibench_here("analyse", path, "--no-simulate", "--out", tmp_path / "out", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert harmful(text) == []
+    assert harmful_characters(text) == []
     assert r"a\x1b[2J" in text
     assert r"\u202eb" in text

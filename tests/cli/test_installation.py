@@ -1,4 +1,4 @@
-"""What a new user meets first: version, shipped files, a description of the installation, missing extras."""
+"""A new installation: version, shipped files, the doctor's report, and missing extras."""
 
 import json
 import os
@@ -47,16 +47,16 @@ print(json.dumps(told))
 """
 
 
-def ran(program, cwd):
+def run_vibench(program, cwd):
     environment = {**os.environ, "COLUMNS": "200"}
     return subprocess.run(
         [sys.executable, "-c", program], cwd=cwd, env=environment, capture_output=True, text=True, check=False
     )
 
 
-def without(libraries, *arguments, cwd):
-    """Run ``vibench`` where some libraries cannot be imported."""
-    return ran(WITHOUT.format(libraries=libraries, arguments=tuple(map(str, arguments))), cwd)
+def run_without(libraries, *arguments, cwd):
+    """Run ``vibench`` while some libraries cannot be imported."""
+    return run_vibench(WITHOUT.format(libraries=libraries, arguments=tuple(map(str, arguments))), cwd)
 
 
 def test_the_version_matches_the_package(answered):
@@ -170,7 +170,7 @@ def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, 
     ],
 )
 def test_a_missing_library_is_reported_with_the_install_command(tmp_path, library, arguments, extra):
-    told = without([library], *arguments, cwd=tmp_path)
+    told = run_without([library], *arguments, cwd=tmp_path)
     assert told.returncode == 1
     assert told.stderr.startswith(f"error: {library}")
     assert f"pip install 'vibench[{extra}]'" in told.stderr
@@ -195,7 +195,7 @@ def test_the_base_installation_supports_commands_without_figures_and_all_help(tm
     program = ONE_AFTER_ANOTHER.format(
         libraries=[*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], lines=[*CORE_ALONE, *helps]
     )
-    done = ran(program, tmp_path)
+    done = run_vibench(program, tmp_path)
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert [(code, said) for code, _, said in told if code] == []
@@ -212,7 +212,7 @@ def test_the_base_installation_supports_commands_without_figures_and_all_help(tm
 )
 def test_the_demo_names_the_missing_extra_before_it_begins(tmp_path, missing, extra):
     left_out = [*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]] if missing is None else missing
-    told = without(left_out, "demo", cwd=tmp_path)
+    told = run_without(left_out, "demo", cwd=tmp_path)
     assert (told.returncode, told.stdout) == (1, "")
     assert f"pip install 'vibench[{extra}]'" in told.stderr
     assert not (tmp_path / "vibench_demo").exists()
@@ -238,7 +238,7 @@ def test_plans_recordings_and_analysis_need_neither_instruments_nor_the_window(l
 
 
 def installed_mb(name, seen):
-    """Give what the files of a library and of all that it needs take, each once."""
+    """Return the size of a library and of all its requirements, each counted once [MB]."""
     if name in seen:
         return 0.0
     seen.add(name)
@@ -257,7 +257,7 @@ def test_the_core_installation_takes_less_than_300_megabytes():
     assert 200 < installed_mb("vibench", set()) < 300
 
 
-def test_the_page_lists_all_exit_codes_and_variables():
+def test_the_installation_page_lists_all_exit_codes_and_variables():
     page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
     assert [int(each) for each in re.findall(r"^\| (\d) \|", page, flags=re.M)] == list(ExitCode)
     assert dict(re.findall(r"^\| `([A-Z_]+)` \| (.+) \|$", page, flags=re.M)) == {
@@ -265,7 +265,7 @@ def test_the_page_lists_all_exit_codes_and_variables():
     }
 
 
-def test_every_variable_that_the_sources_read_is_on_the_page():
+def test_every_environment_variable_of_the_sources_is_on_the_installation_page():
     read = r"""(?:environ(?:\.get|\.setdefault)?[\[(]|VARIABLE = )["']([A-Z][A-Z_]+)["']"""
     sources = [path for portion in PORTIONS for path in (ROOT / portion).rglob("*.py")]
     found = {name for path in sources for name in re.findall(read, path.read_text(encoding="utf-8"))}
@@ -274,7 +274,7 @@ def test_every_variable_that_the_sources_read_is_on_the_page():
     assert [name for name in sorted(found) if f"`{name}`" not in page] == []
 
 
-def test_every_exit_code_has_a_name():
+def test_no_exit_code_is_written_as_a_number():
     numbered = re.compile(r"(?:sys\.exit|typer\.Exit)\(\d")
     loose = [path.name for path in (ROOT / "cli").rglob("*.py") if numbered.search(path.read_text("utf-8"))]
     assert loose == []

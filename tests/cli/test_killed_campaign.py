@@ -9,7 +9,7 @@ import pytest
 from vibench.acquisition.campaign import JournalPointState, read_journal
 
 from .conftest import ENVIRONMENT
-from .killed_campaign import amplitudes, branches, command, done, killed, short_points, slow_rig
+from .killed_campaign import amplitudes, branches, command, done_points, kill_at, short_points, slow_rig
 
 
 @pytest.mark.thorough
@@ -27,8 +27,8 @@ def test_a_killed_and_resumed_campaign_records_every_point_once(tmp_path, points
     reached = 0
     for number in range(kills):
         options = ["--resume"] if number else []
-        reached = killed(command(plan, bench, disturbed, *options), disturbed, points // (kills + 2), chance)
-        assert reached == done(disturbed) < points
+        reached = kill_at(command(plan, bench, disturbed, *options), disturbed, points // (kills + 2), chance)
+        assert reached == done_points(disturbed) < points
     resumed = command(plan, bench, disturbed, "--resume")
     ended = subprocess.run(resumed, env=ENVIRONMENT, check=True, capture_output=True, text=True)
     assert ended.stdout.count("kept") >= reached
@@ -45,7 +45,7 @@ def test_a_killed_and_resumed_campaign_records_every_point_once(tmp_path, points
 @pytest.mark.thorough
 def test_a_resumed_sweep_stays_on_its_branch_after_a_kill(tmp_path):
     plan, bench, out = branches(tmp_path), slow_rig(tmp_path), tmp_path / "out"
-    reached = killed(command(plan, bench, out), out, 4, random.Random(1))
+    reached = kill_at(command(plan, bench, out), out, 4, random.Random(1))
     assert 4 <= reached < 7, "killed on the way up"
     subprocess.run(
         command(plan, bench, out, "--resume"), env=ENVIRONMENT, check=True, stdout=subprocess.DEVNULL
@@ -58,5 +58,5 @@ def test_a_resumed_sweep_stays_on_its_branch_after_a_kill(tmp_path):
     down = [displacement[f"line-0p5vpp-down-{frequency}hz"] for frequency in range(200, 169, -10)]
     assert all(each > 35e-6 for each in up), "on the branch that collides, to its end"
     assert all(each < 25e-6 for each in down)
-    # The branch is no property of the frequency: who goes there directly finds the other one.
+    # At one frequency there are two motions: without lead-in the other motion is found.
     assert displacement["alone-190hz"] < 25e-6 < up[4]

@@ -1,4 +1,4 @@
-"""Commands are listed without importing their modules, with the first line of their help."""
+"""The command list is shown without importing the commands' modules."""
 
 import subprocess
 import sys

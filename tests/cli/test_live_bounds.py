@@ -1,4 +1,4 @@
-"""Bound, target and time left of a recording that lasts until its results are known, as they are shown."""
+"""The terminal, a viewer and the Run page show bound, target and time left of a recording."""
 
 import io
 

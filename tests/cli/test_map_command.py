@@ -1,4 +1,4 @@
-"""`vibench map` as a user meets it: a folder with a file and a picture, and one sentence for each error."""
+"""`vibench map` as a user runs it: a folder with a file and a picture, and one-sentence errors."""
 
 import numpy as np
 import pytest

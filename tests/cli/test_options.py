@@ -49,7 +49,7 @@ def test_every_option_has_a_help(vibench_here, tmp_path, name):
 
 
 def test_the_command_list_is_printed_without_the_rich_library():
-    """Drawing them took a third of the time from the prompt to the list."""
+    """The rich library would take a third of the time until the list appears."""
     program = (
         "import atexit, sys; from vibench.command import main\n"
         "atexit.register(lambda: print('loaded', *sys.modules, file=sys.stderr)); main()"

@@ -1,4 +1,4 @@
-"""Tables in a file of 80 columns, or of fewer: words wrap, and a number is whole."""
+"""Tables in 80 columns or fewer: words wrap, and numbers are not cut."""
 
 import pytest
 from rich.console import Console

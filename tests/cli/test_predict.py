@@ -1,4 +1,4 @@
-"""`vibench predict` as a user meets it: JSON with every point, a table, one sentence for each error."""
+"""`vibench predict` as a user runs it: JSON with every point, a table, and one-sentence errors."""
 
 import json
 
@@ -116,7 +116,7 @@ FORGETFUL = ("--amplitude", 5e-6, "--frequency", 242, "--damping-time", 3e-5, "-
 
 @pytest.mark.timeout(COMPILING_S)
 def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_here, tmp_path):
-    """Chaos that dies out within tens of seconds: after 36, about half of the starts have settled."""
+    """Chaos dies out within tens of seconds: after 36 s half of the initial conditions have settled."""
     asked = ("predict", *FORGETFUL, "--budget", "0.2s", "--explain")
     ran = vibench_here(*asked, "--json", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr

@@ -10,7 +10,7 @@ from vibench.cli.progress_bars import LINE_INTERVAL_S, show_bars
 
 
 class Log(io.StringIO):
-    """A file that says when it was written to."""
+    """A file that records when it was written to."""
 
     def __init__(self):
         super().__init__()

@@ -1,4 +1,4 @@
-"""`vibench reproduce`: what cannot be is refused before anything is computed."""
+"""`vibench reproduce` refuses impossible options before any computation."""
 
 import pytest
 

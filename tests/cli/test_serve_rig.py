@@ -1,4 +1,4 @@
-"""The virtual rig alone, for programs that know nothing of vibench."""
+"""The virtual rig served to programs that do not use vibench."""
 
 import os
 import re
@@ -44,8 +44,8 @@ def free_port():
 
 
 @pytest.fixture(scope="module")
-def served():
-    """What the command printed; each test sets first what it depends on."""
+def serve_rig_output():
+    """Yield the output of `vibench serve-rig`; each test sets the rig's state first."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     options = ("--address", "127.0.0.1:0", "--scpi-port", str(free_port()))
     arguments = [sys.executable, "-u", "-m", "vibench.cli", "serve-rig", *options]
@@ -62,8 +62,8 @@ def served():
     assert server.returncode == 0
 
 
-def test_other_programs_can_use_generator_and_converter_of_the_served_rig(served):
-    address = served.split('insecure_channel("')[1].split('"')[0]
+def test_other_programs_can_use_generator_and_converter_of_the_served_rig(serve_rig_output):
+    address = serve_rig_output.split('insecure_channel("')[1].split('"')[0]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     stranger = subprocess.run(
         [sys.executable, "-c", PROGRAM, address], env=environment, capture_output=True, text=True, check=False
@@ -76,19 +76,19 @@ def test_other_programs_can_use_generator_and_converter_of_the_served_rig(served
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0", min_val=-5, max_val=5)
         task.timing.cfg_samp_clk_timing(51200, samps_per_chan=5120)
         volts = task.read(5120)
-    # 0.2 Vpp at the generator, behind a divider by 2.
+    # 0.2 Vpp at the generator, after a divider by 2.
     assert max(volts) == pytest.approx(0.05, rel=0.01)
 
 
-def hints(served):
-    """What stands indented below each title, as one would paste it."""
-    blocks = re.split(r"^The .*:\n", served, flags=re.MULTILINE)[1:]
+def examples_in(serve_rig_output):
+    """Return the indented example code below each title."""
+    blocks = re.split(r"^The .*:\n", serve_rig_output, flags=re.MULTILINE)[1:]
     return ["\n".join(line[2:] for line in block.splitlines() if line.startswith("  ")) for block in blocks]
 
 
 @pytest.mark.thorough
-def test_the_printed_example_commands_work(served):
-    converter, usb, stream = hints(served)
+def test_the_printed_example_commands_work(serve_rig_output):
+    converter, usb, stream = examples_in(serve_rig_output)
     pasted = {}
     exec(converter, pasted)
     with pasted["task"] as task:
@@ -97,24 +97,24 @@ def test_the_printed_example_commands_work(served):
         assert len(task.read(512)) == 512
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for hint in (usb, stream):
-        # The cable changes what pyvisa finds in its whole process: a process each.
+        # pyvisa keeps its list of devices for a whole process, so each example has a process.
         program = f'{hint}\nprint(generator.query("*IDN?"))\ngenerator.close()'
         words = [sys.executable, "-W", "ignore", "-c", program]
         said = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
         assert said.stdout.startswith("TEKTRONIX,AFG1022"), said.stderr
 
 
-def test_an_indefinite_length_block_ends_at_the_newline(served):
+def test_an_indefinite_length_block_ends_at_the_newline(serve_rig_output):
     pasted = {}
-    exec(hints(served)[2], pasted)
+    exec(examples_in(serve_rig_output)[2], pasted)
     with closing(pasted["generator"]) as generator:
         generator.write_raw(b"DATA:DATA EMEM,#0abcd\n")
         assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
 
 
-def test_the_afg1022_driver_works_over_the_socket_of_a_served_rig(served):
+def test_the_afg1022_driver_works_over_the_socket_of_a_served_rig(serve_rig_output):
     rig = load_rig("virtual_rig")
-    (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", served))
+    (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", serve_rig_output))
     config = rig.generator.model_copy(update={"resource": resource})
     generator = AFG1022X.open(config)
     generator.load_sine(200.0, 0.1)
@@ -123,8 +123,8 @@ def test_the_afg1022_driver_works_over_the_socket_of_a_served_rig(served):
     generator.close()
 
 
-def test_rig_time_advances_without_clients(served):
-    address = served.split('insecure_channel("')[1].split('"')[0]
+def test_rig_time_advances_without_clients(serve_rig_output):
+    address = serve_rig_output.split('insecure_channel("')[1].split('"')[0]
     with (
         grpc.insecure_channel(address) as channel,
         nidaqmx.Task(grpc_options=GrpcSessionOptions(channel, "")) as task,

@@ -1,4 +1,4 @@
-"""Where files or memory run out, a command ends with one sentence and no traceback."""
+"""A command that runs out of files or memory ends with one sentence and no traceback."""
 
 import re
 import subprocess
@@ -23,8 +23,8 @@ excitation = { kind = "dwell", amplitude_vpp = 0.1, frequency_hz = 150, settle_s
 """
 
 
-def limited(folder, name, most, *arguments):
-    """Run ``vibench`` with a limit on what its process may have."""
+def run_limited(folder, name, most, *arguments):
+    """Run ``vibench`` with a limit on a resource of its process."""
     number = getattr(resource, name)
     return subprocess.run(
         [sys.executable, "-m", "vibench.cli", *arguments],
@@ -42,7 +42,7 @@ def limited(folder, name, most, *arguments):
 @pytest.mark.parametrize("most", [8, 12, 16, 20, 24, 32])
 def test_too_few_file_descriptors_end_a_measurement_without_traceback(tmp_path, most):
     (tmp_path / "tiny.toml").write_text(TONE, encoding="utf-8")
-    ended = limited(
+    ended = run_limited(
         tmp_path, "RLIMIT_NOFILE", most, "measure", "tiny.toml", "--out", "out", "--check", "waived"
     )
     assert "Traceback" not in ended.stderr
@@ -61,7 +61,7 @@ def test_too_few_file_descriptors_end_a_measurement_without_traceback(tmp_path, 
     ],
 )
 def test_too_little_address_space_is_refused_before_loading_libraries(tmp_path, most_mb, arguments):
-    ended = limited(tmp_path, "RLIMIT_AS", 1_000_000 * most_mb, *arguments)
+    ended = run_limited(tmp_path, "RLIMIT_AS", 1_000_000 * most_mb, *arguments)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert re.fullmatch(
         rf"error: this process may use {most_mb} MB of address space, but needs \d+ MB\. Nothing was done; "
@@ -71,7 +71,7 @@ def test_too_little_address_space_is_refused_before_loading_libraries(tmp_path, 
 
 
 def test_a_stop_without_memory_advises_to_switch_off(tmp_path):
-    ended = limited(tmp_path, "RLIMIT_AS", 100_000_000, "stop")
+    ended = run_limited(tmp_path, "RLIMIT_AS", 100_000_000, "stop")
     assert ended.returncode == 1
     assert ended.stderr.endswith(f"{SWITCH_OFF}.\n")
 
@@ -96,13 +96,13 @@ def test_every_command_is_refused_without_address_space(vibench_here, tmp_path, 
     ],
 )
 def test_a_wrapped_memory_error_is_reported(vibench_here, tmp_path, monkeypatch, wrapped, said):
-    def short(*_arguments, **_named):
+    def run_out_of_memory(*_arguments, **_named):
         try:
             raise wrapped
         except Exception as error:
             raise OSError("could not find a library") from error
 
-    monkeypatch.setattr("vibench.cli.verify.verify_recordings", short)
+    monkeypatch.setattr("vibench.cli.verify.verify_recordings", run_out_of_memory)
     ended = vibench_here("verify", ".", cwd=tmp_path)
     assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)
     assert said in ended.stderr

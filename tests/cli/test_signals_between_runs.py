@@ -1,4 +1,4 @@
-"""A polite kill ends a campaign as stopped, between its check and its first run too."""
+"""SIGTERM ends a campaign as stopped, also between its check and its first run."""
 
 import subprocess
 import sys

@@ -20,7 +20,7 @@ LAWS = ("hertz", "linear_gap:2e5", "rigid:0.8")
 
 
 def random_specimen(folder, rng):
-    """A file of a random specimen, near enough to the paper's to be moved by the same base."""
+    """Write a random specimen, close enough to the paper's to be driven by the same base motion."""
     spread = 2.0 ** rng.uniform(-1.0, 1.0, (3, 3))
     masses, springs, dampings = spread * [[5.8e-3, 2.1e-3, 2e-3], [2.4e4, 829.0, 1.2e4], [0.47, 0.017, 0.24]]
     path = folder / "random.toml"
@@ -33,8 +33,8 @@ def random_specimen(folder, rng):
     return path
 
 
-def every_way_agrees(vibench_here, folder, path):
-    """Say that whoever reads the file builds one specimen, and that its answer is the engine's."""
+def require_agreement(vibench_here, folder, path):
+    """Require that every command builds the same specimen from the file and gives the engine's result."""
     own = load_specimen(path).specimen()
     known = solve_scene(Scene(own, DRIVE, duration=FixedDuration(0.2, 0.1)))
 
@@ -73,11 +73,11 @@ def every_way_agrees(vibench_here, folder, path):
 def test_all_commands_agree_on_the_numbers_of_random_specimens(vibench_here, tmp_path):
     rng = np.random.default_rng(1)
     for _ in range(2):
-        every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
+        require_agreement(vibench_here, tmp_path, random_specimen(tmp_path, rng))
 
 
-def one_sided(folder):
-    """A file of the paper's specimen without the stop at positive p."""
+def one_sided_specimen(folder):
+    """Write the paper's specimen without the stop at positive p."""
     path = folder / "one_sided.toml"
     path.write_text('model = "gong2025"\nname = "one-sided"\ngap_m = [30e-6, inf]\n', encoding="utf-8")
     return path
@@ -85,18 +85,18 @@ def one_sided(folder):
 
 @pytest.mark.timeout(300)
 def test_all_commands_agree_on_a_specimen_with_one_stop(vibench_here, tmp_path):
-    every_way_agrees(vibench_here, tmp_path, one_sided(tmp_path))
+    require_agreement(vibench_here, tmp_path, one_sided_specimen(tmp_path))
 
 
 @pytest.mark.parametrize("command", [("specimen",), ("chain", "--cells", 1, "--specimen")])
 def test_json_states_a_missing_stop_as_an_infinite_gap(answered, tmp_path, command):
-    document = answered(*command, one_sided(tmp_path), "--json")
+    document = answered(*command, one_sided_specimen(tmp_path), "--json")
     described = document.get("options", {}).get("described", document)
     assert described["gap_m"] == [30e-6, "inf"]
 
 
 def test_a_printed_specimen_with_one_stop_loads_unchanged(answered, tmp_path):
-    path, own = one_sided(tmp_path), tmp_path / "own.toml"
+    path, own = one_sided_specimen(tmp_path), tmp_path / "own.toml"
     own.write_text(answered("specimen", path, "--toml"), encoding="utf-8")
     assert load_specimen(own).specimen() == load_specimen(path).specimen()
 
@@ -162,7 +162,7 @@ def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(answered, tmp_path):
     assert is_beyond.any()
     assert np.all(p_m < 0.0)
     for force_n in (pressed_n, let_go_n):
-        # What pushes m1 back to the middle, and nothing before the stop is reached.
+        # Only the restoring force of m1 acts before the stop is reached.
         assert np.all(force_n[is_beyond] < 0.0)
         assert np.all(force_n[~is_beyond] == 0.0)
     assert "-0.0," not in text

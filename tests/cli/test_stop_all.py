@@ -1,4 +1,4 @@
-"""`vibench stop` in an emergency: it stops every driving program without naming one."""
+"""`vibench stop` in an emergency stops every driving program without naming one."""
 
 import subprocess
 import sys
@@ -40,7 +40,7 @@ def own_state(tmp_path_factory, monkeypatch):
 
 
 @contextmanager
-def driving(what, *within):
+def driving_program(what, *within):
     with subprocess.Popen(
         [*within, sys.executable, "-c", DRIVING, what],
         stdout=subprocess.PIPE,
@@ -56,7 +56,7 @@ def driving(what, *within):
 
 
 def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
-    with driving("north") as north, driving("south") as south:
+    with driving_program("north") as north, driving_program("south") as south:
         told = vibench_here("stop", "--level", "off", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         for what, program in (("north", north), ("south", south)):
@@ -65,7 +65,7 @@ def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
 
 
 def test_stop_with_a_name_stops_only_that_program(vibench_here, tmp_path):
-    with driving("north") as north, driving("south") as south:
+    with driving_program("north") as north, driving_program("south") as south:
         assert vibench_here("stop", "--pid", north.pid, cwd=tmp_path).returncode == 0
         north.wait(20)
         assert [each.what for each in announced_programs(Program)] == ["south"]
@@ -73,7 +73,7 @@ def test_stop_with_a_name_stops_only_that_program(vibench_here, tmp_path):
 
 
 def test_hold_requires_a_program(vibench_here, tmp_path):
-    with driving("north"), driving("south"):
+    with driving_program("north"), driving_program("south"):
         told = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert told.returncode == 1
         assert len(announced_programs(Program)) == 2
@@ -81,7 +81,7 @@ def test_hold_requires_a_program(vibench_here, tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
 def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_here, tmp_path):
-    with driving("hangs") as hangs, driving("south") as south:
+    with driving_program("hangs") as hangs, driving_program("south") as south:
         with frozen(hangs.pid):
             told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
             assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
@@ -93,9 +93,9 @@ def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_h
 
 @pytest.mark.skipif(sys.platform != "linux", reason="containers as Linux has them")
 def test_programs_in_containers_with_a_shared_state_folder_are_all_found(vibench_here, tmp_path):
-    """Both are process 1 in their container; the second wrote over what the first had said of itself."""
+    """Both have process number 1 in their containers; neither may overwrite the other's announcement."""
     with ExitStack() as running:
-        programs = [running.enter_context(driving(what, *CONTAINER)) for what in ("north", "south")]
+        programs = [running.enter_context(driving_program(what, *CONTAINER)) for what in ("north", "south")]
         told = vibench_here("stop", "--level", "abort", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         assert "north, process 1: has carried out the stop (abort)" in told.stdout
@@ -106,7 +106,7 @@ def test_programs_in_containers_with_a_shared_state_folder_are_all_found(vibench
 
 @contextmanager
 def on_another_computer(what):
-    """What a program there says of itself in a home that both share; its lock is held while it lives."""
+    """Announce a program of another computer with the same home folder, and hold its lock."""
     facts = facts_of_this_process(what)
     boot, *others = facts["process_start"].split("_")
     assert others
@@ -127,7 +127,7 @@ def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, 
         assert alone.returncode == 1
         assert "no engine is running" in alone.stderr
         assert there in alone.stderr
-        with driving("here"):
+        with driving_program("here"):
             told = vibench_here("stop", cwd=tmp_path)
         assert told.returncode == 0
         assert there in told.stdout

@@ -1,4 +1,4 @@
-"""Fast `vibench stop`: it loads only the standard library and reports what it cannot verify."""
+"""The fast `vibench stop` loads only the standard library and reports what it cannot verify."""
 
 import os
 import resource
@@ -10,7 +10,7 @@ import pytest
 
 from vibench.acquisition.stopping.program import Program, announced_programs
 
-from .test_stop_all import driving, own_state  # noqa: F401 - a fixture
+from .test_stop_all import driving_program, own_state  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the complete command stops")
 COMMAND = (
@@ -41,7 +41,7 @@ def vibench_stop(*words, **variables):
 
 
 def test_stop_loads_only_the_standard_library():
-    with driving("north"):
+    with driving_program("north"):
         told = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
     said, others, ours = told.stdout.splitlines()
     assert "its output is off" in said
@@ -49,7 +49,7 @@ def test_stop_loads_only_the_standard_library():
 
 
 def test_stop_takes_less_than_0_1_s_of_processor_time():
-    with driving("north"):
+    with driving_program("north"):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         assert vibench_stop().returncode == 0
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -61,7 +61,7 @@ def test_stop_takes_less_than_0_1_s_of_processor_time():
     [(("--level", "off", "--reason", "smoke"), "off smoke"), (("--level=abort",), "abort vibench stop")],
 )
 def test_the_fast_stop_delivers_the_stop_with_its_options(words, told):
-    with driving("north") as north:
+    with driving_program("north") as north:
         said = vibench_stop(*words)
         assert said.returncode == 0
         assert f"north, process {north.pid}: has carried out the stop" in said.stdout
@@ -69,7 +69,7 @@ def test_the_fast_stop_delivers_the_stop_with_its_options(words, told):
 
 
 def test_the_fast_stop_stops_the_named_program():
-    with driving("north") as north, driving("south"):
+    with driving_program("north") as north, driving_program("south"):
         assert vibench_stop("--pid", str(north.pid)).returncode == 0
         north.wait(20)
         assert [each.what for each in announced_programs(Program)] == ["south"]
@@ -80,7 +80,7 @@ def test_the_fast_stop_stops_the_named_program():
     ("words", "code"), [(("--level", "loud"), 1), (("--level",), 2), (("--pid", "x"), 1), (("--reason=",), 1)]
 )
 def test_arguments_that_the_fast_stop_does_not_handle_run_the_full_command(words, code):
-    with driving("north") as north:
+    with driving_program("north") as north:
         told = vibench_stop(*words)
         assert told.returncode == code, told.stderr
         assert north.poll() is None
@@ -88,7 +88,7 @@ def test_arguments_that_the_fast_stop_does_not_handle_run_the_full_command(words
 
 @pytest.mark.thorough
 def test_the_fast_stop_gives_advice_about_a_killed_program():
-    with driving("north") as north:
+    with driving_program("north") as north:
         north.kill()
         north.wait()
         for _ in range(2):
@@ -100,7 +100,7 @@ def test_the_fast_stop_gives_advice_about_a_killed_program():
 
 @pytest.mark.parametrize("is_killed", [False, True])
 def test_control_characters_in_a_program_name_are_escaped(is_killed):
-    with driving("a\x1b[2J\u202e\x9b1m") as hostile:
+    with driving_program("a\x1b[2J\u202e\x9b1m") as hostile:
         if is_killed:
             hostile.kill()
             hostile.wait()
@@ -110,7 +110,7 @@ def test_control_characters_in_a_program_name_are_escaped(is_killed):
 
 @pytest.mark.thorough
 def test_a_suspended_program_is_not_reported_as_silent():
-    with driving("north") as north:
+    with driving_program("north") as north:
         os.kill(north.pid, 19)
         told = vibench_stop("--level", "abort")
         os.kill(north.pid, 18)

@@ -1,4 +1,4 @@
-"""`vibench stop` reaches `vibench measure` between two runs, and while one is held, at the wall's pace."""
+"""`vibench stop` reaches `vibench measure` between two runs and during a held run, in real time."""
 
 import re
 import signal
@@ -52,8 +52,8 @@ def own_state(tmp_path_factory, monkeypatch):
 
 
 @contextmanager
-def measuring(folder, first_s, rest_s, ramp_s=0.3):
-    """Let a campaign of two runs be measured by a command of its own."""
+def measuring_program(folder, first_s, rest_s, ramp_s=0.3):
+    """Run a campaign of two runs by command, in a separate process."""
     runs = "".join(
         RUN.format(name=name, duration_s=duration_s, ramp_s=ramp_s)
         for name, duration_s in (("first", first_s), ("second", LONG_S))
@@ -70,7 +70,7 @@ def measuring(folder, first_s, rest_s, ramp_s=0.3):
 
 
 def until(program, is_so):
-    """Look at the command's engine until something is so."""
+    """Poll the status of the command's engine until a condition holds."""
     give_up_s, clock = time.monotonic() + PATIENCE_S, Event()
     while time.monotonic() < give_up_s and program.poll() is None:
         with suppress(EngineError), EngineClient.attach(the_engine(program.pid).address) as visitor:
@@ -81,7 +81,7 @@ def until(program, is_so):
     pytest.fail(f"never so: {program.stderr.read().decode()}")
 
 
-def rests(status):
+def is_resting(status):
     return any("resting for" in each.what for each in status.messages)
 
 
@@ -89,11 +89,11 @@ def is_held(status):
     return status.state is EngineState.HELD
 
 
-def dwells(status):
+def is_dwelling(status):
     return status.run is not None and status.run.segment == "dwell"
 
 
-def ramps_down(status):
+def is_ramping_down(status):
     return status.run is not None and status.run.run_state is RunState.RAMPING_DOWN
 
 
@@ -104,8 +104,8 @@ def states(folder):
 @pytest.mark.thorough
 @pytest.mark.parametrize("level", ["ramp", pytest.param("off", marks=pytest.mark.thorough)])
 def test_a_stop_during_a_cooling_pause_ends_the_campaign(vibench_here, tmp_path, level):
-    with measuring(tmp_path, first_s=0.2, rest_s=LONG_S) as program:
-        until(program, rests)
+    with measuring_program(tmp_path, first_s=0.2, rest_s=LONG_S) as program:
+        until(program, is_resting)
         told = vibench_here("stop", "--level", level, "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         assert program.wait(SOON_S) == ExitCode.STOPPED
@@ -119,8 +119,8 @@ def test_a_stop_during_a_cooling_pause_ends_the_campaign(vibench_here, tmp_path,
     "level", ["off", *(pytest.param(each, marks=pytest.mark.thorough) for each in ("ramp", "abort"))]
 )
 def test_a_stop_of_a_held_run_keeps_its_recording_and_ends_silent(vibench_here, tmp_path, level):
-    with measuring(tmp_path, first_s=LONG_S, rest_s=0.0) as program:
-        until(program, dwells)
+    with measuring_program(tmp_path, first_s=LONG_S, rest_s=0.0) as program:
+        until(program, is_dwelling)
         assert vibench_here("stop", "--level", "hold", cwd=tmp_path).returncode == 0
         until(program, is_held)
         told = vibench_here("stop", "--level", level, "--reason", "smoke", cwd=tmp_path)
@@ -140,7 +140,7 @@ def test_a_stalled_run_is_reported_as_failed(vibench_here, tmp_path, monkeypatch
     (tmp_path / "f.toml").write_text(
         '[[faults]]\nat_s = 1.0\nfault = "slow_disk"\ndelay_s = 0.2\nfor_s = 9.0\n'
     )
-    # A short queue is full before the rig's time reaches the end of the fault.
+    # A short queue fills before rig time reaches the end of the fault.
     monkeypatch.setattr(writer, "QUEUE_S", 0.5)
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 3)
     words = ("measure", "c.toml", "--out", "out", "--check", "waived", "--faults", "f.toml")
@@ -154,7 +154,7 @@ def test_a_stalled_run_is_reported_as_failed(vibench_here, tmp_path, monkeypatch
 
 
 class StoppedBefore(Engine):
-    """A stop that comes while the bench opens."""
+    """A stop switch that is used while the bench opens."""
 
     def __init__(self, supervision):
         super().__init__(supervision)
@@ -171,10 +171,10 @@ def test_a_campaign_stopped_during_its_check_is_reported(vibench_here, tmp_path,
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
 def test_a_second_ctrl_c_states_that_the_output_is_off(tmp_path):
-    with measuring(tmp_path, first_s=LONG_S, rest_s=0.0, ramp_s=5.0) as program:
-        until(program, dwells)
+    with measuring_program(tmp_path, first_s=LONG_S, rest_s=0.0, ramp_s=5.0) as program:
+        until(program, is_dwelling)
         program.send_signal(signal.SIGINT)
-        until(program, ramps_down)
+        until(program, is_ramping_down)
         program.send_signal(signal.SIGINT)
         assert program.wait(SOON_S) == 128 + signal.SIGINT
         assert re.fullmatch(rb"stopped: SIGINT: .*\. The output is off\.\n", program.stderr.read())

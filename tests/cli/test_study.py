@@ -1,4 +1,4 @@
-"""`vibench study` as a user meets it: a file of answers, one sentence for each error, Ctrl-C, resume."""
+"""`vibench study` as a user runs it: a file of results, one-sentence errors, Ctrl-C and resume."""
 
 import contextlib
 import os
@@ -83,7 +83,7 @@ def test_ctrl_c_keeps_what_is_computed_and_resume_continues(vibench, tmp_path):
         stderr=subprocess.PIPE,
     )
     try:
-        while running.poll() is None and not some_kept(tmp_path / "a.h5"):
+        while running.poll() is None and not has_results(tmp_path / "a.h5"):
             with contextlib.suppress(subprocess.TimeoutExpired):
                 running.wait(timeout=LOOK_S)
         running.send_signal(signal.SIGINT)
@@ -101,8 +101,8 @@ def test_ctrl_c_keeps_what_is_computed_and_resume_continues(vibench, tmp_path):
     assert np.count_nonzero(results.values("session") == 0.0) == kept
 
 
-def some_kept(path):
-    """Whether a file that is being made holds an answer."""
+def has_results(path):
+    """Return whether an unfinished file already contains a result."""
     return path.exists() and path.stat().st_size > 0 and open_study(path).kept > 0
 
 
@@ -132,7 +132,7 @@ def test_a_study_with_a_failed_point_is_saved_and_returns_an_error(vibench_here,
     assert "2 of 2 points, 1 failed (complete)" in ran.stdout
     assert "error: model rigid:1: more impacts than allowed" in ran.stderr
     assert np.isfinite(open_study(tmp_path / "a.h5").values("response_i", model="hertz")).all()
-    # A figure or a reproduction that rests on such a study is made, and ends in the same error.
+    # Figures and reproductions of such a study are made, and also return the error.
     studies = KeptStudies(tmp_path / "studies", 1)
     assert studies(Study.model_validate(tomllib.loads(asked.read_text(encoding="utf-8")))).is_complete
     with pytest.raises(typer.Exit) as ended:

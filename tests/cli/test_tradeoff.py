@@ -1,4 +1,4 @@
-"""`vibench tradeoff` of a user's scene: error over time for every applicable method."""
+"""`vibench tradeoff` for a user's case: error over time for every applicable method."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`vibench twin` beside a real engine in real time: it reports p and does not delay the run."""
+"""`vibench twin` beside a real engine in real time reports p and does not delay the run."""
 
 import os
 import signal
@@ -39,7 +39,7 @@ def campaign(limits, duration_s=600.0):
 
 @pytest.fixture
 def running(tmp_path, monkeypatch):
-    """Start an engine on a rig at the wall's pace, and on it a campaign."""
+    """Return a function that starts an engine with a rig in real time, and a campaign on it."""
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     rig = load_rig("virtual_rig")
@@ -83,7 +83,7 @@ def test_the_live_twin_reports_p_and_a_change_ends_the_run_if_planned(running, t
     assert len(shown) > 100
     assert max(map(abs, shown)) < 48e-6
     assert told.step_s * len(told.p_m) == pytest.approx(0.05, rel=0.1)
-    # It may be ended, and started again, and what is measured is measured on.
+    # A twin may be ended and started again while the measurement continues.
     client.turn_twin(TwinSwitch.OFF)
     assert client.status().twin is None
     until(client, lambda status: status.samples > told.end_sample + 51_200)
@@ -99,7 +99,7 @@ def test_the_live_twin_reports_p_and_a_change_ends_the_run_if_planned(running, t
 
 @pytest.mark.thorough
 def test_the_live_twin_waits_while_a_scan_measures_another_mass(running):
-    """The engine's samples are then those of m2: taken for m0, they would look like another specimen."""
+    """The samples are then those of m2, which would look like another specimen if taken for m0."""
     point = {"name": "tip", "body": "m2", "x_m": 0.0, "y_m": 0.0, "z_m": 0.04}
     plan = campaign({}).model_dump(mode="json") | {"scan": [point]}
     client = running(Campaign.model_validate(plan), twin=TwinSwitch.ON)

@@ -17,7 +17,7 @@ LICENCE = ("--license", "https://creativecommons.org/licenses/by/4.0/")
 
 @pytest.fixture
 def folder(tmp_path):
-    """Two recordings, as a campaign has noted them."""
+    """Return a folder with two recordings and the journal of their campaign."""
     folder = tmp_path / "recordings"
     folder.mkdir()
     for name in ("dwell.h5", "noise.h5"):
@@ -25,25 +25,25 @@ def folder(tmp_path):
     return folder
 
 
-def halved(file):
+def halve_samples(file):
     file["m0_velocity"][...] = file["m0_velocity"][...] // 2
 
 
-def scaled(file):
+def change_scale(file):
     attributes = file["m0_velocity"].attrs
     for name in ("scale_factor", "physical_per_volt"):
         attributes[name] = 2 * attributes[name]
 
 
-def in_other_units(file):
+def change_units(file):
     file["m0_velocity"].attrs["units"] = np.bytes_(b"mm s-1")
 
 
-def at_another_rate(file):
+def change_rate(file):
     file.attrs["sample_rate_hz"] = 2 * file.attrs["sample_rate_hz"]
 
 
-def text_changed(name, old, new):
+def change_text(name, old, new):
     def change(file):
         text = file[f"configuration/{name}"][()].replace(old, new)
         del file[f"configuration/{name}"]
@@ -52,29 +52,29 @@ def text_changed(name, old, new):
     return change
 
 
-def shifted(file):
+def shift_samples(file):
     file["segments/first_sample"][0] += 1
 
 
-def delayed(file):
+def delay_channel(file):
     file["m0_velocity"].attrs["delay_s"] = 1e-4
 
 
 CHANGES = {
     "nothing": lambda file: None,
-    "samples": halved,
-    "scale": scaled,
-    "units": in_other_units,
-    "rate": at_another_rate,
-    "plan": text_changed("plan_json", b"260.0", b"261.0"),
-    "rig": text_changed("bench_json", b"{", b'{"calibration_valid_days": 9, '),
-    "segment": shifted,
-    "delay": delayed,
+    "samples": halve_samples,
+    "scale": change_scale,
+    "units": change_units,
+    "rate": change_rate,
+    "plan": change_text("plan_json", b"260.0", b"261.0"),
+    "rig": change_text("bench_json", b"{", b'{"calibration_valid_days": 9, '),
+    "segment": shift_samples,
+    "delay": delay_channel,
 }
 
 
-def said_by_all(vibench_here, folder, name="dwell.h5"):
-    """What each command says of a recording: code, and all its words."""
+def outputs_of_all_commands(vibench_here, folder, name="dwell.h5"):
+    """Return the exit code and the output of each command for a recording."""
     for each in {*folder.parent.iterdir()} - {folder}:
         shutil.rmtree(each) if each.is_dir() else each.unlink()
     asked = {
@@ -106,7 +106,7 @@ def test_every_command_refuses_or_warns_about_a_recording_without_its_seal(viben
     with h5py.File(folder / "dwell.h5", "r+") as file:
         del file["seal"]
         CHANGES[change](file)
-    told = said_by_all(vibench_here, folder)
+    told = outputs_of_all_commands(vibench_here, folder)
     for word in ("verify", "verify folder", "pack"):
         assert told[word][0] == 1, told[word]
         assert "error: " in told[word][1]
@@ -124,17 +124,17 @@ def test_every_command_refuses_or_warns_about_a_recording_without_its_seal(viben
 @pytest.mark.parametrize("how", [pytest.param("copied over", marks=pytest.mark.slow), "sealed anew"])
 def test_a_swapped_recording_is_refused_by_every_command(vibench_here, folder, how):
     noted(folder, ("dwell", "noise"))
-    assert {code for code, _ in said_by_all(vibench_here, folder).values()} == {0}
+    assert {code for code, _ in outputs_of_all_commands(vibench_here, folder).values()} == {0}
     if how == "copied over":
         shutil.copy(folder / "noise.h5", folder / "dwell.h5")
     else:
         with h5py.File(folder / "dwell.h5", "r+") as file:
             del file["seal"], file["m0_velocity"].attrs["sha256"]
-            halved(file)
+            halve_samples(file)
             counts = file["m0_velocity"][()].tobytes()
             file["m0_velocity"].attrs["sha256"] = np.bytes_(hashlib.sha256(counts).hexdigest().encode())
             _seal.write_seal(file, {}, None)
-    for word, (code, text) in said_by_all(vibench_here, folder).items():
+    for word, (code, text) in outputs_of_all_commands(vibench_here, folder).items():
         assert code == 1, (word, text)
         assert "the campaign's journal for dwell: another recording" in text, (word, text)
 

@@ -31,13 +31,13 @@ SECRET = b"root:x:0:0:root:/root:/bin/bash\n" * 200
 @pytest.fixture
 def folder(tmp_path):
     for name in ("one", "two", "three"):
-        with growing(tmp_path / f"{name}.h5"):
+        with growing_recording(tmp_path / f"{name}.h5"):
             pass
     return tmp_path
 
 
 @contextlib.contextmanager
-def growing(path):
+def growing_recording(path):
     """Write half a second of three channels; the recording is finished when the block ends."""
     channels = tuple(
         ChannelHeader(role, "ai0", "voltage", "V", 1.0, 5.0)
@@ -54,7 +54,7 @@ def damage(path):
 
 
 def point_outside(path):
-    """Let a recording give out a local file as its samples."""
+    """Make the samples of a recording an external link to a local file."""
     path.with_name("passwd").write_bytes(SECRET)
     with h5py.File(path, "r+") as file:
         kept = {name: value for name, value in file["m0_velocity"].attrs.items() if name != "DIMENSION_LIST"}
@@ -62,7 +62,7 @@ def point_outside(path):
         where = [(str(path.with_name("passwd")), 0, 2000)]
         made = file.create_dataset("m0_velocity", shape=(500,), dtype="<i4", external=where)
         made.attrs.update(kept)
-        # Whoever forges samples can forge their checksum, too.
+        # Whoever forges samples can also forge their checksum.
         made.attrs["sha256"] = np.bytes_(hashlib.sha256(SECRET[:2000]).hexdigest())
 
 
@@ -110,8 +110,8 @@ def test_the_catalogue_names_a_damaged_recording_and_fails(vibench_here, folder)
     assert seals == ["intact", "damaged", "intact"]
 
 
-def packed(vibench_here, folder):
-    """Pack a folder; gives what was said, and the crate's entities by name."""
+def pack_folder(vibench_here, folder):
+    """Pack a folder; return the output, and the entities of the crate by name."""
     found = vibench_here("pack", ".", "--license", LICENCE, "--out", "crate.zip", cwd=folder)
     with ZipFile(folder / "crate.zip") as archive:
         names = set(archive.namelist())
@@ -120,7 +120,7 @@ def packed(vibench_here, folder):
 
 
 def test_an_intact_folder_is_packed_without_warnings(vibench_here, folder):
-    found, names, graph = packed(vibench_here, folder)
+    found, names, graph = pack_folder(vibench_here, folder)
     assert (found.returncode, "error" in found.stderr) == (0, False), found.stderr
     assert {"one.h5", "two.h5", "three.h5"} < names
     assert "; complete: " in graph["two.h5"]["description"]
@@ -128,9 +128,9 @@ def test_an_intact_folder_is_packed_without_warnings(vibench_here, folder):
 
 
 def test_unfinished_recordings_are_excluded_from_a_crate_and_named(vibench_here, folder):
-    with growing(folder / "four.h5"):
+    with growing_recording(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
-    found, names, _ = packed(vibench_here, folder)
+    found, names, _ = pack_folder(vibench_here, folder)
     assert (found.returncode, "five.h5.part" in names) == (0, False)
     assert "note: five.h5.part is not finished and was omitted" in found.stderr
 
@@ -138,13 +138,13 @@ def test_unfinished_recordings_are_excluded_from_a_crate_and_named(vibench_here,
 def test_a_crate_marks_damaged_recordings(vibench_here, folder):
     damage(folder / "two.h5")
     (folder / "three.h5").write_bytes((folder / "three.h5").read_bytes()[:5000])
-    found, names, graph = packed(vibench_here, folder)
+    found, names, graph = pack_folder(vibench_here, folder)
     assert found.returncode == 1
     errors = [line for line in found.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 2
     assert "two.h5 cannot be trusted (damaged: changed since sealing: data of /m0_velocity)" in found.stderr
     assert "three.h5 cannot be trusted (unreadable: " in found.stderr
-    # Nothing is left out for it: a deposit may be all that remains.
+    # A damaged recording is packed too: the crate may be all that remains.
     assert {"one.h5", "two.h5", "three.h5"} < names
     for name in ("two.h5", "three.h5"):
         assert graph[name]["description"].startswith("Cannot be trusted")
@@ -160,7 +160,7 @@ def test_a_crate_names_missing_recordings_of_its_campaign(vibench_here, folder):
     made = vibench_here("measure", "tiny.toml", "--out", ".", "--check", "waived", cwd=folder)
     assert made.returncode == 0, made.stderr
     (folder / "tone.h5").unlink()
-    found, names, graph = packed(vibench_here, folder)
+    found, names, graph = pack_folder(vibench_here, folder)
     assert found.returncode == 1
     assert "error: tone.h5 cannot be trusted (missing: the campaign recorded tone here)" in found.stderr
     assert "tone.h5" not in {*names, *graph}
@@ -195,7 +195,7 @@ def test_external_links_are_read_on_request(vibench_here, folder):
 
 
 def test_recover_follows_external_links_on_request(vibench_here, folder):
-    with growing(folder / "four.h5"):
+    with growing_recording(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     with h5py.File(folder / "five.h5.part", "r+") as file:
         file["elsewhere"] = h5py.ExternalLink("one.h5", "/")

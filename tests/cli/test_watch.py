@@ -1,4 +1,4 @@
-"""`vibench watch` and `vibench stop` find an engine that somebody else has started, and reach it."""
+"""`vibench watch` and `vibench stop` find and reach an engine that another program has started."""
 
 import json
 import os
@@ -43,7 +43,7 @@ def running(tmp_path):
         yield engine
 
 
-def unheard(level, reason):
+def refuse_stop(level, reason):
     raise AssertionError((level, reason))
 
 
@@ -127,7 +127,7 @@ def test_watch_reports_an_unwritable_state_folder(vibench_here, tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
 def test_the_token_is_readable_by_its_owner_only(tmp_path):
     state = Path(os.environ["VIBENCH_STATE_DIR"])
-    with announce(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", unheard):
+    with announce(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", refuse_stop):
         (file,) = (state / "engines").iterdir()
         assert file.stat().st_mode & 0o077 == 0
 
@@ -149,7 +149,7 @@ print(outcome.state)
 
 @sees_locks
 class TestWithoutAnEngine:
-    """Scripts and checks that drive a bench themselves were not to be found, while the shaker moved."""
+    """Scripts and checks without an engine are also found while they drive a bench."""
 
     @pytest.fixture
     def script(self, tmp_path):

@@ -59,8 +59,8 @@ def rig(installed):
 @pytest.fixture
 def board_and_rig(rig):
     """Yield a board, and the configuration of a rig with this board."""
-    with on_rig(rig) as (board, board_and_rig):
-        yield board, board_and_rig
+    with on_rig(rig) as (board, served):
+        yield board, served
 
 
 @pytest.fixture
