@@ -371,12 +371,12 @@ class Spread:
     sd_m: float
 
 
-def measured(mean_m=2.0):
+def result(mean_m=2.0):
     return Measured(Spread(np.float64(mean_m), np.nan), np.array([95.0, 266.0]), None, pathlib.Path("here"))
 
 
 def test_a_json_document_has_all_fields_in_order_and_null_for_unknown():
-    document = measured().to_dict()
+    document = result().to_dict()
     assert list(document) == ["mean_m", "sd_m", "lowest_hz", "missing_m", "folder"]
     assert json.dumps(document, allow_nan=False) == (
         '{"mean_m": 2.0, "sd_m": null, "lowest_hz": 95.0, "missing_m": null, "folder": "here"}'
@@ -384,7 +384,7 @@ def test_a_json_document_has_all_fields_in_order_and_null_for_unknown():
 
 
 def test_rows_of_several_results_are_concatenated():
-    found = rows([measured(), measured(3.0)], "frequency_hz mean_m=part.mean_m size_m=absent.size_m")
+    found = rows([result(), result(3.0)], "frequency_hz mean_m=part.mean_m size_m=absent.size_m")
     np.testing.assert_array_equal(found["frequency_hz"], [95.0, 266.0, 95.0, 266.0])
     np.testing.assert_array_equal(found["mean_m"], [2.0, 3.0])
     np.testing.assert_array_equal(found["size_m"], [np.nan, np.nan])

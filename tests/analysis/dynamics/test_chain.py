@@ -79,7 +79,7 @@ def test_alternating_cells_repeat_and_changed_values_apply_to_every_cell():
         ({"start_hz": 10.0, "stop_hz": 300.0, "step_hz": 1e-3}, "take a larger step"),
     ],
 )
-def test_an_invalid_request_is_refused_in_one_sentence(options, said):
+def test_an_invalid_chain_request_is_refused_in_one_sentence(options, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**options)
 
@@ -97,7 +97,7 @@ def test_a_steady_chain_reaches_a_requested_error():
     assert np.all(np.isnan(truth.transmission_error))
 
 
-def test_stated_errors_of_lines_hold_in_95_percent():
+def test_stated_errors_of_spectral_lines_hold_in_95_percent():
     random = np.random.default_rng(5)
     drawn = random.standard_normal((400, 16, 2)) @ np.array([1.0, 1j])
     held = [abs(abs(lines.mean()) / 5.0 - 1.0) <= error_of_lines(lines[:, None])[0] for lines in 5.0 + drawn]

@@ -271,7 +271,7 @@ def test_a_lossy_contact_reports_the_missing_damping_check():
 
 
 @pytest.mark.thorough
-def test_a_balance_reports_the_convergence_of_its_harmonics():
+def test_a_harmonic_balance_reports_the_convergence_of_its_harmonics():
     options = {"model": "power:5", "start": 60.0, "stop": 80.0, "places": 2, "starts": 0}
     first = diagram_of(BranchRequest(method=BranchMethod.FIRST_ORDER, **options))
     many = diagram_of(BranchRequest(method=BranchMethod.BALANCE, **options))

@@ -32,7 +32,7 @@ OWN = {"name": "mine", "masses_kg": (5.8e-3, 2.1e-3, 2.2e-3)}
         ({"x_m": 1e-7}, "Specimen gong2025, frequency_hz = 260, x_m = 1e-07;"),
     ],
 )
-def test_a_caption_names_every_changed_specimen_value(said, words):
+def test_a_map_caption_names_every_changed_specimen_value(said, words):
     # The drive is too small for contact, so nothing is integrated.
     levels = Range(start=1e-9, stop=2e-9, points=2)
     plan = Map.model_validate({"amplitude_m": levels, "periods": 100, "window_periods": 10, **said})
@@ -51,7 +51,7 @@ CHAOS = MapMotion(MotionKind.CHAOTIC_SO_FAR, None, True, 4.08, 2.0, Share(0.7134
         (3, None, "71.34% of the points; with other random initial states 17.07% to 96.78%"),
     ],
 )
-def test_the_share_of_a_motion_has_an_interval_only_if_it_is_an_estimate(random_starts, filled, end):
+def test_the_share_of_a_motion_in_a_map_has_an_interval_only_if_estimated(random_starts, filled, end):
     plan = Map(frequency_hz=Range(start=100.0, stop=200.0, points=3), random_starts=random_starts)
     audit = None if filled is None else Audit(filled, 0, 0, (0.0,), (0.0,))
     said = motion_words(SimpleNamespace(plan=plan, audit=audit), CHAOS)

@@ -109,7 +109,7 @@ def test_wav_keeps_converter_counts_relative_to_full_scale(known, known_values, 
         np.testing.assert_array_equal(column / 2.0**31 * full_scale, np.nan_to_num(known_values[role]))
 
 
-def test_a_rate_that_wav_cannot_state_is_refused(known, tmp_path):
+def test_a_sampling_rate_that_wav_cannot_state_is_refused(known, tmp_path):
     odd = replace(known, sample_rate_hz=51_199.7)
     with pytest.raises(
         InvalidRequest, match=r"51199\.7 samples/s, but the rate of a WAV file is a whole number"

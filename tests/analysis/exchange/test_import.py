@@ -462,7 +462,7 @@ def test_a_sampling_rate_far_from_the_rate_in_the_file_is_refused(tmp_path):
         ("time [s]", 1.0, 2, 1000.0),
     ],
 )
-def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading, unit_s, digits, rate_hz):
+def test_a_sampling_rate_contradicting_a_time_column_is_refused(tmp_path, heading, unit_s, digits, rate_hz):
     rows = (f"{k / rate_hz / unit_s:.{digits}f};{value!r}\n" for k, value in enumerate(signals()[0].tolist()))
     (tmp_path / "a.csv").write_text(f"{heading};v\n" + "".join(rows), encoding="utf-8")
     meaning = mapping(tmp_path, ("v", "m0_velocity", ""))
@@ -489,7 +489,7 @@ def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading,
         ("             ", "s", None),
     ],
 )
-def test_a_rate_that_contradicts_a_universal_file_is_refused(known, tmp_path, increment, unit, said):
+def test_a_sampling_rate_that_contradicts_a_universal_file_is_refused(known, tmp_path, increment, unit, said):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     lines = path.read_bytes().split(b"\n", 19)
     lines[12] = b"NONE"
@@ -507,7 +507,7 @@ def test_a_rate_that_contradicts_a_universal_file_is_refused(known, tmp_path, in
 
 
 @pytest.mark.parametrize("to", [Format.UFF, Format.MAT, Format.CSV])
-def test_a_rate_that_contradicts_a_vibench_export_is_refused(known, tmp_path, to):
+def test_a_sampling_rate_that_contradicts_a_vibench_export_is_refused(known, tmp_path, to):
     path, *_ = export_samples(excerpt(known, to_s=0.5), to, tmp_path / f"a.{to.value}")
     source = "m0_velocity.values" if to is Format.MAT else "m0_velocity"
     for each in (path, known.path):
@@ -673,7 +673,7 @@ def test_external_links_are_read_only_if_allowed(tmp_path):
         assert [each.name for each in source.channels] == ["/v"]
 
 
-def test_nothing_is_overwritten_by_an_import(tmp_path):
+def test_an_import_overwrites_no_file(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     (tmp_path / "made.h5").write_text("mine")
     with pytest.raises(RecordingError, match="nothing is ever overwritten"):

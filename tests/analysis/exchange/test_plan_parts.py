@@ -75,7 +75,7 @@ def test_parts_after_the_end_of_the_file_are_left_out():
         ([(1e307, 1e308)], "no part of the plan begins within the 10 s"),
     ],
 )
-def test_impossible_parts_are_refused(told, said):
+def test_impossible_parts_of_an_imported_plan_are_refused(told, said):
     parts = [{"start_s": start_s, "stop_s": stop_s} for start_s, stop_s in told]
     with pytest.raises(InvalidRequest, match=said):
         place_parts(mapping_of(NOISE, parts=parts), 1000.0, 10_000)

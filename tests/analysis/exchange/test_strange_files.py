@@ -315,7 +315,7 @@ def test_units_at_the_end_of_a_universal_file_apply_to_its_functions(tmp_path):
     ("fact", "numbers", "said"),
     [("t0", (0, 0, 0.0025), "several different values"), ("gain", (1.0, 0.1, 10.0), "gain = 1, 0.1, 10")],
 )
-def test_several_starts_or_gains_of_one_table_are_refused(tmp_path, suffix, fact, numbers, said):
+def test_several_start_times_or_gains_of_one_table_are_refused(tmp_path, suffix, fact, numbers, said):
     facts = {fact: np.array(numbers, dtype=float)}
     if suffix == ".h5":
         with h5py.File(tmp_path / "a.h5", "w") as file:

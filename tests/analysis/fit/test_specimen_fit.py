@@ -26,7 +26,7 @@ LINES_HZ = np.arange(60.0, 560.0, 4.0)
 SD = 0.02
 
 
-def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
+def transmission(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
     """Return a transmission with line scatter ``sd`` in ln(magnitude) and in phase, stated as such."""
     scatter = sd * (rng.standard_normal(lines_hz.size) + 1j * rng.standard_normal(lines_hz.size))
     value = gain * base_transmissibility(specimen, lines_hz)[:, 0] * np.exp(scatter)
@@ -58,7 +58,7 @@ def realisation_average(specimen, rng, sd, realisations):
     spread = np.sqrt(scatter) / np.abs(value)
     coherence = 1.0 / (1.0 + 2.0 * realisations * spread**2)
     told = {"value": value, "coherence": coherence, "n_eff": float(realisations)}
-    return replace(measured(specimen, rng), **told, relative_sd_magnitude=spread, sd_phase_rad=spread)
+    return replace(transmission(specimen, rng), **told, relative_sd_magnitude=spread, sd_phase_rad=spread)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_scaled_gaps_and_dampings_keep_their_ratios():
 
 
 def test_a_noise_free_transmission_recovers_the_specimen(true):
-    clean = measured(true, np.random.default_rng(0), sd=1e-9)
+    clean = transmission(true, np.random.default_rng(0), sd=1e-9)
     fit = fit_specimen(clean, NOMINAL)
     for name, value in TRUE.items():
         assert fit.value(name).value == pytest.approx(value, rel=1e-6)
@@ -105,7 +105,7 @@ def test_a_noise_free_transmission_recovers_the_specimen(true):
 def test_fit_intervals_have_their_stated_coverage_and_width(true):
     rng = np.random.default_rng(20250101)
     draws = 120
-    fits = [fit_specimen(measured(true, rng), NOMINAL) for _ in range(draws)]
+    fits = [fit_specimen(transmission(true, rng), NOMINAL) for _ in range(draws)]
     # Three standard deviations of the binomial number of covered values: 114 +- 7.2 of 120.
     slack = 3 * math.sqrt(draws * 0.95 * 0.05)
     for name, value in TRUE.items():
@@ -147,7 +147,7 @@ def test_noisy_lines_neither_reject_a_true_model_nor_diverge(true):
 
 
 def test_channel_high_pass_and_delay_do_not_bias_the_fit(true):
-    clean = measured(true, np.random.default_rng(6), sd=1e-3)
+    clean = transmission(true, np.random.default_rng(6), sd=1e-3)
     turned = 0.5 / LINES_HZ + 2 * np.pi * LINES_HZ * 20e-6
     fit = fit_specimen(replace(clean, value=clean.value * np.exp(1j * turned)), NOMINAL)
     for name, value in TRUE.items():
@@ -158,7 +158,7 @@ def test_channel_high_pass_and_delay_do_not_bias_the_fit(true):
 
 def test_frequency_intervals_include_the_converter_clock(true):
     """A clock that runs 40 ppm fast lowers all frequencies by 40 ppm, without any scatter."""
-    slow = measured(true, np.random.default_rng(7), sd=1e-6)
+    slow = transmission(true, np.random.default_rng(7), sd=1e-6)
     fit = fit_specimen(replace(slow, frequency_hz=LINES_HZ * (1 - 40e-6)), NOMINAL)
     for name, value in TRUE.items():
         found = fit.value(name)
@@ -167,7 +167,7 @@ def test_frequency_intervals_include_the_converter_clock(true):
 
 
 def test_parameters_not_fitted_keep_their_described_values(true):
-    fit = fit_specimen(measured(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
+    fit = fit_specimen(transmission(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
     assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
     assert fit.specimen.stiffnesses == pytest.approx(true.stiffnesses, rel=1e-12)
     with pytest.raises(InvalidRequest, match="f0_hz was not fitted"):
@@ -192,7 +192,7 @@ def test_one_wrong_assumption_is_rejected_and_named_as_suspect(true, assumption)
     factors = WRONG[assumption]
     other = with_values(true, {each: f * parameter_value(true, each) for each, f in factors.items()})
     gain = 1.01 if assumption is Assumption.SENSITIVITY else 1.0
-    found = measured(other, np.random.default_rng(2), sd=2e-3, gain=gain)
+    found = transmission(other, np.random.default_rng(2), sd=2e-3, gain=gain)
     fit = fit_specimen(found, NOMINAL, is_nonlinear=False)
     assert not fit.fits
     assert fit.values == ()
@@ -210,7 +210,7 @@ def test_one_wrong_assumption_is_rejected_and_named_as_suspect(true, assumption)
 def test_indistinguishable_causes_are_named_together(true):
     """At one level of linear motion a damper and friction have the same effect."""
     other = with_values(true, {Parameter.C0: 3.0 * parameter_value(true, Parameter.C0)})
-    fit = fit_specimen(measured(other, np.random.default_rng(2), sd=2e-3), NOMINAL)
+    fit = fit_specimen(transmission(other, np.random.default_rng(2), sd=2e-3), NOMINAL)
     assert {each.assumption for each in fit.suspects if each.may_be_it} == {
         Assumption.C0,
         Assumption.FRICTION,
@@ -219,7 +219,7 @@ def test_indistinguishable_causes_are_named_together(true):
 
 def test_sensor_uncertainty_widens_dependent_intervals(true):
     """A sensitivity error of 1 % is no contradiction if the calibration uncertainty is 1 %."""
-    off = measured(true, np.random.default_rng(8), sd=2e-3, gain=1.01)
+    off = transmission(true, np.random.default_rng(8), sd=2e-3, gain=1.01)
     allowed = fit_specimen(off, NOMINAL, scale_sd=0.01)
     assert allowed.fits
     for name, value in TRUE.items():
@@ -234,7 +234,7 @@ def test_reduced_chi_square_of_a_true_model_is_one_with_few_averages(true, avera
     draws = 0.01 * (rng.standard_normal((averages, lines_hz.size, 2)))
     mean = draws.mean(axis=0)
     spread = np.sqrt(np.sum((draws - mean) ** 2, axis=(0, 2)) / (2 * (averages - 1)) / averages)
-    clean = measured(true, rng, sd=1e-12, lines_hz=lines_hz)
+    clean = transmission(true, rng, sd=1e-12, lines_hz=lines_hz)
     found = replace(
         clean,
         value=clean.value * np.exp(mean[:, 0] + 1j * mean[:, 1]),
@@ -249,14 +249,14 @@ def test_reduced_chi_square_of_a_true_model_is_one_with_few_averages(true, avera
 
 def test_a_fit_finds_a_specimen_far_from_its_description():
     far = with_values(NOMINAL, {name: value * 1.07 for name, value in TRUE.items()})
-    fit = fit_specimen(measured(far, np.random.default_rng(3)), NOMINAL)
+    fit = fit_specimen(transmission(far, np.random.default_rng(3)), NOMINAL)
     for name in LINEAR:
         assert fit.value(name).value == pytest.approx(parameter_value(far, name), abs=4 * fit.value(name).sd)
     assert fit.reduced_chi_square < 1.5
 
 
 def test_parameters_that_a_transmission_cannot_determine_are_refused(true):
-    clean = measured(true, np.random.default_rng(4))
+    clean = transmission(true, np.random.default_rng(4))
     with pytest.raises(InvalidRequest, match="determines any of"):
         fit_specimen(clean, NOMINAL, (Parameter.GAP,))
     with pytest.raises(InvalidRequest, match="a fit of no parameter was requested"):
@@ -266,6 +266,6 @@ def test_parameters_that_a_transmission_cannot_determine_are_refused(true):
 
 
 def test_a_fit_to_too_few_lines_is_refused(true):
-    few = measured(true, np.random.default_rng(5), lines_hz=LINES_HZ[:6])
+    few = transmission(true, np.random.default_rng(5), lines_hz=LINES_HZ[:6])
     with pytest.raises(NotEnoughData, match="6 lines"):
         fit_specimen(few, NOMINAL)

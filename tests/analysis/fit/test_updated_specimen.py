@@ -64,7 +64,7 @@ def sweep_file(folder, rng):
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def recordings(tmp_path_factory):
     """Record weak noise and a colliding sweep of the true specimen; the bench states the paper's values."""
     folder, rng = tmp_path_factory.mktemp("shaken"), np.random.default_rng(11)
     sweep, first_hz = sweep_file(folder, rng)
@@ -72,32 +72,32 @@ def recorded(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def measured(recorded):
-    return analyse_files(recorded[:2], "shaken", Simulation.LEFT_OUT)
+def campaign(recordings):
+    return analyse_files(recordings[:2], "shaken", Simulation.LEFT_OUT)
 
 
 @pytest.fixture(scope="module")
-def updated(measured):
-    return update_model(measured)
+def fitted_model(campaign):
+    return update_model(campaign)
 
 
-def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(updated):
-    assert [each.parameter for each in updated.values] == [*LINEAR, Parameter.GAP]
-    for each in updated.values:
+def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(fitted_model):
+    assert [each.parameter for each in fitted_model.values] == [*LINEAR, Parameter.GAP]
+    for each in fitted_model.values:
         truth = parameter_value(TRUE, each.parameter)
         # Each interval covers 95 %: one of five values may lie slightly outside.
         slack = 0.7 * (each.high - each.low) / 2
         assert each.low - slack <= truth <= each.high + slack, each
         assert not each.low <= each.nominal <= each.high, each
-    assert len(updated.not_determined) == 1
-    assert "Both gaps, m1, c1 and the contact law are not determined" in updated.not_determined[0]
-    assert updated.fits
-    assert 0.3 < updated.reduced_chi_square < 3
+    assert len(fitted_model.not_determined) == 1
+    assert "Both gaps, m1, c1 and the contact law are not determined" in fitted_model.not_determined[0]
+    assert fitted_model.fits
+    assert 0.3 < fitted_model.reduced_chi_square < 3
 
 
-def test_the_report_shows_fitted_and_described_values(measured, updated):
-    said = list(findings(replace(measured, model_sentences=updated.sentences)))
-    assert said[: len(updated.sentences)] == list(updated.sentences)
+def test_the_report_shows_fitted_and_described_values(campaign, fitted_model):
+    said = list(findings(replace(campaign, model_sentences=fitted_model.sentences)))
+    assert said[: len(fitted_model.sentences)] == list(fitted_model.sentences)
     assert [
         each
         for each in said
@@ -105,21 +105,21 @@ def test_the_report_shows_fitted_and_described_values(measured, updated):
     ]
 
 
-def test_fitted_intervals_are_narrow_enough_to_be_useful(updated):
-    relative = {each.parameter: (each.high - each.low) / each.value for each in updated.values}
+def test_fitted_intervals_are_narrow_enough_to_be_useful(fitted_model):
+    relative = {each.parameter: (each.high - each.low) / each.value for each in fitted_model.values}
     assert relative[Parameter.DAMPING_TIME] < 0.1
     assert max(relative[each] for each in LINEAR[1:]) < 0.01
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_onset_frequency_is_that_of_the_first_impact(recorded, measured):
-    (onset,) = onsets(measured.sweeps[0].analysis, TRUE)
-    assert onset.frequency_hz == pytest.approx(recorded[2], abs=0.6)
+def test_the_onset_frequency_is_that_of_the_first_impact(recordings, campaign):
+    (onset,) = onsets(campaign.sweeps[0].analysis, TRUE)
+    assert onset.frequency_hz == pytest.approx(recordings[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
 
 
-def test_base_motion_from_collisions_does_not_bias_the_gap(measured):
-    sweep = measured.sweeps[0].analysis
+def test_base_motion_from_collisions_does_not_bias_the_gap(campaign):
+    sweep = campaign.sweeps[0].analysis
     (before,) = onsets(sweep, TRUE)
     pushed = np.where(
         sweep.collisions.is_colliding,
@@ -160,30 +160,30 @@ def test_the_lag_of_a_swept_response_is_predicted_by_its_rate():
     assert np.max(np.abs(lagging / seen - 1)) < 0.5 * np.max(np.abs(steady / seen - 1))
 
 
-def test_the_gap_is_not_fitted_without_a_sweep_and_a_reason_is_given(measured):
-    only_noise = CampaignResults("noise", measured.noise, ())
+def test_the_gap_is_not_fitted_without_a_sweep_and_a_reason_is_given(campaign):
+    only_noise = CampaignResults("noise", campaign.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m
     assert [each for each in found.not_determined if "gap stays as described" in each]
-    only_sweep = update_model(CampaignResults("sweep", measured.sweeps, ()))
+    only_sweep = update_model(CampaignResults("sweep", campaign.sweeps, ()))
     assert [each.parameter for each in only_sweep.values] == [Parameter.GAP]
     assert math.isnan(only_sweep.reduced_chi_square)
 
 
-def test_missing_data_for_a_fit_give_a_one_sentence_error(measured):
+def test_missing_data_for_a_fit_give_a_one_sentence_error(campaign):
     with pytest.raises(NotEnoughData, match="no result"):
         update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep goes from"):
         fit_gap([], gong2025())
 
 
-def test_a_fit_whose_simulation_disagrees_with_its_noise_gives_no_values(measured, updated):
+def test_a_fit_whose_simulation_disagrees_with_its_noise_gives_no_values(campaign, fitted_model):
     def overlaid(*, agrees):
         overlay = SimpleNamespace(ensemble=(SimpleNamespace(agrees=agrees),))
-        return replace(measured, results=tuple(replace(each, overlay=overlay) for each in measured.results))
+        return replace(campaign, results=tuple(replace(each, overlay=overlay) for each in campaign.results))
 
-    assert updated.checked(overlaid(agrees=True)) is updated
-    refused = updated.checked(overlaid(agrees=False))
+    assert fitted_model.checked(overlaid(agrees=True)) is fitted_model
+    refused = fitted_model.checked(overlaid(agrees=False))
     assert not refused.fitted
     assert not refused.fits
     assert refused.specimen == gong2025()

@@ -17,13 +17,13 @@ NOISE_M_PER_S = 2e-5
 
 
 @pytest.fixture(scope="module")
-def analysed(tmp_path_factory):
+def analyse_with(tmp_path_factory):
     """Return a function that analyses a mass with twice the base motion and a distorted velocity.
 
     `through` is the transmission, `base_gain` the base sensor's gain; both may vary by realisation.
     """
 
-    def played(
+    def record_and_analyse(
         distorted,
         realisations=REALISATIONS,
         drive_noise_m=0.0,
@@ -62,11 +62,11 @@ def analysed(tmp_path_factory):
         with open_recording(path) as recording:
             return analyse(recording)
 
-    return played
+    return record_and_analyse
 
 
-def test_driven_lines_are_taken_from_the_plan_despite_drive_noise(analysed):
-    quiet, noisy = (analysed(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
+def test_driven_lines_are_taken_from_the_plan_despite_drive_noise(analyse_with):
+    quiet, noisy = (analyse_with(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
     driven = np.rint(noisy.response.frequency_response.frequency_hz / REPETITION_HZ)
     np.testing.assert_array_equal(driven, quiet.excitation.excited_lines)
     off = noisy.response.frequency_response.magnitude / 2 - 1
@@ -74,9 +74,9 @@ def test_driven_lines_are_taken_from_the_plan_despite_drive_noise(analysed):
     assert not set(driven) & set(noisy.response.periodic.detection.order)
 
 
-def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analysed):
-    square = distortion(analysed(lambda velocity: 0.05 * velocity**2).response.periodic)
-    cube = distortion(analysed(lambda velocity: 0.02 * velocity**3).response.periodic)
+def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analyse_with):
+    square = distortion(analyse_with(lambda velocity: 0.05 * velocity**2).response.periodic)
+    cube = distortion(analyse_with(lambda velocity: 0.02 * velocity**3).response.periodic)
     noise = square.detection_noise_m_per_s
     assert square.even_m_per_s > 20 * noise > 20 * square.odd_m_per_s / 3
     assert cube.odd_m_per_s > 20 * noise > 20 * cube.even_m_per_s / 3
@@ -85,8 +85,8 @@ def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analysed):
     assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
 
 
-def test_the_remainder_of_an_undistorted_response_is_the_added_noise(analysed):
-    found = distortion(analysed(np.zeros_like).response.periodic)
+def test_the_remainder_of_an_undistorted_response_is_the_added_noise(analyse_with):
+    found = distortion(analyse_with(np.zeros_like).response.periodic)
     # White noise of variance s^2 adds 4 s^2 / (averaged samples) to a squared amplitude.
     expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))
     assert found.detection_noise_m_per_s == pytest.approx(expected, rel=0.1)
@@ -108,8 +108,8 @@ def _mode(natural_hz, hz, damping=0.08):
         ({"through": lambda hz, number: _mode(200, hz, 0.08 + 0.002 * number)}, "all lines together"),
     ],
 )
-def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drifting, named):
-    analysis = analysed(np.zeros_like, **drifting)
+def test_drift_between_realisations_is_not_reported_as_distortion(analyse_with, drifting, named):
+    analysis = analyse_with(np.zeros_like, **drifting)
     found = distortion(analysis.response.periodic)
     assert found.distortion_share < 3 * found.noise_share
     (remark,) = [each.text for each in analysis.checks if each.what == "Drift"]
@@ -130,12 +130,12 @@ def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drif
         lambda v: v * (np.abs(v) > 2.0),
     ],
 )
-def test_distortion_is_not_reported_as_drift(analysed, distorted):
-    assert "Drift" not in [each.what for each in analysed(distorted).checks]
+def test_distortion_is_not_reported_as_drift(analyse_with, distorted):
+    assert "Drift" not in [each.what for each in analyse_with(distorted).checks]
 
 
-def test_the_distortion_figure_shows_all_lines_and_its_caption_the_levels(analysed):
-    analysis = analysed(lambda velocity: 0.05 * velocity**2)
+def test_the_distortion_figure_shows_all_lines_and_its_caption_the_levels(analyse_with):
+    analysis = analyse_with(lambda velocity: 0.05 * velocity**2)
     periodic = analysis.response.periodic
     drawn = distortion_figure(analysis, periodic)
     shares, quiet = drawn.figure.axes
@@ -148,14 +148,14 @@ def test_the_distortion_figure_shows_all_lines_and_its_caption_the_levels(analys
     assert f"{1e6 * distortion(periodic).even_m_per_s:.3g} µm/s on even lines" in drawn.caption
 
 
-def test_distortion_is_reported_as_unknown_for_one_realisation(analysed):
-    periodic = analysed(np.zeros_like, realisations=1).response.periodic
+def test_distortion_is_reported_as_unknown_for_one_realisation(analyse_with):
+    periodic = analyse_with(np.zeros_like, realisations=1).response.periodic
     assert distortion(periodic).distortion_share is None
     assert "one realisation cannot show distortion" in distortion_caption(periodic)
 
 
-def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analysed):
-    periodic = analysed(np.zeros_like, realisations=1).response.periodic
+def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analyse_with):
+    periodic = analyse_with(np.zeros_like, realisations=1).response.periodic
     noisy = replace(periodic, noise_variance=np.full_like(periodic.noise_variance, 1e3))
     share = 100 * distortion(noisy).noise_share
     assert share > 1000
@@ -164,13 +164,13 @@ def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analyse
     assert "noise of the channels or chaos of the specimen" in caption, "chaos is not called noise"
 
 
-def test_a_shifting_narrow_mode_is_reported_as_drift(analysed):
+def test_a_shifting_narrow_mode_is_reported_as_drift(analyse_with):
     """A linear specimen whose mode at 264 Hz shifted by 0.3 % was once reported with 1.2 % distortion."""
 
     def through(hz, number):
         ratio = hz / (260 * (1 + 0.0015 * number))
         return 1 + 1 / (1 - ratio**2 + 2j * 0.0005 * ratio)
 
-    found = distortion(analysed(np.zeros_like, through=through).response.periodic)
+    found = distortion(analyse_with(np.zeros_like, through=through).response.periodic)
     assert found.drift.gain_share == 0.0
     assert found.drift.frequency_share == pytest.approx(0.0015 * np.std(range(REALISATIONS), ddof=1), rel=0.1)

@@ -325,7 +325,7 @@ def test_a_resonance_in_one_realisation_only_is_rejected():
     assert len(scattered_resonances([found], [[found], [found], []])) == 1
 
 
-def test_different_fit_bands_do_not_count_as_scatter_of_realisations():
+def test_leave_one_out_fits_in_another_band_do_not_count_as_scatter():
     """Seven of twelve leave-one-out fits use all modes, as the full fit does; five use this mode alone."""
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 183.2, 0.06)), low_hz=100, high_hz=300)

@@ -184,7 +184,7 @@ def test_one_segment_is_not_enough_for_a_coherence():
         transmissibility(noise(18, 50), noise(19, 50), RATE, segment_samples=100)
 
 
-def test_a_sample_that_is_not_finite_is_refused_unless_marked():
+def test_a_non_finite_sample_is_refused_unless_marked_as_invalid():
     y = noise(20, 1000)
     y[500] = np.nan
     with pytest.raises(UnusableData, match="mark"):

@@ -35,7 +35,7 @@ def test_a_deviation_of_half_a_second_triggers_the_change_alarm():
     assert alarms_after(([OUT] * 4 + [WITHIN] * 25) * 10) is None
 
 
-def test_the_change_alarm_is_given_once():
+def test_the_alarm_for_a_specimen_change_is_given_once():
     watch = ChangeWatch(USUAL)
     assert sum(watch.take(OUT) for _ in range(100)) == 1
     assert watch.has_changed

@@ -225,7 +225,7 @@ def test_contact_loss_is_identified_and_not_attributed_to_a_damper(world_recordi
 
 
 @pytest.mark.thorough
-def test_parameters_are_identified_from_a_motion_that_settles_half_way(world_recording):
+def test_parameters_are_identified_from_a_motion_that_settles_within_the_record(world_recording):
     """The later impacts are identical; a search from the middle of the record started 1.3 um off."""
     recorded = world_recording(257.0, 1.7, duration_s=2.2, seed=31)
     m0, m1, m2 = recorded.specimen.masses

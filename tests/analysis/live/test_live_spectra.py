@@ -31,7 +31,7 @@ def test_a_live_spectrum_excludes_old_samples():
     assert live_spectra(samples, 1000).spectrum().amplitude_density.max() == 0.0
 
 
-def test_a_lost_sample_invalidates_two_segments():
+def test_a_lost_sample_excludes_two_segments_from_a_live_spectrum():
     samples = np.random.default_rng(3).standard_normal((2, 20_500))
     whole = live_spectra(samples, 700).frequency_response((0, 1), low_hz=100.0, high_hz=1000.0)
     samples[0, 10_250] = np.nan
@@ -80,7 +80,7 @@ def test_one_segment_gives_a_spectrum_but_no_transmission():
     assert spectra.frequency_response((0, 1), low_hz=100.0, high_hz=1000.0) is None
 
 
-def test_settings_without_averages_are_refused():
+def test_live_spectra_settings_without_averages_are_refused():
     with pytest.raises(InvalidRequest, match="1 segments"):
         SpectrumSettings(averages=1)
 

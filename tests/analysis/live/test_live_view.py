@@ -92,7 +92,7 @@ def test_overlapping_blocks_do_not_change_the_view(view):
     assert view.next_sample == before
 
 
-def test_a_run_without_base_channel_can_be_viewed():
+def test_a_measurement_without_base_channel_can_be_viewed_live():
     found = LiveView(CHANNELS[:2], RATE, band_hz=(150.0, 350.0))
     found.add(0, volts(0, 51_200)[:2])
     assert found.frequency_response() is None

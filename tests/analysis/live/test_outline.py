@@ -23,13 +23,13 @@ def test_the_edges_of_a_steady_sine_are_straight(frequency_hz, noise):
     assert low[4:-4] == pytest.approx(-0.7, abs=room)
 
 
-def test_slow_waves_are_not_smoothed():
+def test_the_outline_of_slow_waves_is_not_smoothed():
     wave = sine(260.0, 0.2)
     for drawn, plain in zip(outline(wave, COLUMNS), envelope(wave, COLUMNS), strict=True):
         assert np.array_equal(drawn, plain)
 
 
-def test_noise_is_not_smoothed():
+def test_the_outline_of_noise_is_not_smoothed():
     noise = np.random.default_rng(2).standard_normal(102_400).astype(np.float32)
     assert np.array_equal(outline(noise, COLUMNS)[1], envelope(noise, COLUMNS)[1])
 

@@ -50,14 +50,14 @@ def test_an_overview_picture_shows_the_extremes_of_its_range(recording, start, s
     assert np.nanmin(picture.low) == pytest.approx(np.nanmin(samples), rel=1e-6)
 
 
-def test_zooming_in_shows_individual_samples(recording):
+def test_an_overview_picture_of_a_short_range_shows_individual_samples(recording):
     picture = overview_of(recording).picture(("m0_velocity",), 150_000, 150_010, 100)
     assert picture.samples_per_column == 1.0
     assert np.allclose(picture.low[0], recording.read("m0_velocity", 150_000, 150_010))
     assert np.allclose(picture.time_s, np.arange(150_000, 150_010) / RATE)
 
 
-def test_lost_samples_leave_a_gap_in_the_picture(recording):
+def test_lost_samples_leave_a_gap_in_the_overview_picture(recording):
     picture = overview_of(recording).picture(CHANNELS, 0, SAMPLES, 1000)
     inside = (picture.time_s > (HOLE[0] + 300) / RATE) & (picture.time_s < (HOLE[1] - 400) / RATE)
     assert inside.sum() > 5

@@ -47,7 +47,7 @@ def test_lost_samples_are_nan_in_a_ring_buffer_and_older_samples_remain():
     assert np.array_equal(values[:, 30:], numbered(30, 5))
 
 
-def test_a_ring_buffer_returns_the_samples_since_a_position():
+def test_a_ring_buffer_returns_the_samples_after_a_position():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 45))
     assert np.array_equal(ring.since(40).values, numbered(40, 5))

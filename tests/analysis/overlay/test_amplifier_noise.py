@@ -45,6 +45,6 @@ def test_draws_include_unrecorded_amplifier_noise(recording):
     assert source.run.why == ""
 
 
-def test_a_twin_reports_unknown_amplifier_noise(recording):
+def test_a_twin_reports_that_the_amplifier_noise_is_unknown(recording):
     unheard = replace(recording, segments=())
     assert "noise of the amplifier is unknown" in voltage_source(unheard, specimen_of(RIG)).run.why

@@ -75,7 +75,7 @@ def test_limits_from_few_draws_are_exceeded_in_1_percent_of_cases(draws):
     assert beyond == pytest.approx(0.01, abs=0.0025)
 
 
-def test_one_distant_line_is_outside_the_limit_of_the_draws():
+def test_one_spectral_line_far_from_the_draws_is_outside_their_limit():
     rng = np.random.default_rng(7)
     values = rare_dips(rng, (17, 1000))
     values[0, 500] = 3.0
@@ -84,7 +84,7 @@ def test_one_distant_line_is_outside_the_limit_of_the_draws():
     assert found.limit < 8
 
 
-def test_the_z_of_each_draw_is_computed_from_the_other_draws():
+def test_the_z_score_of_each_draw_is_computed_from_the_other_draws():
     found = curve(np.random.default_rng(9), 9, 40)
     by_hand = [
         EnsembleCurve("q", found.frequency_hz, each, np.delete(found.draws, place, axis=0)).z
@@ -142,7 +142,7 @@ def test_the_interval_of_the_escape_rate_contains_the_true_rate():
     assert 0.94 <= covered / told <= 0.99
 
 
-def test_no_escape_rate_is_given_for_an_end_common_to_all_runs():
+def test_no_escape_rate_is_given_if_collisions_end_at_the_same_time_in_all_runs():
     runs = [Ending("collisions", 0.0, 60.0 + 0.05 * k, ended=True) for k in range(17)]
     assert escape_rate(runs[:1], [(each,) for each in runs[1:]]) is None
     lasting = [Ending("collisions", 0.0, 90.0, ended=False)] * 17

@@ -80,7 +80,7 @@ def test_weak_noise_and_its_simulation_agree_on_every_line(noise_file):
     assert "0.05" in basis
 
 
-def test_another_specimen_can_be_overlaid(dwell_file):
+def test_a_simulation_of_another_specimen_can_be_overlaid(dwell_file):
     _, overlay = overlay_of(dwell_file("weak"), specimen=gong2025(damping_time_s=1e-4))
     exact = np.abs(base_transmissibility(gong2025(damping_time_s=1e-4), 260.0)[0, 0])
     assert overlay.response.response_ii == pytest.approx(exact, rel=2e-3)
@@ -95,7 +95,7 @@ def test_a_prediction_below_the_gap_equals_the_linear_response():
     np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-4)
 
 
-def test_only_the_three_levels_of_the_paper_have_a_paper_amplitude():
+def test_only_the_three_drive_levels_of_the_paper_have_a_paper_amplitude():
     assert [paper_amplitude_m(each) for each in (0.05, 1.5, 10.0)] == [1e-6, 5e-6, 50e-6]
     assert paper_amplitude_m(2.0) is None
 

@@ -98,7 +98,7 @@ def test_similarity_interpolates_and_never_extrapolates():
         ([1.0], [1.0], 0.0, "positive"),
     ],
 )
-def test_an_invalid_curve_is_refused(frequencies, responses, amplitude_m, complaint):
+def test_an_invalid_response_curve_is_refused(frequencies, responses, amplitude_m, complaint):
     with pytest.raises(InvalidRequest, match=complaint):
         SimilarityCurve(np.array(frequencies), np.array(responses), amplitude_m)
 

@@ -52,24 +52,24 @@ def twin_of(path, **how):
 
 
 @pytest.fixture(scope="module")
-def chaotic(recordings):
+def chaotic_dwell(recordings):
     return twin_of(recordings / "dwell.h5")
 
 
-def test_a_chaotic_dwell_is_consistent_with_its_draws(chaotic):
-    run = chaotic.overlay.run
+def test_a_chaotic_dwell_is_consistent_with_its_draws(chaotic_dwell):
+    run = chaotic_dwell.overlay.run
     assert run.driven is Driven.AMPLIFIER
     assert run.draws in {8, 12, 16}
     assert run.impact_rate_hz > 300
-    assert all(each.compared == 1 and each.agrees for each in chaotic.overlay.ensemble)
+    assert all(each.compared == 1 and each.agrees for each in chaotic_dwell.overlay.ensemble)
 
 
-def test_a_simulation_under_the_recorded_base_is_not_compared_with_draws(recordings, chaotic):
+def test_a_simulation_under_the_recorded_base_is_not_compared_with_draws(recordings, chaotic_dwell):
     base = twin_of(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).overlay
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)
     assert all(not each.compared for each in base.ensemble)
     # A prescribed base motion does not react to the specimen: Response II is far too low.
-    assert base.response.response_ii < chaotic.overlay.quantity("Response II").lower[0]
+    assert base.response.response_ii < chaotic_dwell.overlay.quantity("Response II").lower[0]
 
 
 def test_a_twin_with_a_wrong_gap_disagrees_with_the_measurement(recordings):
@@ -84,17 +84,17 @@ def test_the_twin_agrees_with_weak_noise_on_every_line(recordings):
     assert found.difference.rms_db < 0.05
 
 
-def test_json_and_figures_show_the_draws(chaotic):
-    said = json.loads(json.dumps(result_summary(chaotic)))["simulated"]
+def test_json_and_figures_show_the_draws(chaotic_dwell):
+    said = json.loads(json.dumps(result_summary(chaotic_dwell)))["simulated"]
     assert said["drive"] == "recorded amplifier voltage"
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]
     assert all(abs(each["z"][0]) <= each["limit_z"] for each in said["ensemble"])
-    drawn = dwells_figure([(chaotic.analysis, chaotic.overlay)])
-    assert f"{chaotic.overlay.run.draws} draws" in drawn.caption
+    drawn = dwells_figure([(chaotic_dwell.analysis, chaotic_dwell.overlay)])
+    assert f"{chaotic_dwell.overlay.run.draws} draws" in drawn.caption
     assert "95 % of draws" in [each.get_label() for each in drawn.figure.axes[2].collections]
 
 
-def test_a_shaker_is_found_from_weak_noise_within_its_bounds(recordings):
+def test_shaker_parameters_fitted_to_weak_noise_are_within_their_bounds(recordings):
     with open_recording(recordings / "noise.h5") as recording:
         found = fit_shaker(recording, analyse(recording), gong2025())
     assert found.chi2 < 2

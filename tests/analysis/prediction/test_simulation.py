@@ -78,7 +78,7 @@ def test_the_simulation_uses_the_specimen_given_by_name_or_file(tmp_path):
         SimulationRequest(specimen="nowhere.toml", **LINEAR)
 
 
-def test_nothing_is_computed_after_a_cancellation():
+def test_no_point_is_computed_after_a_cancellation():
     told = []
     simulate(SimulationRequest(**LINEAR), told.append, lambda: True, 1)
     assert sum(len(parts) for parts in told) < 12

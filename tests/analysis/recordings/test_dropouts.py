@@ -136,7 +136,7 @@ def test_drop_outs_are_not_searched_below_20_khz():
     assert found_dropouts(with_drop_out(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
 
 
-def measured(rig, plan, path, dropouts_per_s, seed=5, **how):
+def measure(rig, plan, path, dropouts_per_s, seed=5, **how):
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": dropouts_per_s, "seed": seed})
     with open_bench(rig.model_copy(update={"virtual": virtual})) as bench:
         run_measurement(bench, Measurement(name="m", excitation=plan, ramp_s=0.3), path, **how)
@@ -154,7 +154,7 @@ def test_bridged_drop_outs_do_not_change_a_dwell(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
     results = []
     for dropouts_per_s in (0.0, 4.0):
-        path = measured(rig, plan, tmp_path / f"d{dropouts_per_s:g}.h5", dropouts_per_s)
+        path = measure(rig, plan, tmp_path / f"d{dropouts_per_s:g}.h5", dropouts_per_s)
         results.append(analyse_files([path], "d", Simulation.LEFT_OUT).results[0].analysis)
     light, dark = (each.response for each in results)
     assert dark.response_i == pytest.approx(light.response_i, rel=2e-3)
@@ -171,7 +171,7 @@ def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(rig, tmp_path,
     document = rig.model_dump(mode="json")
     document["specimen"]["contact"] = "linear"
     plan = Dwell(amplitude_vpp=1.0, frequency_hz=230, settle_s=1, duration_s=6)
-    path = measured(Rig.model_validate(document), plan, tmp_path / "d.h5", dropouts_per_s, seed)
+    path = measure(Rig.model_validate(document), plan, tmp_path / "d.h5", dropouts_per_s, seed)
     done = analyse_files([path], "d", Simulation.LEFT_OUT)
     if done.results:
         assert done.results[0].analysis.response.response_i == pytest.approx(3.21, rel=0.02)
@@ -194,10 +194,10 @@ def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(rig, tmp_path,
 )
 def test_drop_outs_and_collisions_are_distinguished(rig, tmp_path, plan):
     """Bridged samples differ from those of a run without drop-outs by at most 2 % of the motion."""
-    with open_recording(measured(rig, plan, tmp_path / "light.h5", 0.0)) as recording:
+    with open_recording(measure(rig, plan, tmp_path / "light.h5", 0.0)) as recording:
         light = recording.read(ROLE)
         assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
-    with open_recording(measured(rig, plan, tmp_path / "dark.h5", 3.0)) as recording:
+    with open_recording(measure(rig, plan, tmp_path / "dark.h5", 3.0)) as recording:
         dark, mended = recording.read(ROLE), BridgedChannel(recording, ROLE).read(0, recording.samples)
         facts = recording_facts(recording)
     assert facts.dropouts > 5
@@ -214,7 +214,7 @@ def test_drop_outs_within_milliseconds_are_bridged_within_2_percent(rig, tmp_pat
     for dropouts_per_s in (0.0, 20.0):
         path = tmp_path / f"{dropouts_per_s:g}.h5"
         how = {"bench_check": "recently passed", "seed": seed}
-        with open_recording(measured(rig, plan, path, dropouts_per_s, **how)) as recording:
+        with open_recording(measure(rig, plan, path, dropouts_per_s, **how)) as recording:
             read.append(BridgedChannel(recording, ROLE).read(0, recording.samples - 1_000))
     light, mended = read
     assert np.max(np.abs(mended - light)) < 0.02 * np.max(np.abs(light))
@@ -237,14 +237,14 @@ def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(rig, tmp_p
     dwells = (Dwell(amplitude_vpp=8.0, frequency_hz=each, settle_s=1, duration_s=3) for each in (140, 200))
     for number, plan in enumerate((noise, *dwells)):
         path = tmp_path / f"{number}.h5"
-        with open_recording(measured(other, plan, path, 0.0, bench_check="recently passed")) as recording:
+        with open_recording(measure(other, plan, path, 0.0, bench_check="recently passed")) as recording:
             assert recording_facts(recording).dropouts == 0
 
 
 @pytest.mark.thorough
 def test_a_part_of_a_recording_is_bridged_like_the_whole(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
-    with open_recording(measured(rig, plan, tmp_path / "d.h5", 8.0)) as recording:
+    with open_recording(measure(rig, plan, tmp_path / "d.h5", 8.0)) as recording:
         whole = BridgedChannel(recording, ROLE).read(0, recording.samples)
         dropouts = BridgedChannel(recording, ROLE).between(0, recording.samples)
         assert len(dropouts) > 5
@@ -259,7 +259,7 @@ def test_a_part_of_a_recording_is_bridged_like_the_whole(rig, tmp_path):
 @pytest.mark.parametrize("rate_hz", [1e-6, 0.4, 1e12])
 def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=1)
-    path = measured(rig, plan, tmp_path / "d.h5", 0.0)
+    path = measure(rig, plan, tmp_path / "d.h5", 0.0)
     with h5py.File(path, "r+") as file:
         file.attrs["sample_rate_hz"] = rate_hz
     with open_recording(path) as recording:
@@ -269,7 +269,7 @@ def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
 @pytest.mark.thorough
 def test_many_drop_outs_give_a_warning(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
-    with open_recording(measured(rig, plan, tmp_path / "d.h5", 1.0)) as recording:
+    with open_recording(measure(rig, plan, tmp_path / "d.h5", 1.0)) as recording:
         facts = recording_facts(recording)
     (note,) = (each for each in measurement_checks(facts) if each.what == "Drop-outs")
     (warning,) = (

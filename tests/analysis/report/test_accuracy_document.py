@@ -43,7 +43,7 @@ def headings(text):
     return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
 
 
-def test_the_accuracy_page_lists_every_level_and_solver_of_every_motion(benchmark, page_of):
+def test_the_accuracy_page_lists_every_accuracy_level_and_solver_of_every_motion(benchmark, page_of):
     page = page_of(benchmark)
     for each in benchmark.motions:
         assert each.motion.name in page

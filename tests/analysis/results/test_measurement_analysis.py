@@ -94,7 +94,7 @@ def test_every_step_of_a_stepped_sine_is_analysed_like_a_dwell(stepped_file):
     assert found.response.direction == ("up", "up")
 
 
-def test_a_stopped_dwell_is_analysed_with_a_warning(dwell_file):
+def test_an_aborted_dwell_is_analysed_with_a_warning(dwell_file):
     path = dwell_file("weak", state=RecordingState.STOPPED, reason="cancelled", samples=round(4 * RATE))
     found = analysis_of(path)
     assert found.response.window_s < 2.0

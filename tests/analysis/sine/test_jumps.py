@@ -34,7 +34,7 @@ def response(at_hz, decibel, noise, seed=0):
 
 @pytest.mark.parametrize("decibel", [-10.0, 3.0])
 @pytest.mark.parametrize("noise", [1e-3, 0.02])
-def test_the_bounds_contain_the_jump_and_no_other_jump_is_found(decibel, noise):
+def test_the_frequency_bounds_of_a_jump_contain_it_and_no_other_jump_is_found(decibel, noise):
     for seed in range(10):
         at_hz = np.random.default_rng(seed).uniform(180, 320)
         found = jumps(TIME_S, FREQUENCY_HZ, response(at_hz, decibel, noise, seed))
@@ -95,14 +95,14 @@ def test_the_ringing_of_a_linear_specimen_is_not_a_jump(start_hz, stop_hz, durat
     assert smooth_jumps(found, collisions(found)) == ()
 
 
-def test_a_step_between_two_rough_sides_is_not_a_jump():
+def test_a_step_between_two_colliding_ranges_is_not_a_jump():
     rough = np.zeros(TIME_S.size, dtype=bool)
     assert jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), rough) == ()
     half = FREQUENCY_HZ < 250
     assert len(jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), half)) == 1
 
 
-def test_rows_of_different_length_are_refused():
+def test_sweep_arrays_of_different_length_are_refused():
     with pytest.raises(InvalidRequest, match="equally long"):
         jumps(TIME_S, FREQUENCY_HZ[1:], TIME_S)
 

@@ -164,7 +164,7 @@ def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_maximum_caused_by_one_short_fault_is_given_no_bound(dwell):
+def test_a_maximum_caused_by_a_short_fault_has_no_uncertainty(dwell):
     """A drop-out of 3 ms read as motion once gave 17.9 +- 2.5; 11.8 is true."""
     result = dwell(lambda time_s: np.where(np.abs(time_s - 11.0) < 0.004, 1.5, 1.0))
     assert result.analysis.motion.verdict.kind is MotionKind.UNDECIDED

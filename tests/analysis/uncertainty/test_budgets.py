@@ -87,16 +87,16 @@ def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, wea
     """Reference: JCGM 101:2008, with all inputs drawn from their distributions."""
     rng = np.random.default_rng(12)
 
-    def calibrated(relative, factor=2.0):
+    def calibration_factor(relative, factor=2.0):
         return 1 + relative / factor * rng.standard_normal()
 
-    def tilted(degrees):
+    def tilt_factor(degrees):
         return np.cos(np.radians(degrees) * rng.uniform())
 
     found = []
     for _ in range(DRAWS):
-        base = calibrated(0.0173, 1.73) * calibrated(0.006) * tilted(3.0)
-        response = calibrated(0.012) * calibrated(0.004) * tilted(6.0)
+        base = calibration_factor(0.0173, 1.73) * calibration_factor(0.006) * tilt_factor(3.0)
+        response = calibration_factor(0.012) * calibration_factor(0.004) * tilt_factor(6.0)
         one = response_of(samples, weak, rng, base=base, response=response, clock=rng.uniform(-1, 1) * 4e-3)
         found.append((1e6 * one.drive.amplitude_m, one.response_i, one.response_ii))
     facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})

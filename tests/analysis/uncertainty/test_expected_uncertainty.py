@@ -89,7 +89,7 @@ def dwell(at_hz, level_vpp):
     return Measurement(name="dwell", excitation=excitation)
 
 
-def test_chance_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_one():
+def test_chance_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_dwell():
     first, second = expected_uncertainty(dwell(260, 1.5), RIG)
     assert first.cause is second.cause is Cause.CHANCE
     assert first.after(5.0) == first.after(500.0) > 0.01
