@@ -188,7 +188,7 @@ def accelerated_specimen(contact, acceleration):
 
 
 @pytest.mark.parametrize("contact", SPRINGY)
-def test_a_slow_pressed_contact_settles_where_its_springs_balance(contact):
+def test_a_pressed_contact_settles_at_its_static_indentation(contact):
     acceleration = 20.0
     specimen, base, start = accelerated_specimen(contact, acceleration)
     run = integrate(specimen, base, 0.6, Accuracy.REFERENCE, start)
@@ -227,7 +227,7 @@ def stored_energy(specimen, states):
 
 
 @pytest.mark.parametrize("duration_s", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])
-def test_perfect_rigid_stops_lose_nothing_in_any_number_of_impacts(duration_s):
+def test_elastic_rigid_stops_conserve_energy_over_any_number_of_impacts(duration_s):
     specimen = gong2025(damping_time_s=0.0, contact="rigid:1")
     start = np.array([2e-5, 0.0, -4e-5, 0.5, 0.25, -0.9])
     run = integrate(
@@ -243,7 +243,7 @@ def test_perfect_rigid_stops_lose_nothing_in_any_number_of_impacts(duration_s):
     ("contact", "size"),
     [*((contact, size) for contact in STOPS for size in (1e20, 1e100, 1e200, 1e300)), ("power:47", 1e200)],
 )
-def test_overflowing_numbers_end_with_an_outcome(contact, size, monkeypatch):
+def test_overflowing_motions_end_with_an_outcome(contact, size, monkeypatch):
     monkeypatch.setattr("vibench.sim.specimen.drive.LARGEST_AMPLITUDE_M", 1e100)
     samples = np.sin(np.arange(200) * 0.01) * size
     runs = [

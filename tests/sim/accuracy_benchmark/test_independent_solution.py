@@ -43,6 +43,6 @@ def test_an_initial_state_beyond_the_gap_is_in_contact():
     assert state_error(engine, independent_state(specimen, STILL, 0.01, pressed)) < 1e-8
 
 
-def test_rigid_stops_are_refused_in_a_sentence():
+def test_rigid_stops_are_refused_by_the_independent_solution():
     with pytest.raises(ValueError, match=r"Rigid stops .* give another law"):
         independent_state(replace(gong2025(), contact=RigidStops(0.8)), STILL, 0.01, MOVING)

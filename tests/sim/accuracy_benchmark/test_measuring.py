@@ -21,7 +21,7 @@ SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
 @pytest.mark.parametrize(
     "motion", [m for m in MOTIONS if m.regime is not Regime.CHAOTIC], ids=lambda m: m.name
 )
-def test_every_level_meets_its_stated_accuracy(motion):
+def test_every_accuracy_level_meets_its_stated_accuracy(motion):
     start = settled_state(motion)
     span_s = round(0.1 * motion.frequency_hz) / motion.frequency_hz
     truth = independent_state(motion.specimen, motion.drive, span_s, start)
@@ -30,7 +30,7 @@ def test_every_level_meets_its_stated_accuracy(motion):
         assert state_error(found, truth) <= level.promise
 
 
-def test_higher_levels_improve_periodic_motion_and_not_chaos():
+def test_higher_accuracy_levels_improve_periodic_motion_and_not_chaos():
     periodic = measure_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels
     assert reference.state_error < 5e-2 * quick.state_error

@@ -38,7 +38,7 @@ def test_a_hardening_branch_over_frequency_folds_at_98_296_and_116_296_hz():
         (285.0, 9.32, 17.3),
     ],
 )
-def test_a_hardening_branch_over_level_folds_at_the_ends_of_its_unstable_part(frequency, lower_um, upper_um):
+def test_a_branch_over_the_drive_level_folds_at_the_ends_of_its_unstable_part(frequency, lower_um, upper_um):
     found = folds(hardening(), AmplitudePath(frequency), 0.3e-6 * lower_um, 1.3e-6 * upper_um)
     levels = sorted(1e6 * each.amplitude_m for each in found)
     assert levels[0] == pytest.approx(lower_um, abs=0.006)

@@ -211,6 +211,6 @@ def test_each_branch_point_uses_the_recorded_level_at_its_frequency():
 @pytest.mark.parametrize(
     ("amplitudes", "frequencies"), [((), ()), ((1e-6, 2e-6), ()), ((1e-6, 2e-6), (2.0, 1.0)), ((0.0,), ())]
 )
-def test_an_invalid_level_is_refused(amplitudes, frequencies):
+def test_an_invalid_recorded_level_is_refused(amplitudes, frequencies):
     with pytest.raises(ValueError, match="not allowed"):
         FrequencyPath(amplitudes, frequencies)

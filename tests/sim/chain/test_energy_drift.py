@@ -52,7 +52,7 @@ def test_undamped_chains_under_other_laws_keep_their_energy(contact, bound):
         "power:3+5+7",
     ],
 )
-def test_energy_is_conserved_for_every_law_drive_and_level(contact, cells, accuracy):
+def test_energy_is_conserved_for_every_law_drive_and_accuracy_level(contact, cells, accuracy):
     """Energy errors were once 2e-2 with a sampled drive and 2e-3 with a power law."""
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     chain = chain_of(specimen, cells)

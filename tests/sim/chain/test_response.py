@@ -36,7 +36,7 @@ def test_a_chain_of_one_cell_matches_the_specimen_even_in_chaos(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:5"])
-def test_lines_of_the_inner_masses_match_a_densely_sampled_run(contact):
+def test_spectral_lines_of_the_inner_masses_match_a_densely_sampled_run(contact):
     chain, drive = chain_of(gong2025(contact=contact), 1), Harmonic(220.0, 40e-6, phase_rad=0.7)
     start = np.array([[1e-5, -2e-5, 1.5e-5, 0.05, -0.1, 0.08]])
     duration_s = 5.0 / drive.frequency_hz
@@ -48,7 +48,7 @@ def test_lines_of_the_inner_masses_match_a_densely_sampled_run(contact):
     np.testing.assert_allclose(response.lines_m[0, :3], lines, atol=1e-3 * np.abs(lines).min())
 
 
-def test_peaks_and_lines_match_a_densely_sampled_run():
+def test_peaks_and_spectral_lines_match_a_densely_sampled_run():
     chain, drive = chain_of(gong2025(), 3), Harmonic(220.0, 40e-6)
     start = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 6)) * np.repeat([2e-5, 0.15], 3)
     duration_s = 5.0 / drive.frequency_hz
@@ -106,7 +106,7 @@ def test_an_incomplete_run_has_no_response():
 
 
 @pytest.mark.parametrize(("drive", "duration_s"), [(PERIODIC, 1e12), (Harmonic(1e10, 1e-6), 2.0)])
-def test_a_run_of_too_many_windows_is_refused(drive, duration_s):
+def test_a_chain_run_of_too_many_windows_is_refused(drive, duration_s):
     with pytest.raises(
         ValueError, match=r"^[\de+]+ s of 2 cells are not allowed: they need .* Shorten the run"
     ):

@@ -71,7 +71,7 @@ def test_an_interrupted_collision_is_resolved_in_steps():
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3])
-def test_peaks_lines_and_samples_of_a_collision_match_a_stepwise_solution(speed):
+def test_observables_of_a_collision_match_a_stepwise_solution(speed):
     start, until = at_stop(speed, 1.0, 20e-6), 1e-4
     state, seen = follow_run(start, until, STANDARD)
     by_steps, told = follow_run(start, until, 1e-11)

@@ -130,11 +130,11 @@ def test_a_motion_does_not_depend_on_its_batch():
         (replace(SPECIMEN, contact=Hertz(1e300)), STANDARD, False),
     ],
 )
-def test_batches_follow_hertz_stops_and_lightly_damped_modes(specimen: Specimen, tolerance, follows):
+def test_only_lightly_damped_specimens_with_hertz_stops_are_batchable(specimen: Specimen, tolerance, follows):
     assert is_batchable(specimen, tolerance) is follows
 
 
-def test_stops_with_unequal_gaps_are_touched_at_their_positions():
+def test_batched_motions_match_single_runs_with_unequal_gaps():
     specimen = gong2025(gap_m=(30e-6, 60e-6))
     drives, starts = [Harmonic(200.0 + k, 1e-5) for k in range(8)], [np.zeros(6)] * 8
     for drive, start, found in zip(drives, starts, follow(specimen, drives, starts, [6] * 8), strict=True):
@@ -148,7 +148,7 @@ def test_a_specimen_unsuitable_for_batches_is_refused():
         follow(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
 
 
-def test_a_motion_without_periods_is_refused():
+def test_a_batched_motion_of_zero_periods_is_refused():
     run = NativeRun(SPECIMEN, Harmonic(130.0, 2e-5), np.zeros(6), STANDARD)
     with pytest.raises(ValueError, match="refuses to follow_batch"):
         follow_batch([run], [0])

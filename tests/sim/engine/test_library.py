@@ -133,7 +133,7 @@ def test_a_scene_with_impossible_values_is_refused():
         engine.prepare(scene)
 
 
-def test_a_nan_time_is_refused():
+def test_a_run_to_a_nan_time_is_refused():
     run = NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 3e-7)
     with pytest.raises(ValueError, match="end time must be finite"):
         run.advance(np.nan, RunRecord(0))

@@ -61,12 +61,12 @@ def test_the_native_test_program_passes_under_the_sanitizers(sanitized_library, 
     )
 
 
-def test_a_broken_structure_returns_an_error_code():
+def test_a_corrupted_c_structure_returns_an_error_code():
     assert "-1:" in output_of(sys.executable, FUZZ, native_engine().path, "--count", 400)
 
 
 @needs_gcc
 @pytest.mark.thorough
 @pytest.mark.timeout(600)
-def test_broken_structures_cause_no_undefined_behaviour(sanitized_library):
+def test_corrupted_c_structures_cause_no_undefined_behaviour(sanitized_library):
     output_under_sanitizers(FUZZ, sanitized_library, "--count", 300)

@@ -34,7 +34,7 @@ def observe_run(law, tolerance, drive):
 
 @pytest.mark.parametrize("tolerance", [3e-7, 1e-10])
 @pytest.mark.parametrize("law", LAWS)
-def test_peaks_and_lines_match_the_samples(law, tolerance):
+def test_peaks_and_spectral_lines_of_a_run_match_its_samples(law, tolerance):
     drive = Harmonic(130.0, 20e-6, 0.7)
     record, states, time_s = observe_run(law, tolerance, drive)
     assert record.impacts > 10 or law == "linear" or law.startswith("power")

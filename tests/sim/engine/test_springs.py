@@ -34,7 +34,7 @@ def growth(run, span_s, start):
 @pytest.mark.parametrize("gap_m", GAPS, ids=["even", "uneven"])
 @pytest.mark.parametrize("drive", DRIVES, ids=str)
 @pytest.mark.parametrize("level", Accuracy)
-def test_linear_stops_match_the_independent_solution_at_every_level(drive, gap_m, level):
+def test_linear_stops_match_the_independent_solution_at_every_accuracy_level(drive, gap_m, level):
     run, span_s = settled_run(drive, gap_m), 3.0 / drive.frequency_hz
     start = run.state
     truth = independent_state(run.specimen, drive, span_s, start)

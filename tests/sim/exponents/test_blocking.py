@@ -32,7 +32,7 @@ def test_block_means_scatter_within_their_stated_errors():
     assert np.mean(np.abs(scores) > 2.0) < 0.12
 
 
-def test_a_series_shorter_than_its_correlation_is_marked_as_too_short():
+def test_a_series_shorter_than_its_correlation_time_is_marked_as_too_short():
     assert not block_mean(autoregression(0.999, 512, 1)).is_long_enough
     assert not block_mean(np.arange(64.0)).is_long_enough
 
@@ -52,7 +52,7 @@ def test_a_shifted_series_has_a_shifted_mean_and_the_same_error(values, shift):
         assert other.standard_error == pytest.approx(one.standard_error, rel=1e-6, abs=1e-9)
 
 
-def test_equal_values_have_zero_error_and_a_single_value_an_unknown_error():
+def test_the_mean_of_equal_values_has_zero_error_and_a_single_value_an_unknown_error():
     assert block_mean([2.5] * 40).standard_error == 0.0
     assert np.isnan(block_mean([2.5]).standard_error)
 

@@ -56,7 +56,7 @@ def test_the_exponent_of_a_periodic_motion_by_multipliers_matches_its_average():
     assert found.exponent_per_s == pytest.approx(found.local_exponents_per_s[-300:].mean(), abs=0.3)
 
 
-def test_a_run_ends_as_soon_as_its_error_is_small_enough():
+def test_an_exponent_run_ends_as_soon_as_its_error_is_small_enough():
     whole = lyapunov_exponent(gong2025(), Harmonic(430.0, 50e-6), Accuracy.QUICK, duration_s=10.0)
     short = lyapunov_exponent(
         gong2025(),
@@ -87,6 +87,6 @@ def test_a_failed_run_has_no_exponent_and_states_the_reason():
         ({"initial_state": np.zeros(5)}, "six finite numbers"),
     ],
 )
-def test_invalid_runs_are_refused(options, message):
+def test_invalid_runs_for_an_exponent_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         lyapunov_exponent(gong2025(), CHAOS, **options)

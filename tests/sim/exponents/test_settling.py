@@ -54,7 +54,7 @@ def test_a_periodic_final_motion_begins_where_the_section_starts_to_repeat(cycle
     assert 300 <= found.since + cycle <= 300 + 2 * cycle
 
 
-def test_a_section_over_a_fraction_of_a_period_is_not_called_periodic():
+def test_a_section_sampled_within_a_period_is_not_classified_as_periodic():
     found = settling(a_run(noise(2.0), np.ones((COUNT, 6)), periods=0), np.ones(6))
     assert found.motion is FinalMotion.THROUGHOUT
 
@@ -80,7 +80,7 @@ def test_a_periodic_motion_that_turns_chaotic_is_not_reported_as_settled():
     assert settling(a_run(growth), np.ones(6)).motion is FinalMotion.THROUGHOUT
 
 
-def test_no_change_is_found_in_noise_around_zero():
+def test_no_end_of_chaos_is_found_in_noise_around_zero():
     found = [settling(a_run(noise(0.0, seed)), np.ones(6)).motion for seed in range(40)]
     assert found.count(FinalMotion.SETTLED) == 0
 

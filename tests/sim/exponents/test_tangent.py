@@ -68,7 +68,7 @@ def test_the_tangent_without_damping_is_symplectic(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:29"])
-def test_following_a_tangent_does_not_change_the_motion(contact):
+def test_computing_the_tangent_does_not_change_the_motion(contact):
     specimen = gong2025(contact=contact)
     _, carried, _ = run_with_tangent(specimen, Accuracy.STANDARD, 0.3)
     plain = integrate(specimen, DRIVE, 0.3, Accuracy.STANDARD)

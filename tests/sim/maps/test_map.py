@@ -103,7 +103,7 @@ def test_every_quantity_of_a_map_is_set_in_its_scenes():
     assert scene.start.state == (0.0, 0.0, 0.0, 0.0, 0.01, 0.0)
 
 
-def test_random_starts_differ_and_are_reproducible():
+def test_random_initial_states_of_a_map_differ_and_are_reproducible():
     plan = Map(frequency_hz=FREQUENCIES, random_starts=3, seed=4)
     assert plan.start_labels == ("rest", "random 1", "random 2", "random 3")
     states = [plan.scene((k, 2)).start.state for k in range(4)]
@@ -235,7 +235,7 @@ def test_chained_map_points_are_sampled_at_drive_phase_zero():
 
 
 @pytest.mark.parametrize("other", ["x_m", "frequency_hz"])
-def test_random_starts_are_refused_if_the_map_varies_the_start(other):
+def test_random_initial_states_are_refused_if_the_map_varies_the_initial_state(other):
     """Every cell would repeat the same few initial states; files with such maps can still be opened."""
     plan = Map(**{other: LEVELS if other == "x_m" else FREQUENCIES, "y_m": LEVELS, "random_starts": 8})
     for asked in (estimate_map, solve_map):

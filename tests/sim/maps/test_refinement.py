@@ -60,7 +60,7 @@ def test_every_map_cell_is_computed_or_filled_in_once():
     st.floats(9, 40),
     st.sampled_from([2, 4, 8]),
 )
-def test_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, radius, coarse):
+def test_map_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, radius, coarse):
     codes = disc(shape, centre, radius)
     known, plan = refine(codes, coarse)
     is_wrong = filled_codes(codes, known, plan) != codes
@@ -68,7 +68,7 @@ def test_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, 
     assert is_wrong.sum() <= 4
 
 
-def test_a_thin_line_is_refined_once_it_is_found():
+def test_a_thin_region_of_a_map_is_refined_completely_once_found():
     codes = np.zeros((65, 65), dtype=np.int64)
     columns = np.arange(65)
     codes[np.clip(columns // 2 + 16, 0, 64), columns] = 1
@@ -77,7 +77,7 @@ def test_a_thin_line_is_refined_once_it_is_found():
     assert known.mean() < 0.3
 
 
-def test_a_response_jump_within_one_kind_is_found():
+def test_a_response_jump_within_one_kind_of_motion_is_refined_in_a_map():
     codes = np.zeros((40, 40), dtype=np.int64)
     sizes = np.where(np.indices(codes.shape)[1] > 17, 1.0, 0.0)
     known, _ = refine(codes, 8, sizes=sizes)
@@ -85,7 +85,7 @@ def test_a_response_jump_within_one_kind_is_found():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_stopped_map_computes_the_same_cells(seed):
+def test_an_interrupted_map_computes_the_same_cells(seed):
     codes = disc((45, 60), (20, 30), 11) + 2 * disc((45, 60), (35, 50), 6)
     rng = np.random.default_rng(seed)
     whole, plan = refine(codes)
@@ -95,7 +95,7 @@ def test_a_stopped_map_computes_the_same_cells(seed):
     assert np.array_equal(plan.audited_donors, other.audited_donors)
 
 
-def test_the_audit_finds_wrongly_filled_cells():
+def test_the_audit_of_a_map_finds_wrongly_filled_cells():
     # Single cells between lattice points are found by chance only.
     rng = np.random.default_rng(5)
     codes = (rng.random((129, 129)) < 0.02).astype(np.int64)
@@ -110,7 +110,7 @@ def test_the_audit_finds_wrongly_filled_cells():
     assert (sum(audit.gained), sum(audit.lost)) == (audit.wrong, audit.wrong)
 
 
-def test_unaudited_filled_cells_widen_the_shares():
+def test_unaudited_filled_cells_widen_the_share_intervals():
     unaudited = Audit(filled=30, audited=0, wrong=0, gained=(0.0, 0.0), lost=(0.0, 0.0))
     shares = unaudited.corrected((Share(0.9, 0.85, 0.95), Share(0.1, 0.05, 0.15)), 100)
     assert [each.share for each in shares] == [0.9, 0.1]
@@ -123,7 +123,7 @@ def test_unaudited_filled_cells_widen_the_shares():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("rare", [0.02, pytest.param(0.15, marks=pytest.mark.slow)])
-def test_share_intervals_hold_for_rare_kinds(rare):
+def test_share_intervals_of_a_map_hold_for_rare_kinds_of_motion(rare):
     held, middles = 0, []
     for seed in range(20):
         rng = np.random.default_rng(seed)

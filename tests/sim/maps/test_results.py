@@ -56,7 +56,7 @@ def several_starts():
     return solve_map(plan)
 
 
-def test_a_map_with_several_starts_counts_the_motions_at_each_point(several_starts):
+def test_a_map_with_several_initial_states_counts_the_motions_at_each_point(several_starts):
     counts = several_starts.motion_counts
     for place in np.ndindex(counts.shape):
         found = several_starts.motions_at(*place)
@@ -65,7 +65,7 @@ def test_a_map_with_several_starts_counts_the_motions_at_each_point(several_star
     assert counts.max() > 1
 
 
-def test_shares_over_common_starts_have_the_uncertainty_of_the_starts(several_starts):
+def test_shares_over_common_initial_states_have_the_uncertainty_of_these_states(several_starts):
     for found in (several_starts.motions, several_starts.motions_at(0, 0)):
         assert sum(each.share.share for each in found) == pytest.approx(1.0)
         for each in found:

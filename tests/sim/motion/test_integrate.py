@@ -104,7 +104,7 @@ def test_a_sweep_agrees_with_an_independent_integrator_within_its_stated_error()
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(60.0, 550.0), st.floats(1.5e-6, 10e-6))
-def test_no_impact_on_a_fine_grid_is_missed(frequency_hz, amplitude_m):
+def test_no_impact_of_a_finely_sampled_motion_is_missed(frequency_hz, amplitude_m):
     specimen = paper()
     run = integrate(specimen, Harmonic(frequency_hz, amplitude_m), 0.05, sample_rate_hz=1e6)
     pressed = np.abs(run.states[:, 1] - run.states[:, 2]) > specimen.gap_m

@@ -26,7 +26,7 @@ def test_the_environment_variable_for_the_state_folder_takes_precedence(monkeypa
         ("win32", "", "home/AppData/Local/vibench"),
     ],
 )
-def test_each_system_uses_its_standard_state_folder(monkeypatch, tmp_path, platform, variable, expected):
+def test_each_platform_uses_its_standard_state_folder(monkeypatch, tmp_path, platform, variable, expected):
     if platform == "win32":
         monkeypatch.setattr(_state_folder, "usual_state_folder", windows().usual_state_folder)
     elif not hasattr(os, "fork"):

@@ -61,7 +61,7 @@ class Sawtooth:
 
 
 @pytest.mark.parametrize("longest", [0.01, 0.1, 0.3])
-def test_a_circle_is_followed_once_with_both_folds(longest):
+def test_the_continuation_follows_a_circle_once_with_both_folds(longest):
     steps = ArcSteps(first=0.005, longest=longest, most_points=2000)
     points = list(trace(Circle(), np.array([-1.0, 0.0]), 1.0, (-2.0, 2.0), steps))
     assert points[-1].end is ArcEnd.CLOSED
@@ -91,7 +91,7 @@ def test_a_branch_that_turns_back_in_a_kink_is_followed_across_it():
 
 
 @pytest.mark.parametrize("longest", [0.02, 0.05, 0.1, 0.3])
-def test_a_step_past_a_sharp_fold_does_not_jump_to_another_branch(longest):
+def test_a_continuation_step_past_a_sharp_fold_stays_on_its_branch(longest):
     steps = ArcSteps(longest=longest)
     points = list(trace(LoopBesideALine(), np.array([0.02, 0.0]), 1.0, (-3.0, 3.0), steps))
     assert points[-1].end is ArcEnd.CLOSED
@@ -99,7 +99,7 @@ def test_a_step_past_a_sharp_fold_does_not_jump_to_another_branch(longest):
     assert [p.point[-1] for p in points if p.is_fold] == pytest.approx([1.0, -1.0], abs=1e-8)
 
 
-def test_undefined_equations_end_the_branch_with_a_reason():
+def test_an_undefined_residual_ends_the_branch_with_a_reason():
     last = list(trace(Edge(), np.array([0.0, 0.0]), 1.0, (-1.0, 1.0), ArcSteps()))[-1]
     assert last.end is ArcEnd.STEP_TOO_SHORT
     assert last.point[-1] == pytest.approx(0.5, abs=1e-5)
@@ -113,6 +113,6 @@ def test_repeated_kinks_end_the_branch_soon():
 
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
-def test_the_first_step_has_the_requested_direction(direction):
+def test_the_first_continuation_step_has_the_requested_direction(direction):
     points = list(trace(Snap(), np.array([0.0, 0.0]), direction, (-0.1, 0.1), ArcSteps()))
     assert points[-1].point[-1] == pytest.approx(0.1 * direction)

@@ -36,5 +36,5 @@ def test_a_double_zero_of_a_polynomial_is_found_once():
 @pytest.mark.parametrize(
     "coefficients", [[1.0, 2.0, 3.0], [-1.0, -2.0, -3.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 )
-def test_a_sum_without_a_change_of_sign_has_no_zero(coefficients):
+def test_a_polynomial_without_a_change_of_sign_has_no_zero(coefficients):
     assert len(positive_zeros(np.array(coefficients), np.array([0.0, 1.0, 2.0]))) == 0

@@ -75,7 +75,7 @@ def test_the_volume_of_perturbations_shrinks_by_damping_only():
     assert np.log(np.linalg.det(monodromy)) == pytest.approx(-390.081 / 130.0, rel=1e-6)
 
 
-def test_the_multipliers_of_an_impacting_orbit_match_the_exact_flow():
+def test_the_floquet_multipliers_of_an_impacting_orbit_match_the_exact_flow():
     specimen, drive = gong2025(damping_time_s=3e-5), Harmonic(100.0, 5e-6)
     start = integrate(specimen, drive, 3.0, Accuracy.REFERENCE).final_state
     units = np.array([1e-10] * 3 + [1e-7] * 3)

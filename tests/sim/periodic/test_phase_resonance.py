@@ -61,7 +61,7 @@ def test_a_hardening_mode_is_periodic_with_90_degrees_lag():
         ((92.0, 97.0), (2e-7, 1e-7), "ascending"),
     ],
 )
-def test_a_band_without_phase_resonance_is_refused(band_hz, levels_m, said):
+def test_a_frequency_band_without_phase_resonance_is_refused(band_hz, levels_m, said):
     with pytest.raises(ValueError, match=said):
         phase_resonance_branch(gong2025(), band_hz, levels_m)
 
@@ -73,7 +73,7 @@ def test_a_failed_newton_iteration_is_refused(low_m):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))
 
 
-def test_a_band_with_several_modes_is_refused_with_their_frequencies():
+def test_a_phase_resonance_band_with_several_modes_is_refused_with_their_frequencies():
     with pytest.raises(ValueError, match=r"is at 94\.6"):
         phase_resonance_branch(gong2025(), (50.0, 600.0), (1e-8, 1e-7))
 

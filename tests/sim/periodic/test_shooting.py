@@ -16,7 +16,7 @@ TRACE = 390.081
 
 
 @pytest.mark.parametrize("shape", list(OrbitShape))
-def test_the_known_periodic_state_is_found(shape):
+def test_shooting_finds_a_known_periodic_state(shape):
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6), shape)
     assert orbit.outcome is ShootingEnd.CONVERGED
     assert orbit.is_stable
@@ -26,7 +26,7 @@ def test_the_known_periodic_state_is_found(shape):
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(100.0, 5e-6), (130.0, 20e-6)])
-def test_the_product_of_multipliers_follows_from_damping(frequency_hz, amplitude_m):
+def test_the_product_of_the_floquet_multipliers_follows_from_the_damping(frequency_hz, amplitude_m):
     # Liouville's theorem: an elastic contact does not change the phase-space volume.
     orbit = periodic_orbit(SPECIMEN, Harmonic(frequency_hz, amplitude_m), OrbitShape.MIRRORED)
     product = np.prod(orbit.floquet_multipliers)
@@ -45,7 +45,7 @@ def test_the_orbit_without_contact_is_the_linear_response():
     assert orbit.response_i == pytest.approx(linear, rel=1e-5)
 
 
-def test_an_orbit_is_found_from_a_state_far_from_it():
+def test_shooting_finds_an_orbit_from_a_distant_state():
     drive = Harmonic(130.0, 20e-6)
     known = periodic_orbit(SPECIMEN, drive)
     pushed = known.state + 1e-3 * state_scales(SPECIMEN, drive)
@@ -53,7 +53,7 @@ def test_an_orbit_is_found_from_a_state_far_from_it():
     np.testing.assert_allclose(again.state / known.state, 1.0, atol=1e-6)
 
 
-def test_the_map_slopes_match_a_linear_flow():
+def test_the_slopes_of_the_period_map_match_a_linear_flow():
     specimen, drive = gong2025(contact="linear"), Harmonic(130.0, 20e-6)
     mapping = PeriodMap(specimen)
     scales = state_scales(specimen, drive)
@@ -68,7 +68,7 @@ def test_the_map_slopes_match_a_linear_flow():
     np.testing.assert_allclose(slope, origin / scales, atol=1e-9 * np.abs(origin / scales).max())
 
 
-def test_chaos_has_no_period_and_a_settled_orbit_has_period_one():
+def test_a_chaotic_section_has_no_period_and_a_settled_orbit_has_period_one():
     drive = Harmonic(130.0, 20e-6)
     section = stroboscopic_section(SPECIMEN, drive, 300)
     assert smallest_period(section, state_scales(SPECIMEN, drive)) == 1
@@ -77,7 +77,7 @@ def test_chaos_has_no_period_and_a_settled_orbit_has_period_one():
     assert smallest_period(section, state_scales(SPECIMEN, wild)) is None
 
 
-def test_a_section_of_a_known_sequence_has_its_period():
+def test_a_poincare_section_of_a_known_sequence_has_its_period():
     points = np.tile(np.arange(3.0), 8)[:, None] * np.ones(6)
     assert smallest_period(points, np.ones(6)) == 3
     assert smallest_period(points + np.arange(24.0)[:, None], np.ones(6)) is None

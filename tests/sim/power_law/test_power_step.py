@@ -11,7 +11,7 @@ DRIVE = Harmonic(130.0, 20e-6)
 SCALES = np.repeat([1e-4, 0.1], 3)
 
 
-def test_a_negligible_law_gives_the_linear_motion():
+def test_a_negligible_contact_law_gives_the_linear_motion():
     specimen = replace(gong2025(), contact=PowerLaw(46e-6, ((3, 1e-20),)))
     start = np.array([1e-5, -2e-5, 1.5e-5, 0.01, -0.02, 0.03])
     found = integrate(specimen, DRIVE, 0.1, Accuracy.REFERENCE, start, sample_rate_hz=1e4)

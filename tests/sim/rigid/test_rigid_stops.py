@@ -197,7 +197,7 @@ def bound_motion(specimen, drive, state, begin_s, end_s):
     return (expm(system * (end_s - begin_s)) @ np.concatenate([state[[0, 2, 3, 5]], base]))[:4]
 
 
-def test_a_pair_held_on_a_stop_moves_as_one_body():
+def test_m1_and_m2_move_as_one_body_during_sticking():
     specimen = rigid(0.0)
     run = integrate(specimen, STICKING, 0.1, sample_rate_hz=1e5)
     first, last = held_stretch(run, specimen.gap_m)
@@ -241,7 +241,7 @@ def test_resonances_with_a_vanishing_gap_match_the_joined_masses(restitution, mo
         assert response.response_ii == pytest.approx(bound_response(specimen, frequency_hz), rel=2e-3)
 
 
-def test_stiff_contacts_converge_to_rigid_stops_as_their_contact_time():
+def test_stiff_contacts_converge_to_rigid_stops_in_proportion_to_the_contact_time():
     rigid_end = integrate(rigid(1.0), BOUNCING, 0.01, Accuracy.REFERENCE)
     errors = []
     for stiffness in (1e13, 1e15, 1e17):
@@ -338,7 +338,7 @@ def test_the_accuracy_level_has_no_effect_without_chatter():
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
-def test_each_accuracy_meets_its_tolerance_with_chatter(restitution):
+def test_each_accuracy_level_meets_its_tolerance_with_chatter(restitution):
     finals = {level: integrate(rigid(restitution), STICKING, 0.03, level).final_state for level in Accuracy}
     for level in (Accuracy.QUICK, Accuracy.STANDARD):
         assert distance(finals[level], finals[Accuracy.REFERENCE]) < level.tolerance
@@ -355,7 +355,7 @@ def test_a_sampled_sine_with_rigid_stops_equals_the_sine(restitution, drive):
     assert distance(sampled.final_state, harmonic.final_state) < 1e-6
 
 
-def test_a_chattering_sweep_equals_its_sampled_drive():
+def test_a_chattering_motion_is_equal_for_a_sweep_and_its_sampled_drive():
     specimen, sweep, rate = rigid(0.7), LinearSweep(180.0, 220.0, 0.05, 50e-6), 200_000.0
     base = sweep.amplitude_m * np.sin(2.0 * np.pi * sweep.turns(np.arange(10_001) / rate))
     swept = integrate(specimen, sweep, 0.04, Accuracy.REFERENCE, sample_rate_hz=1e5)
@@ -382,7 +382,7 @@ def test_a_split_run_equals_the_whole_even_during_sticking(first_s, restitution)
 
 
 @pytest.mark.parametrize("p", [45.1e-6, -46e-6])
-def test_a_start_inside_a_rigid_stop_is_refused(p):
+def test_an_initial_state_inside_a_rigid_stop_is_refused(p):
     with pytest.raises(ValueError, match=r"A start at y - z = .* is not allowed: rigid stops are at"):
         integrate(rigid(0.5), STILL, 0.1, initial_state=[0.0, p, 0.0, 0.0, 0.0, 0.0])
 

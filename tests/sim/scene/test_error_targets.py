@@ -18,7 +18,7 @@ def campaign():
 
 
 @pytest.mark.parametrize("index", [2, 4, 8, 9, 10])
-def test_stated_errors_hold_and_targets_are_met_for_fixed_starts(campaign, index):
+def test_stated_errors_hold_and_error_targets_are_met_for_fixed_initial_states(campaign, index):
     _, scene = campaign["drawn_scene"](SEED, index)
     for target in campaign["solve_and_measure"](scene, 60.0)["targets"]:
         assert target["kind"] in {"periodic", "named window"}

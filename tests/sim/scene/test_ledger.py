@@ -78,7 +78,7 @@ def test_costs_are_learnt_even_if_their_folder_is_not_writable(tmp_path):
     assert ledger.expected(KIND, 1.0).runs == FEWEST
 
 
-def test_invalid_times_are_not_learnt(ledger):
+def test_invalid_computing_times_are_not_learnt(ledger):
     for _ in range(FEWEST):
         ledger.learn(KIND, 1.0, 0.0)
         ledger.learn(KIND, 0.0, 1.0)
@@ -95,7 +95,7 @@ def test_costs_of_unused_kinds_of_run_follow_a_slower_machine(ledger):
     assert 1.2 < ledger.expected(kinds[5], 1.0).time_s < 2.6
 
 
-def test_one_outlier_changes_a_plan_little(ledger):
+def test_one_outlier_changes_a_cost_estimate_little(ledger):
     for _ in range(10):
         ledger.learn(KIND, 1.0, 1.0)
     ledger.learn(KIND, 1.0, 100.0)

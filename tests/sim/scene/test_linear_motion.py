@@ -9,7 +9,7 @@ DRIVE = Harmonic(137.0, 3e-6, phase_rad=0.7)
 START = (2e-6, -1e-6, 3e-6, 1e-3, -2e-3, 5e-4)
 
 
-def test_the_closed_form_matches_integration_from_any_start():
+def test_the_closed_form_without_contact_matches_integration():
     motion = linear_motion(gong2025(contact="linear"), DRIVE, START)
     run = integrate(gong2025(contact="linear"), DRIVE, 0.3, Accuracy.REFERENCE, START, sample_rate_hz=1000.0)
     for time_s, state in zip(run.time_s[::30], run.states[::30], strict=True):
@@ -51,7 +51,7 @@ def test_the_transient_has_decayed_at_the_stated_time():
     assert motion.share_left(0.5 * when_s) > 1e-5
 
 
-def test_contact_is_excluded_only_if_proven():
+def test_contact_is_excluded_only_if_a_bound_proves_it():
     quiet, loud = Harmonic(200.0, 1e-6), Harmonic(200.0, 1e-4)
     for contact in ("hertz", "linear_gap", "rigid:0.8"):
         specimen = gong2025(contact=contact)
@@ -62,6 +62,6 @@ def test_contact_is_excluded_only_if_proven():
     assert never_touches(none, linear_motion(none, loud, (0.0,) * 6))
 
 
-def test_overflowing_numbers_are_refused_in_a_sentence():
+def test_overflowing_parameters_are_refused_in_a_sentence():
     with pytest.raises(ValueError, match="cannot be computed: its numbers are too far apart"):
         linear_motion(gong2025(1e300), DRIVE, np.zeros(6))

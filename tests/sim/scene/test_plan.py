@@ -23,7 +23,7 @@ def test_a_transient_that_may_touch_a_stop_is_integrated():
     assert "A stop may be touched" in plan.explain()
 
 
-def test_a_transient_within_the_window_is_integrated():
+def test_a_transient_that_lasts_into_the_window_is_integrated():
     short = plan_scene(Scene(gong2025(), QUIET, duration=FixedDuration(0.2, 0.1)))
     undamped = plan_scene(Scene(gong2025(damping_time_s=0.0), QUIET))
     for plan in (short, undamped):
@@ -43,7 +43,7 @@ def test_a_contact_law_with_a_force_at_every_displacement_is_always_integrated()
         (Observable.SCATTER, "show the scatter"),
     ],
 )
-def test_only_requested_quantities_are_computed(observable, said):
+def test_a_scene_plan_computes_only_requested_observables(observable, said):
     plain = plan_scene(Scene(gong2025(), LOUD))
     asked = plan_scene(Scene(gong2025(), LOUD, observe=(Observable.RESPONSE, observable)))
     assert said not in plain.explain()
@@ -51,7 +51,7 @@ def test_only_requested_quantities_are_computed(observable, said):
     assert asked.planned_s >= plain.planned_s
 
 
-def test_cost_without_contact_grows_with_the_drive_periods():
+def test_the_planned_cost_without_contact_grows_with_the_drive_periods():
     def cost(frequency_hz):
         drive = Harmonic(frequency_hz, 1e-9)
         length = FixedDuration(2.0, 1.9)

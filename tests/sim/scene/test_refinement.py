@@ -63,7 +63,7 @@ def test_a_periodic_motion_costs_the_same_for_a_small_and_a_large_error():
     assert rough.duration_s == fine.duration_s
 
 
-def test_a_mean_over_starts_reaches_one_percent():
+def test_a_mean_over_initial_states_reaches_an_error_of_one_percent():
     found = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
     assert found.memory is StartMemory.LOST
     assert found.target.is_met
@@ -74,7 +74,7 @@ def test_a_mean_over_starts_reaches_one_percent():
     assert again.response_ii == found.response_ii
 
 
-def test_the_error_of_a_mean_over_starts_includes_the_error_of_the_runs():
+def test_the_error_of_a_mean_over_initial_states_includes_the_error_of_the_runs():
     """The responses from different initial states scatter by less than the tolerance of a run."""
     specimen = gong2025(8.1e-6, 5.965e-6, "power:3")
     drive = Harmonic(125.89780847473365, 2.120822403280049e-05)
@@ -93,7 +93,7 @@ def test_the_error_of_a_mean_over_starts_includes_the_error_of_the_runs():
         ("rigid:0.6", 7.22e-6, 5.448e-6, 247.9, 5.844e-6, True),
     ],
 )
-def test_only_growing_perturbations_make_a_mean_over_starts_chaotic(
+def test_a_mean_over_initial_states_is_chaotic_only_with_growing_perturbations(
     contact, gap_m, damping_s, frequency_hz, amplitude_m, is_chaos
 ):
     specimen = gong2025(damping_s, gap_m, contact)

@@ -17,7 +17,7 @@ def section_of(values):
 
 
 @pytest.mark.parametrize("period", [1, 2, 3, 7, 12, 32])
-def test_a_repeating_section_has_its_shortest_period(period):
+def test_a_repeating_poincare_section_has_its_shortest_period(period):
     one = 1.0 + np.random.default_rng(period).uniform(-0.5, 0.5, period)
     found = repetition(section_of(np.resize(one, COUNT)), OMEGA, FORGETTING, SHARP)
     assert found == Repetition(period, 0.0)
@@ -51,7 +51,7 @@ def test_alternating_values_that_differ_by_5e_6_give_no_verdict():
     assert repetition(section_of(nearly_one), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_a_section_of_five_points_gives_no_verdict():
+def test_a_poincare_section_of_five_points_gives_no_verdict():
     assert repetition(section_of(np.ones(5)), OMEGA, FORGETTING, SHARP) is None
 
 
@@ -71,5 +71,5 @@ def test_growth_of_perturbations_identifies_aperiodic_motion(logarithms, kind):
     assert kind_of(None, growth, fading_s=0.25) is kind
 
 
-def test_a_repeating_section_is_periodic_for_any_growth():
+def test_a_repeating_poincare_section_is_periodic_for_any_growth_of_perturbations():
     assert kind_of(Repetition(3, 0.0), Growth(np.array([50.0]), 1.0), 0.25) is MotionKind.PERIODIC

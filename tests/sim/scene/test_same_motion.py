@@ -52,17 +52,17 @@ def reached_motion(kind, period=None, factor=1.0, scatter=None, grew=None):
         (reached_motion(CHAOS, None, 1.0, 0.02), reached_motion(CHAOS, None, 1.5, 0.02), False),
     ],
 )
-def test_equal_motions_of_two_starts_are_recognised(one, other, same):
+def test_equal_motions_from_two_initial_states_are_recognised(one, other, same):
     assert is_same(one, other) is same
     assert len(motions_among([one, other])) == (1 if same else 2)
 
 
-def test_a_motion_is_reported_from_the_start_with_the_smallest_error():
+def test_a_motion_is_reported_from_the_run_with_the_smallest_error():
     (motion,) = motions_among([reached_motion(OPEN, None, 1.0, 1e-6), reached_motion(TORUS, None, 1.0, 1e-6)])
     assert kind_among(motion, FORGETTING_S) is TORUS
 
 
-def test_weak_chaos_is_classified_by_the_majority_of_starts():
+def test_weak_chaos_is_classified_by_the_majority_of_runs():
     starts = [reached_motion(TORUS, None, 1.0, 0.01), reached_motion(OPEN, None, 1.01, 0.01)]
     starts += [reached_motion(CHAOS, None, factor, 0.01) for factor in (0.99, 1.0, 1.01)]
     (motion,) = motions_among(starts)
@@ -101,7 +101,7 @@ def test_one_of_several_chaotic_motions_may_turn_into_another(kinds, final):
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_merged_starts_have_the_larger_uncertainty(order):
+def test_merged_runs_have_the_larger_uncertainty(order):
     calm, burst = reached_motion(TORUS, None, 1.0, 0.001), reached_motion(CHAOS, None, 1.0, 0.02)
     errors = {id(calm): 1e-6, id(burst): 0.04}
     assert _error([calm, burst][::order], lambda each: errors[id(each)]) == 0.04

@@ -60,7 +60,7 @@ def test_start_dependence_without_a_budget_is_known_only_for_chaos():
     assert chaos.motion is MotionKind.CHAOTIC_SO_FAR
 
 
-def test_several_attractors_are_reported_with_their_shares(several_attractors):
+def test_several_attractors_of_one_scene_are_reported_with_their_shares(several_attractors):
     assert several_attractors.memory is StartMemory.LOST
     assert several_attractors.is_one_of_several
     ensemble = several_attractors.ensemble
@@ -101,7 +101,7 @@ def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
 
-def test_starts_still_chaotic_at_the_end_count_as_possibly_unknown_motion():
+def test_runs_still_chaotic_at_their_end_count_as_possibly_unknown_motion():
     found = solve_scene(
         scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
     ).ensemble
@@ -141,11 +141,11 @@ def test_the_scatter_over_initial_states_matches_their_responses():
     assert chaos.scatter == chaos.ensemble.scatter
 
 
-def test_the_ensemble_of_a_scene_is_reproducible(short_chaos):
+def test_the_ensemble_of_runs_of_a_scene_is_reproducible(short_chaos):
     assert solve_scene(SHORT_CHAOS).to_dict() == short_chaos.to_dict()
 
 
-def test_a_larger_budget_follows_more_starts(short_chaos):
+def test_a_larger_computing_budget_follows_more_initial_states(short_chaos):
     small = solve_scene(replace(SHORT_CHAOS, budget_s=0.02))
     assert small.ensemble is None or small.ensemble.followed_s < short_chaos.ensemble.followed_s
     with pytest.raises(ValueError, match=r"Budget -1\.0 s is not allowed: it must be zero or positive"):

@@ -26,7 +26,7 @@ def test_joint_share_intervals_cover_the_true_shares_in_95_percent(shares):
     assert held / len(drawn) > 0.93
 
 
-def test_share_intervals_allow_unfinished_starts_to_reach_any_motion():
+def test_share_intervals_allow_unfinished_runs_to_reach_any_motion():
     settled, pending = shares_of([Count(6, is_final=True), Count(10, is_final=False)])
     alone = wilson_share(6, 16)
     assert (settled.share, settled.low, settled.high) == (alone.share, alone.low, 1.0)

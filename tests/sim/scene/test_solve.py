@@ -107,7 +107,7 @@ def test_no_part_of_chaos_is_skipped(integrated_s):
     assert sum(integrated_s) >= 30.0
 
 
-def test_perturbations_are_followed_where_chaos_is_uncertain(monkeypatch):
+def test_perturbations_are_computed_where_chaos_is_uncertain(monkeypatch):
     carried, follow = [], FollowedRun.follow
 
     def noted(run, *options, **more):
@@ -161,7 +161,7 @@ def test_chaos_ending_in_a_torus_is_not_chaotic():
     assert found.motion is MotionKind.QUASI_PERIODIC
 
 
-def test_the_spectrum_contains_response_ii_at_the_drive_and_chaotic_noise():
+def test_the_spectrum_contains_response_ii_at_the_drive_frequency_and_chaotic_noise():
     observe = (Observable.RESPONSE, Observable.SPECTRUM)
     periodic = solve_scene(scene_of("hertz", 130.0, 20e-6, observe=observe, duration=FixedDuration(4.0, 1.0)))
     chaos = solve_scene(replace(CHAOS, observe=observe, duration=FixedDuration(4.0, 1.0)))
@@ -175,7 +175,7 @@ def test_the_spectrum_contains_response_ii_at_the_drive_and_chaotic_noise():
     assert np.max(periodic.spectrum[quiet]) < 1e-6
 
 
-def test_the_section_contains_one_state_per_drive_period_of_the_window():
+def test_the_poincare_section_contains_one_state_per_drive_period_of_the_window():
     observe = (Observable.RESPONSE, Observable.POINCARE)
     found = solve_scene(replace(CHAOS, observe=observe, duration=FixedDuration(4.0, 1.0)))
     assert found.section.shape == (260, 6)

@@ -83,7 +83,7 @@ def test_the_specimen_response_over_the_base_is_independent_of_the_shaker(freque
 
 
 @pytest.mark.parametrize("stiffer", [0.5, 3.0, 1e7])
-def test_a_changed_middle_spring_is_described_by_the_lever(stiffer):
+def test_the_lever_ratio_predicts_the_response_with_a_changed_middle_spring(stiffer):
     frequency_hz = np.array([20.0, 94.0, 201.0, 266.0, 350.0, 436.0, 500.0])
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses

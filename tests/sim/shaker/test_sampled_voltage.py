@@ -81,7 +81,7 @@ def test_the_response_of_the_sensors_is_included():
     assert base[1] / base[0] == pytest.approx(150j / (150j + 20), rel=1e-3)
 
 
-def test_impacts_are_counted_and_depend_on_nanometres_of_the_start():
+def test_impacts_are_counted_and_depend_on_nanometres_of_the_initial_state():
     rate_hz = 51_200.0
     time_s = np.arange(round(2 * rate_hz)) / rate_hz
     volts = 2.5 * np.cos(2 * np.pi * 260 * time_s) * (time_s > 1.0)

@@ -27,7 +27,7 @@ def test_the_stuck_response_equals_that_of_the_joined_masses():
 
 
 @pytest.mark.parametrize("stiffer", [0.5, 3.0])
-def test_the_lever_ratio_gives_x_for_any_p(stiffer):
+def test_the_lever_ratio_gives_x_for_any_relative_displacement(stiffer):
     """Another spring between m1 and m2 changes p, and x changes by the lever ratio times p."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses

@@ -55,7 +55,7 @@ def test_any_number_of_threads_gives_the_same_curve_bit_for_bit(curve, answers, 
     require_equal(solve_study(curve, workers=3), answers)
 
 
-def test_a_point_of_a_curve_equals_a_single_point(curve, answers):
+def test_a_batched_point_of_a_study_equals_a_single_prediction(curve, answers):
     for place in (4, 11, 19):
         alone = solve_in_batch(curve.scene((0, 0, 0, 0, 0, place), Rest()))
         frequency_hz = curve.frequencies_hz[place]
@@ -99,7 +99,7 @@ def test_scenes_that_batches_do_not_support_are_solved_singly():
     assert found[1].method is Method.CLOSED_FORM
 
 
-def test_a_thinned_long_lead_in_does_not_cause_start_dependence():
+def test_a_long_lead_in_with_thinned_states_is_not_reported_as_start_dependent():
     # Of 13,000 drive periods only 4,096 states are stored for the comparison of initial states.
     scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
     assert solve_scene(scene).memory is StartMemory.KEPT
@@ -107,7 +107,7 @@ def test_a_thinned_long_lead_in_does_not_cause_start_dependence():
 
 
 @pytest.mark.parametrize(("phase_rad", "length"), [(0.5 * np.pi, (20.0, 1.0)), (1.57, (20.0, 1.0))])
-def test_one_contact_per_period_does_not_cause_start_dependence(phase_rad, length):
+def test_a_motion_with_one_contact_per_period_is_not_reported_as_start_dependent(phase_rad, length):
     drive = Harmonic(130.0, 20e-6, phase_rad)
     scene = Scene(gong2025(), drive, duration=FixedDuration(*length), budget_s=0.02)
     assert solve_scene(scene).memory is StartMemory.KEPT

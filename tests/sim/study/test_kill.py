@@ -51,11 +51,11 @@ def resume(path):
     """Resume the study in this process and return the computed scenes."""
     begun = []
 
-    def noted(scene):
+    def solve_and_note(scene):
         begun.append(scene)
         return solve_scene(scene)
 
-    executor = ThreadExecutor(2, noted)
+    executor = ThreadExecutor(2, solve_and_note)
     with FileStore(path, child.STUDY) as store:
         end = run_study(child.STUDY, executor, store)
     executor.close()

@@ -17,23 +17,23 @@ def scheduler_of(planned_s, after=None, is_done=None):
     return scheduler
 
 
-def test_the_longest_point_begins_first():
+def test_the_study_point_with_the_longest_planned_time_begins_first():
     scheduler = scheduler_of([1.0, 5.0, 3.0])
     assert [scheduler.take(0.1, 1) for _ in range(4)] == [(1,), (2,), (0,), ()]
 
 
-def test_short_points_are_grouped_into_larger_jobs():
+def test_short_study_points_are_grouped_into_larger_jobs():
     assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 10) == (0, 1, 2)
     assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
 
 
-def test_the_priority_of_a_point_includes_all_points_waiting_for_it():
+def test_the_priority_of_a_study_point_includes_all_points_waiting_for_it():
     # The chain 0 <- 1 <- 2 takes 6 s, point 3 alone 5 s.
     scheduler = scheduler_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
     assert scheduler.take(0.1, 1) == (0,)
 
 
-def test_a_point_waits_until_its_predecessor_is_finished():
+def test_a_study_point_waits_until_its_predecessor_is_finished():
     scheduler = scheduler_of([1.0, 2.0], after=[NOBODY, 0])
     assert scheduler.take(10.0, 10) == (0,)
     assert scheduler.take(10.0, 10) == ()
@@ -41,12 +41,12 @@ def test_a_point_waits_until_its_predecessor_is_finished():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_the_successor_of_a_finished_point_can_start_at_once():
+def test_the_successor_of_a_finished_study_point_can_start_at_once():
     scheduler = scheduler_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_measured_times_of_neighbours_change_the_order_of_points():
+def test_measured_times_of_neighbours_change_the_order_of_study_points():
     scheduler = scheduler_of([1.0, 1.0, 1.0, 2.0])
     assert scheduler.take(0.1, 1) == (3,)
     scheduler.finish(3)
@@ -56,7 +56,7 @@ def test_measured_times_of_neighbours_change_the_order_of_points():
     assert scheduler.take(0.1, 1) == (2,)
 
 
-def test_a_point_that_failed_in_a_group_is_repeated_alone():
+def test_a_study_point_that_failed_in_a_group_is_repeated_alone():
     scheduler = scheduler_of([1.0, 1.0, 1.0])
     assert scheduler.take(10.0, 10) == (0, 1, 2)
     scheduler.put_back_alone(1)
@@ -70,7 +70,7 @@ def test_a_point_that_failed_in_a_group_is_repeated_alone():
     st.lists(st.tuples(st.floats(0.001, 10.0), st.booleans()), min_size=1, max_size=20),
     st.integers(0, 2**32),
 )
-def test_every_point_is_scheduled_until_finished_and_never_after(points, seed):
+def test_every_study_point_is_scheduled_until_finished_and_never_after(points, seed):
     """Chains of any length, replies in any order, some points put back, some costs learnt."""
     luck = random.Random(seed)
     planned_s, is_chained = zip(*points, strict=True)

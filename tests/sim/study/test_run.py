@@ -86,7 +86,7 @@ def single_prediction(frequency_hz, amplitude_m, start):
     )
 
 
-def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
+def test_a_chained_point_continues_from_the_final_state_of_its_predecessor(small, truth):
     first = single_prediction(200.0, 20e-6, Rest())
     # 0.2 s at 200 Hz are whole periods, so the drive continues at phase zero.
     second = single_prediction(230.0, 20e-6, Given(first.final_state))
@@ -97,7 +97,7 @@ def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
     assert not np.array_equal(*states)
 
 
-def test_base_motion_is_continuous_where_a_chain_changes_frequency():
+def test_base_motion_is_continuous_between_chained_points_of_a_study():
     study = Study(frequencies_hz=[201.3, 233.7, 260.1], amplitudes_m=[5e-6], starts=["down"], **SHORT)
     results = solve_study(study, workers=1)
     phase = results.values(PHASE).ravel()
@@ -113,7 +113,7 @@ def test_predictions_name_the_initial_state_of_their_run(truth):
     assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
 
 
-def test_every_point_begins_at_the_requested_initial_state():
+def test_every_study_point_begins_at_the_requested_initial_state():
     state = (0.0, 2e-5, 0.0, 0.0, 0.05, 0.0)
     study = Study(
         frequencies_hz=[100.0, 130.0],
@@ -203,7 +203,7 @@ def test_a_cancelled_study_stops_at_once_and_keeps_its_finished_points(study, re
     np.testing.assert_array_equal(results.values("response_i")[is_done], whole[is_done])
 
 
-def test_progress_counts_every_point_once_and_ends_with_no_time_left(study):
+def test_the_progress_of_a_study_counts_every_point_once_and_ends_with_no_time_left(study):
     seen = []
     solve_study(study, workers=2, observer=seen.append)
     counts = [each.done for each in seen]

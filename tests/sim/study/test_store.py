@@ -43,11 +43,11 @@ def run_into_file(path, study, solver=solve_scene, cancelled=None):
     """Run or resume a study in its file; return the computed scenes and how the run ended."""
     begun = []
 
-    def noted(scene):
+    def solve_and_note(scene):
         begun.append(scene)
         return solver(scene)
 
-    executor = ThreadExecutor(2, noted)
+    executor = ThreadExecutor(2, solve_and_note)
     with FileStore(path, study) as store:
         end = run_study(study, executor, store, cancelled=cancelled)
     executor.close()
@@ -148,7 +148,7 @@ def test_sessions_record_which_executor_computed_which_point(small, tmp_path):
 
 
 @pytest.mark.thorough
-def test_resuming_computes_only_missing_points(study, tmp_path, require_equal):
+def test_a_resumed_study_computes_only_missing_points(study, tmp_path, require_equal):
     path = tmp_path / "a.h5"
     make_file(path, study)
     count = itertools.count()
@@ -177,7 +177,7 @@ def test_stored_scene_identities_match_the_scenes(small, tmp_path):
         ({"duration_s": 0.3, "window_s": 0.2}, "0.2 in the file and 0.3 in the request, window_s is 0.1"),
     ],
 )
-def test_another_study_is_refused_with_the_differences(small, tmp_path, change, said):
+def test_a_file_of_another_study_is_refused_with_the_differences(small, tmp_path, change, said):
     path = tmp_path / "a.h5"
     make_file(path, small)
     before = path.read_bytes()
@@ -285,7 +285,7 @@ def images_after_power_cuts(empty, log, luck):
 
 
 @pytest.mark.thorough
-def test_counted_points_are_complete_after_a_power_cut(small, tmp_path):
+def test_study_points_reported_as_stored_are_complete_after_a_power_cut(small, tmp_path):
 
     path, image_path = tmp_path / "a.h5", tmp_path / "image.h5"
     make_file(path, small)
