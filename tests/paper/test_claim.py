@@ -108,7 +108,7 @@ def test_expectation_bounds_include_their_ends(low, width, value):
     assert wanted.is_met_by((value,)) == (low <= value <= low + width)
 
 
-def test_empty_bounds_are_refused():
+def test_empty_bounds_of_a_claim_are_refused():
     with pytest.raises(InvalidRequest, match="lower bound first"):
         Expectation("peak", "Hz", 2.0, 1.0)
 
@@ -129,7 +129,7 @@ def test_an_option_changes_only_its_own_setting():
     assert "4 µm" in change("sweep-amplitude", 4e-6).name
 
 
-def test_numbers_are_shown_with_their_units():
+def test_numbers_of_a_claim_are_shown_with_their_units():
     assert about("peak", "Hz", 95.0, 1.0).sentence == "94 to 96 Hz"
     assert at_least("share", "%", 0.9).sentence == "≥ 90 %"
     assert at_most("largest", "1/s", 10.0).sentence == "≤ 10 1/s"

@@ -16,7 +16,7 @@ SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
 
 
 @pytest.fixture(scope="module")
-def solved():
+def solver():
     """Return a function that solves each study once."""
     found = {}
 
@@ -29,9 +29,9 @@ def solved():
     return solve
 
 
-def draw(solved, number, options=SHORT):
+def draw(solver, number, options=SHORT):
     figure = paper_figure(number)
-    return figure.draw(options, *(solved(each) for each in figure.studies(options)))
+    return figure.draw(options, *(solver(each) for each in figure.studies(options)))
 
 
 def numbers(table, heading):
@@ -42,8 +42,8 @@ def numbers(table, heading):
 @pytest.mark.parametrize(
     "number", [1, 2, 3, 5, 7, *(pytest.param(n, marks=pytest.mark.slow) for n in (6, 8, 9, 11))]
 )
-def test_a_paper_figure_is_saved_in_every_format_with_its_numbers(solved, number, tmp_path):
-    found = draw(solved, number)
+def test_a_paper_figure_is_saved_in_every_format_with_its_table(solver, number, tmp_path):
+    found = draw(solver, number)
     paths = found.save(tmp_path, list(ImageKind))
     heads = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     for path in paths:
@@ -54,8 +54,8 @@ def test_a_paper_figure_is_saved_in_every_format_with_its_numbers(solved, number
 
 
 @pytest.mark.thorough
-def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solved):
-    weak, *_, strong = draw(solved, 3).tables
+def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solver):
+    weak, *_, strong = draw(solver, 3).tables
     f = numbers(weak, "frequency_hz")
 
     def peaks(table):
@@ -68,9 +68,9 @@ def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solv
 
 
 @pytest.mark.thorough
-def test_figure_3_shades_only_the_frequencies_with_collisions(solved):
-    results = solved(paper_figure(3).studies(SHORT)[0])
-    for amplitude_m, table in zip(AMPLITUDES_M, draw(solved, 3).tables, strict=True):
+def test_figure_3_shades_only_the_frequencies_with_collisions(solver):
+    results = solver(paper_figure(3).studies(SHORT)[0])
+    for amplitude_m, table in zip(AMPLITUDES_M, draw(solver, 3).tables, strict=True):
         curve = responses(results, amplitude=amplitude_m)
         assert np.array_equal(numbers(table, "collides") > 0, curve.collides)
     shares = [responses(results, amplitude=each).collides.mean() for each in AMPLITUDES_M]
@@ -92,31 +92,31 @@ def test_collision_shading_extends_halfway_to_neighbouring_points():
 
 
 @pytest.mark.thorough
-def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solved):
-    (table,) = draw(solved, 5).tables
+def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solver):
+    (table,) = draw(solver, 5).tables
     share = {name: numbers(table, f"collides_{name}").mean() for name in ("damped", "undamped", "damped_7um")}
     assert share["damped"] < share["undamped"]
     assert share["damped"] < share["damped_7um"]
 
 
 @pytest.mark.thorough
-def test_figure_7_has_the_papers_rates_at_the_weakest_level(solved):
-    caption = draw(solved, 7).caption
+def test_figure_7_has_the_papers_rates_at_the_weakest_level(solver):
+    caption = draw(solver, 7).caption
     assert "log10 of the response [mm]" in caption
-    titles = [axes.get_title() for axes in draw(solved, 7).figure.axes]
+    titles = [axes.get_title() for axes in draw(solver, 7).figure.axes]
     assert "Response I: R = 8" in titles[0]
 
 
 @pytest.mark.thorough
-def test_the_argument_of_the_logarithm_is_an_option_of_figure_7(solved):
+def test_the_argument_of_the_logarithm_is_an_option_of_figure_7(solver):
     other = FigureOptions(
         accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED
     )
-    assert draw(solved, 7, other).caption != draw(solved, 7).caption
-    assert draw(solved, 7, other).figure.axes[0].get_title() != draw(solved, 7).figure.axes[0].get_title()
+    assert draw(solver, 7, other).caption != draw(solver, 7).caption
+    assert draw(solver, 7, other).figure.axes[0].get_title() != draw(solver, 7).figure.axes[0].get_title()
 
 
 @pytest.mark.parametrize(("name", "value"), [("gap_m", 0.0), ("damping_time_s", -1.0), ("gap_m", np.nan)])
-def test_impossible_options_are_refused(name, value):
+def test_impossible_options_of_a_paper_figure_are_refused(name, value):
     with pytest.raises(InvalidRequest, match="not allowed"):
         FigureOptions(**{name: value})

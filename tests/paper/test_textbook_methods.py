@@ -100,7 +100,7 @@ def test_an_invalid_step_or_tolerance_is_refused(value):
         ode45(absolute=value)
 
 
-def test_no_drives_give_no_exponents():
+def test_an_empty_list_of_drives_gives_no_exponents():
     """The claims page follows only colliding motions, and there may be none."""
     assert textbook_exponents(gong2025(), [], ode45()).shape == (0,)
     assert textbook_exponents(gong2025(), [], runge_kutta(1e-3)).shape == (0,)
