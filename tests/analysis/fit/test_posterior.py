@@ -59,7 +59,7 @@ def test_statistics_from_a_wrong_model_do_not_fit(cases):
 
 
 def test_a_run_of_the_true_model_is_rarely_rejected_with_few_references():
-    """Too few reference runs once let two in five of the runs of the true model be rejected."""
+    """With the distances of the 80 regression runs as reference, two in five true runs were once rejected."""
     refused, runs, statistics = 0, 80, 60
     for seed in range(12):
         rng = np.random.default_rng(seed)

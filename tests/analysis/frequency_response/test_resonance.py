@@ -246,7 +246,7 @@ def test_frequency_and_damping_of_every_mode_are_within_bounds():
 @pytest.mark.thorough
 @pytest.mark.parametrize("accelerometer", [0.3, 0.003])
 def test_bounds_of_every_mode_hold_with_two_realisations_of_noise(accelerometer):
-    """The base motion has a notch to 30 % at the first mode, narrow compared with the line spacing."""
+    """The base motion has a notch to 30 % at the first mode, about one spectral line wide."""
     rate, points, realisations = 4096.0, 2048, 2
     driven = np.arange(25, 301)
     frequency_hz = 2.0 * driven
