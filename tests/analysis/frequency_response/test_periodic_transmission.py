@@ -76,7 +76,7 @@ def test_the_measured_repetition_period_scatters_as_stated():
 
 
 def test_zero_order_hold_images_do_not_affect_clock_or_band():
-    """A zero-order hold of 8192 points per period adds an image of the band at 8192 - k, 22 dB lower."""
+    """A zero-order hold of 8192 points per period adds an image at 8192 - k; 10 dB lower here."""
     rng = np.random.default_rng(9)
     period = 51200 * (1 + 60e-6)
     band, image = np.arange(20, 600, 19), 8192 - np.arange(20, 600, 19)

@@ -1,7 +1,5 @@
 """Dwells: responses, spectral lines and Poincaré points of known motions and of the simulated specimen."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.sine.dwell_analysis import stroboscope
 from vibench.analysis.spectra.spectra import spectral_density
 from vibench.analysis.tones.sine_fit import drive_level, noise_drive_level
-from vibench.sim import Harmonic, gong2025, integrate
 
 RATE = 12_800.0
 DRIVE_HZ = 260.0031  # the generator's 260 Hz measured by the converter's clock
@@ -130,15 +127,6 @@ def test_twice_the_error_of_a_complex_mean_covers_its_true_value_in_95_percent(c
     values = np.random.default_rng(5).standard_normal((4000, count, 2)).view(complex)[..., 0]
     held = np.mean([abs(each.mean().real) < 2 * standard_uncertainty(each) for each in values])
     assert held == pytest.approx(0.954, abs=0.012)
-
-
-@cache
-def simulate_dwell(amplitude_m):
-    specimen = gong2025()
-    path = integrate(specimen, Harmonic(260.0, amplitude_m), 8.0, sample_rate_hz=RATE)
-    omega = 2 * np.pi * 260.0
-    base = -amplitude_m * omega**2 * np.sin(omega * path.time_s)
-    return np.sin(omega * path.time_s), base, path.states[:, 0], path.states[:, 3], path.impacts.count
 
 
 def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_two():
