@@ -14,7 +14,10 @@ SEVERE_PER_S = 100.0
 NEAR_ZERO_PER_S = 10.0
 """Exponent that counts as near zero, a tenth of severe; free motion decays at a few per second."""
 _AROUND_HZ = 15.0
-_SEVERE = (at_least("frequencies above 100", "%", 0.9), at_least("median exponent", "1/s", SEVERE_PER_S))
+_SEVERE = (
+    at_least("exponents above 100", "%", 0.9),
+    at_least("median exponent", "1/s", SEVERE_PER_S),
+)
 _GROWS = (at_least("exponent, 10 over 5 µm", "", 1.0), at_least("50 over 10 µm", "", 1.0))
 
 
@@ -24,13 +27,13 @@ _GROWS = (at_least("exponent, 10 over 5 µm", "", 1.0), at_least("50 over 10 µm
     at_most("largest |exponent|", "1/s", NEAR_ZERO_PER_S),
 )
 def calm_at_1um(r: Reading) -> Values:
-    """At 1 µm the exponent of the piece-wise model is near zero at all frequencies."""
+    """At 1 µm the piece-wise model's exponent is near zero at all frequencies."""
     return (np.nanmax(np.abs(r.exponents(WEAK_M))),)
 
 
 @costly_claim("4, Fig. 10(b)", "As above.", at_most("largest |exponent|", "1/s", NEAR_ZERO_PER_S))
 def calm_at_1um_continuous(r: Reading) -> Values:
-    """At 1 µm the exponent of the continuous model n = 5 is near zero at all frequencies."""
+    """At 1 µm the exponent of n = 5 is near zero at all frequencies."""
     return (np.nanmax(np.abs(r.exponents(WEAK_M, CONTINUOUS))),)
 
 
@@ -74,7 +77,7 @@ def _severe(r: Reading, lowest_hz: float, highest_hz: float) -> Values:
 @costly_claim(
     "4, Fig. 10(a, b)",
     "Smallest increase of the share of exponents above 10 per second, between amplitudes.",
-    at_least("smallest increase, piece-wise", "%", 0.0),
+    at_least("smallest increase of frequencies, piece-wise", "%", 0.0),
     at_least("n = 5", "%", 0.0),
     tried=(NARROWER_FIT,),
 )
@@ -99,7 +102,7 @@ def chaos_grows(r: Reading) -> Values:
 
 @costly_claim("4, Fig. 10(b)", "As above.", *_GROWS)
 def chaos_grows_continuous(r: Reading) -> Values:
-    """With larger A0 the exponent of the continuous model n = 5 is larger."""
+    """With larger A0 the exponent of n = 5 is larger."""
     return _grows(r, CONTINUOUS)
 
 
@@ -128,7 +131,7 @@ def stops_more_chaotic(r: Reading) -> Values:
 @costly_claim(
     "4, Fig. 10(c)",
     "Smallest increase of the share of frequencies at which they differ by over 10 per second.",
-    at_least("smallest increase", "%", 0.0),
+    at_least("smallest increase of frequencies", "%", 0.0),
 )
 def exponents_part(r: Reading) -> Values:
     """With larger A0 the exponents of the two models differ at more frequencies."""
@@ -144,7 +147,7 @@ def exponents_part(r: Reading) -> Values:
     tried=(NARROWER_FIT,),
 )
 def exponents_near_with_order(r: Reading) -> Values:
-    """With larger n the exponents of the continuous model approach those of the piece-wise model."""
+    """With larger n the continuous model's exponents approach the piece-wise model's."""
     stops = r.exponents(MODERATE_M)
     cubic, fifth, seventh = (
         float(np.nanmean(np.abs(stops - r.exponents(MODERATE_M, model))))
@@ -156,7 +159,7 @@ def exponents_near_with_order(r: Reading) -> Values:
 @claim(
     "4, Fig. 10(a, b)",
     "Piece-wise model: mean exponent within 15 Hz of each resonance, relative to the overall mean.",
-    *(at_least(f"over mean at {each:g} Hz", "", 1.0) for each in PAPER_TERMINAL_RESONANCES_HZ),
+    *(at_least(f"exponent at {each:g} Hz over mean", "", 1.0) for each in PAPER_TERMINAL_RESONANCES_HZ),
 )
 def exponents_peak_at_terminal(r: Reading) -> Values:
     """At 50 µm the exponents peak at the terminal resonances, 201 and 435 Hz."""

@@ -19,13 +19,15 @@ _HEADINGS = ("claim", "section, figure", "measured", "required", "verdict")
 HEAD = f"| {' | '.join(_HEADINGS)} |"
 _TITLE = "Claims of the paper, checked by simulation"
 _METHOD = """\
-Each claim of Gong et al. (2025) with a number or a direction is checked with a simulation of their
-specimen. The paper states few tolerances, so the required bounds are our choice. They allow for chaos,
-which differs by some per cent from run to run. Some were set after a first look at the results.
+Each claim of Gong et al. (2025) with a number or direction is checked with a simulation of their
+specimen. The paper states few tolerances, so the required bounds are our choice, some made after a first
+look at the results. The bounds allow for chaos, whose responses differ by some per cent between runs.
+"Strict reading" takes the paper's words literally. "A over B" is the ratio A / B.
 If chaos ends at random, a claim is measured from several starts (initial states a millionth of the gap
-apart), and the range is given. If a claim fails, options are tested in order until it holds.
-A0 is the base amplitude, n the power of a continuous contact law, similarity the rate of eq. 7, and
-the exponent the largest Lyapunov exponent. DIR/report.html lists options, methods and claims by setting."""
+apart); its range is in parentheses. If a claim fails, options are tested in order until it holds.
+A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest Lyapunov
+exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
+DIR/report.html describes how each claim is measured."""
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
@@ -55,9 +57,9 @@ class Reproduction:
         """The numbers of claims by verdict, in words."""
         return (
             f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults, "
-            f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts, "
+            f"{self.count(Verdict.HOLDS_FOR_SHARE)} under the defaults for some starts only, "
             f"{self.count(Verdict.HOLDS_UNDER)} under another named option, "
-            f"{self.count(Verdict.FAILS)} under none of the options tested."
+            f"{self.count(Verdict.FAILS)} under no option tested."
         )
 
 
@@ -165,19 +167,19 @@ def _upheld(result: Judgement) -> str:
     """Return the options under which a claim holds, with their numbers, and the comment."""
     claim, alternatives = result.claim, result.findings[1:]
     sentences = [
-        f"{'It holds under' if each.is_met else 'Values for'} {each.case.name}: {_values(claim, each)}."
+        f"{'It holds under' if each.is_met else 'Values with'} {each.case.name}: {_values(claim, each)}."
         for each in alternatives
         if each.met > 0
     ]
     if alternatives and result.met_under is None:
-        sentences.insert(0, f"It holds under none of {len(alternatives)} options tested{_except(result)}.")
+        sentences.insert(0, f"It holds under none of {len(alternatives)} options{_except(result)}.")
     return " ".join([*sentences, claim.remark]).strip()
 
 
 def _except(result: Judgement) -> str:
     """Return the options under which a claim holds for some starts only."""
     return "".join(
-        f", except {each.case.name} for {each.met} of {len(each.draws)} starts"
+        f"; with {each.case.name} it holds for {each.met} of {len(each.draws)} starts"
         for each in result.findings
         if each.is_met_in_part
     )

@@ -77,7 +77,7 @@ def test_the_claims_page_begins_with_differences_and_agreeing_options(found):
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
     assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary
-    assert "- **third**: It is so with third. It holds under none of 1 options tested." in summary
+    assert "- **third**: It is so with third. It holds under none of 1 options." in summary
 
 
 def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_number():
@@ -90,16 +90,16 @@ def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_numbe
     page = reproduction_document(
         Reproduction({"Synthetic": (found,)}, score_rows(((), ("chance",))), (), "Defaults: these.", "")
     )
-    except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
-    assert f"It holds under none of 1 options tested{except_it}." in page
+    except_it = "; with c = 3e-05 s · k it holds for 3 of 4 starts"
+    assert f"It holds under none of 1 options{except_it}." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
-    assert "Values for c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
+    assert "Values with c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
 
 
 def test_the_score_names_the_best_damping_and_the_failed_claims(found):
     page = reproduction_document(found, (("A figure", "images/it.png"),))
-    assert "most hold at 3e-05 s." in page
-    assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second, third |" in page
+    assert "most hold at 3e-05 s. At every damping fail: third." in page
+    assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second |" in page
     assert "nowhere" not in page
     assert page.endswith("![A figure](images/it.png)\n")
 
@@ -109,7 +109,9 @@ def test_the_claims_report_begins_with_counts_and_has_a_card_per_section(found, 
     path = write_page(reproduction_page(found, levels, score), tmp_path / "report.html")
     page = Page(path.read_text(encoding="utf-8"))
     assert page.headings == ["claims on", "result", "agreement", "figure and remarks"]
-    assert page.findings.startswith("Of 3 claims 1 hold under the defaults, 0 for a share of starts, 1 under")
+    assert page.findings.startswith(
+        "Of 3 claims 1 hold under the defaults, 0 under the defaults for some starts only, 1 under"
+    )
     assert page.findings.endswith("Claims that do not hold: third.")
     assert "Synthetic 1 of 3 claims hold under the defaults. no second, third" in page.visible
     order = ["findings", "figure-1", "cards", "card-1", "further", "figure-2", "details"]
