@@ -1,4 +1,4 @@
-"""``python -m tests.attack TARGET``: hours on purpose, in shards, and the sum of what they have seen.
+"""``python -m tests.attack TARGET``: long attacks in shards, and the sum of their results.
 
 ::
 
@@ -45,10 +45,10 @@ TARGETS: dict[str, Attack] = {
 
 
 def main() -> int:
-    """Attack, or add up; the exit code is 1 when something was found."""
+    """Run an attack or add up saved results; the exit code is 1 if something was found."""
     options = _options()
     if options.sum:
-        tallies = _added_up([tally for path in options.sum for tally in saved_tallies(path)])
+        tallies = _summary([tally for path in options.sum for tally in saved_tallies(path)])
     else:
         part, of = (int(each) for each in options.shard.split("/"))
         until_s = time.monotonic() + 60 * options.minutes
@@ -62,7 +62,7 @@ def main() -> int:
     return int(any(tally.findings for tally in tallies))
 
 
-def _added_up(tallies: list[Tally]) -> list[Tally]:
+def _summary(tallies: list[Tally]) -> list[Tally]:
     sums: dict[str, Tally] = {}
     for tally in tallies:
         sums.setdefault(tally.target, Tally(tally.target)).add(tally)

@@ -1,7 +1,7 @@
-"""Recordings of a noted campaign that somebody altered: no reading command takes one as intact.
+"""Alterations of recordings of a campaign: no command may take an altered recording as intact.
 
-Each number alters one file, the journal or the folder as an outsider would, and lets every reading command
-look at it. Numbers that change must be refused or warned of; what is unharmed must stay intact.
+Each number alters one file, the journal or the folder as an outsider could, and runs every reading command on
+it. Altered numbers must be refused or warned of; unaltered recordings must stay intact.
 """
 
 import io
@@ -36,8 +36,8 @@ READERS = ("verify", "verify folder", "analyse", "analyse folder", "export", "pa
 """The catalogue does not check samples, and says so."""
 
 
-def noted(folder: Path, names: tuple[str, ...] = NAMES) -> None:
-    """Write a journal in which recordings of a folder are done."""
+def write_journal(folder: Path, names: tuple[str, ...] = NAMES) -> None:
+    """Write a journal that lists recordings of a folder as done."""
     plans, seals = [], {}
     for name in names:
         with open_recording(folder / f"{name}.h5") as recording:
@@ -52,7 +52,7 @@ def noted(folder: Path, names: tuple[str, ...] = NAMES) -> None:
             journal.end(name, JournalPointState.DONE, ReasonCode.CARRIED_OUT, "so it was", seal)
 
 
-# --- alterations: each changes the folder and tells how ---------------------------------------
+# --- alterations: each changes the folder and returns a description ---------------------------
 
 
 def _change_bytes(path: Path, chance: random.Random) -> str:
@@ -140,7 +140,7 @@ INSIDE: tuple[Callable[[h5py.File, random.Random], str], ...] = (
 
 
 def _inside(path: Path, chance: random.Random) -> str:
-    """Change a file by HDF5's own means; its seal is kept, removed, or made again as by a forger."""
+    """Change a file by HDF5; the seal is kept, removed, or made again as by a forger."""
     seal = chance.choice(("kept", "kept", "removed", "renewed"))
     with h5py.File(path, "r+") as file:
         said = chance.choice(INSIDE)(file, chance)
@@ -154,7 +154,7 @@ def _inside(path: Path, chance: random.Random) -> str:
 
 
 def _exchange(path: Path, chance: random.Random) -> str:
-    """Put another recording under the name: a copy, a link of either kind, or both exchanged."""
+    """Replace a recording by another: a copy, a link of either kind, or both exchanged."""
     other = path.with_name(f"{next(each for each in NAMES if each != path.stem)}.h5")
     how = chance.choice(("copied", "hard link", "link", "exchanged"))
     if how == "exchanged":
@@ -202,7 +202,7 @@ ALTERATIONS: tuple[Callable[[Path, random.Random], str], ...] = (
 # --- the commands -----------------------------------------------------------------------------
 
 
-def _said(folder: Path, *arguments: str) -> tuple[int, str]:
+def _output(folder: Path, *arguments: str) -> tuple[int, str]:
     from vibench.cli.__main__ import main
 
     out, argv = io.StringIO(), sys.argv
@@ -212,15 +212,15 @@ def _said(folder: Path, *arguments: str) -> tuple[int, str]:
             main()
     except SystemExit as ended:
         return int(ended.code or 0), out.getvalue()
-    except Exception as error:  # what the program does not expect is what is looked for
+    except Exception as error:  # unexpected exceptions are what the attack looks for
         return -1, f"Traceback: {type(error).__name__}: {error}"
     finally:
         sys.argv = argv
     return 0, out.getvalue()
 
 
-def taken(folder: Path, name: str) -> list[str]:
-    """Return the readers that take an altered recording as intact, or end with an exception."""
+def fooled_readers(folder: Path, name: str) -> list[str]:
+    """Return the commands that take an altered recording as intact, or end with an exception."""
     from vibench.gui.pages.files.recording_table import facts_text, whole_check
 
     out = folder.parent / "out"
@@ -235,11 +235,11 @@ def taken(folder: Path, name: str) -> list[str]:
     }
     found = []
     for word, arguments in commands.items():
-        code, text = _said(folder, *arguments)
+        code, text = _output(folder, *arguments)
         is_warned = word in {"analyse", "analyse folder", "export"} and any(each in text for each in WARNED)
         if code == -1 or not (code == 1 or is_warned):
             found.append(f"{word}: {code} {text[:300]}")
-    code, text = _said(folder, "catalogue", ".")
+    code, text = _output(folder, "catalogue", ".")
     if code == -1 or not any(line.startswith(name) and "good" not in line for line in text.splitlines()):
         found.append(f"catalogue: {code} {text[:300]}")
     try:
@@ -261,8 +261,8 @@ def attack(shard: Shard) -> Tally:
         usual.mkdir()
         for name in NAMES:
             (usual / f"{name}.h5").write_bytes(good_recordings()[f"{name}.h5"])
-        noted(usual)
-        unharmed = taken(shutil.copytree(usual, Path(text, "unharmed")), "dwell.h5")
+        write_journal(usual)
+        unharmed = fooled_readers(shutil.copytree(usual, Path(text, "unharmed")), "dwell.h5")
         if [each.split(":")[0] for each in unharmed] != list(READERS):
             raise RuntimeError(f"unharmed recordings are refused: {unharmed}")
         for number, chance in shard.chances(tally):
@@ -271,7 +271,7 @@ def attack(shard: Shard) -> Tally:
             alteration = chance.choice(ALTERATIONS)
             how = f"{path.name}: {alteration(path, chance)}"
             tally.count(alteration.__name__.strip("_"))
-            if found := taken(folder, path.name):
+            if found := fooled_readers(folder, path.name):
                 tally.findings.append(Finding("altered", shard.seed, number, (how, *found), ""))
             shutil.rmtree(folder.parent)
     return tally

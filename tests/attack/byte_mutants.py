@@ -25,7 +25,7 @@ MOST_AT_ONCE = 6
 
 
 def mutated_bytes(content: bytes, chance: random.Random, others: tuple[bytes, ...] = ()) -> bytes:
-    """Change a few places of ``content``; ``others`` are files of the same format to take pieces from."""
+    """Change a few places of ``content``; ``others`` are files of the same format that give pieces."""
     data = bytearray(content)
     changes = [_flip, _overwrite, _overwrite_float, _cut, _repeat, _insert, _end_early, _blank]
     if others:
@@ -35,15 +35,15 @@ def mutated_bytes(content: bytes, chance: random.Random, others: tuple[bytes, ..
     return bytes(data)
 
 
-def flipped_bit(content: bytes, chance: random.Random) -> bytes:
-    """Turn one bit over, anywhere."""
+def flip_bit(content: bytes, chance: random.Random) -> bytes:
+    """Flip one bit at a random position."""
     data = bytearray(content)
     _flip(data, chance)
     return bytes(data)
 
 
 def _place(data: bytearray, chance: random.Random) -> int:
-    """Most of what a format says of itself stands at its beginning."""
+    """Return a random position; headers are preferred, since they describe the format."""
     if not data:
         return 0
     return chance.randrange(min(len(data), 512)) if chance.random() < 0.4 else chance.randrange(len(data))

@@ -17,7 +17,7 @@ def attack_commands(
     shard: Shard,
     judge: Callable[[Case, Ending], tuple[str, ...]] = lambda _, ending: ending.faults,
 ) -> Tally:
-    """Run the mutants of a shard, and tell what was found."""
+    """Run the mutants of a shard, and return the tally with all findings."""
     tally = shard.tally(name)
     with CommandRunner() as runner:
         for number, chance in shard.chances(tally):

@@ -1,7 +1,7 @@
 """Run commands one after another, each in a process with limits on time and memory.
 
-Starting an interpreter and importing takes seconds, so one process imports everything and forks itself for
-each command. What is forked ends for good: nothing of a command reaches the next one.
+Starting an interpreter and importing takes seconds. One process therefore imports everything and forks itself
+for each command, so that no command affects the next one.
 """
 
 import json
@@ -49,7 +49,7 @@ class CommandRunner:
             return self.run_in(Path(name), case)
 
     def run_in(self, folder: Path, case: Case) -> Ending:
-        """Run ``vibench`` as a case says in a folder that is there."""
+        """Run ``vibench`` as described by a case in an existing folder."""
         before = _files(folder)
         asked = json.dumps({"folder": str(folder), **asdict(replace(case, files={}))})
         self._server.stdin.write(asked + "\n")
@@ -77,7 +77,7 @@ def _files(folder: Path) -> set[str]:
 
 
 def serve() -> None:
-    """Fork for each line of standard input, and say on standard output how the command ended."""
+    """Fork for each line of standard input, and print how the command ended."""
     import vibench.cli.environment  # noqa: I001 - numpy reads its setting, so it comes first
     import vibench.analysis
     import vibench.cli.__main__
@@ -93,17 +93,17 @@ def serve() -> None:
     for line in sys.stdin:
         asked = json.loads(line)
         folder, case = Path(asked.pop("folder")), Case(**asked)
-        print(json.dumps(ended(folder, case)), flush=True)
+        print(json.dumps(run_command(folder, case)), flush=True)
 
 
-def ended(folder: Path, case: Case) -> dict[str, object]:
-    """Run one command to its end, or to the end of its time."""
+def run_command(folder: Path, case: Case) -> dict[str, object]:
+    """Run one command until it ends or its time is over."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         began = time.monotonic()
         number = os.fork()
         if number == 0:
             _become_command(folder, case, out.fileno(), err.fileno())
-        status, usage = _waited(number, case.hangs_s)
+        status, usage = _wait(number, case.hangs_s)
         return {
             "code": os.waitstatus_to_exitcode(status),
             "took_s": usage.ru_utime + usage.ru_stime,
@@ -114,8 +114,8 @@ def ended(folder: Path, case: Case) -> dict[str, object]:
         }
 
 
-def _waited(number: int, hangs_s: float) -> tuple[int, resource.struct_rusage]:
-    """Wait for a process to end, or end it with everything that it started."""
+def _wait(number: int, hangs_s: float) -> tuple[int, resource.struct_rusage]:
+    """Wait for a process to end; after the time limit kill it and all its children."""
     descriptor = os.pidfd_open(number)
     try:
         ready, _, _ = select.select([descriptor], [], [], hangs_s + GRACE_S)
@@ -133,7 +133,7 @@ def _text(file: object) -> str:
 
 
 def _become_command(folder: Path, case: Case, out: int, err: int) -> None:
-    """Never returns."""
+    """Run a command in this forked process; never returns."""
     os.setpgid(0, 0)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(out, 1)

@@ -1,8 +1,8 @@
-"""Recordings whose truth is a closed form and whose numbers invite a confident mistake.
+"""Recordings with a known closed form that invite wrong results.
 
-Each member draws another specimen, level, duration and kind of noise; a finding is a number that is reported
-with a bound and lies more than twice that bound off, or a verdict that the truth excludes. "Withheld" is
-never a finding, and is counted.
+Each member has a random specimen, level, duration and noise. A finding is a reported number that is off by
+more than twice its stated bound, or a verdict that contradicts the truth. A withheld number is never a
+finding; it is counted.
 """
 
 import random
@@ -35,7 +35,7 @@ Faults = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Said:
-    """What was said of one member."""
+    """Result of the analysis of one member."""
 
     ending: str
     faults: Faults
@@ -43,7 +43,7 @@ class Said:
 
 
 def members(target: str, member: Callable[[np.random.Generator, Path], Said]) -> Callable[[Shard], Tally]:
-    """Return the campaign of one kind of member."""
+    """Return the attack for one kind of member."""
 
     def attack(shard: Shard) -> Tally:
         tally = shard.tally(target)
@@ -60,7 +60,7 @@ def members(target: str, member: Callable[[np.random.Generator, Path], Said]) ->
 
 
 def generator(chance: random.Random) -> np.random.Generator:
-    """Return numpy's source of chance for a member."""
+    """Return numpy's random generator for a member."""
     return np.random.default_rng(chance.getrandbits(64))
 
 
@@ -73,7 +73,7 @@ def specimen_without_contact(rng: np.random.Generator) -> Specimen:
 
 
 def near_a_mode(rng: np.random.Generator, specimen: Specimen) -> float:
-    """Draw a frequency [Hz] within some bandwidths of a mode, or anywhere between."""
+    """Draw a frequency [Hz] within some bandwidths of a mode, or anywhere in the range."""
     if rng.random() < 0.25:
         return float(rng.uniform(60, 520))
     mode = int(rng.integers(3))
@@ -82,7 +82,7 @@ def near_a_mode(rng: np.random.Generator, specimen: Specimen) -> float:
 
 
 def sensor_noise(rng: np.random.Generator, samples: int, size: float) -> tuple[str, np.ndarray]:
-    """Draw what a sensor adds, and its name; `size` is the root mean square of its motion."""
+    """Draw sensor noise and its name; `size` is the rms of the sensor's signal."""
     kind = str(rng.choice(("white", "hum", "1/f", "drift", "quantised")))
     level = size * 10 ** rng.uniform(-6, -2.5)
     time_s = np.arange(samples) / synthetic.RATE
@@ -100,8 +100,8 @@ def sensor_noise(rng: np.random.Generator, samples: int, size: float) -> tuple[s
     return kind, level * white
 
 
-def filtered(specimen: Specimen, moved_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the base's acceleration and m0's velocity without contact, of a motion that ends in rest."""
+def filter_motion(specimen: Specimen, moved_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return base acceleration and m0 velocity of a motion without contact that ends at rest."""
     padded = 1 << int(np.ceil(np.log2(moved_m.size + 40 * synthetic.RATE)))
     frequency_hz = np.fft.rfftfreq(padded, 1 / synthetic.RATE)
     omega = 2 * np.pi * frequency_hz
@@ -112,8 +112,8 @@ def filtered(specimen: Specimen, moved_m: np.ndarray) -> tuple[np.ndarray, np.nd
     )
 
 
-def stepped(rng: np.random.Generator, folder: Path) -> Said:
-    """Steps of a specimen that has, or has not, settled."""
+def stepped_sine(rng: np.random.Generator, folder: Path) -> Said:
+    """Stepped sine of a specimen that has settled, or not."""
     specimen = specimen_without_contact(rng)
     count = int(rng.integers(1, 4))
     settle_s, record_s = float(10 ** rng.uniform(-0.7, 0.6)), float(rng.uniform(0.4, 2.0))
@@ -134,7 +134,7 @@ def stepped(rng: np.random.Generator, folder: Path) -> Said:
     is_on = (time_s > 0) & (time_s < time_s[-1] - 0.2)
     level_m = oaconvolve(levels_m[step] * is_on, glide)[: step.size]
     moved_m = level_m * np.sin(2 * np.pi * np.cumsum(played_hz) / synthetic.RATE + rng.uniform(0, 6))
-    acceleration, velocity = filtered(specimen, moved_m)
+    acceleration, velocity = filter_motion(specimen, moved_m)
     within = min(1.0, 0.5 / np.max(np.abs(velocity)), 50 / np.max(np.abs(acceleration)))
     levels_m, moved_m, acceleration, velocity = (
         within * each for each in (levels_m, moved_m, acceleration, velocity)
@@ -202,15 +202,15 @@ def stepped(rng: np.random.Generator, folder: Path) -> Said:
     return Said(ending, tuple(faults), about)
 
 
-attack_steps = members("steps", stepped)
+attack_steps = members("steps", stepped_sine)
 
 
 DRIFTS = ("none", "gain", "base gain", "frequency", "damping", "delay", "gain and frequency", "within")
 DISTORTIONS = ("none", "cube", "square", "dead zone")
 
 
-def drifted(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Draw what a property does from realisation to realisation: mean zero, largest 1."""
+def draw_drift(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Draw the drift of a property over realisations, with zero mean and a maximum of 1."""
     course = str(rng.choice(("line", "walk", "random", "step", "turn")))
     place = np.linspace(-1, 1, count)
     shapes = {
@@ -225,7 +225,7 @@ def drifted(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def repeated_noise(rng: np.random.Generator, folder: Path) -> Said:
-    """Realisations of noise, of a specimen that drifts, is not linear, or both, or neither."""
+    """Noise realisations of a specimen that drifts, is nonlinear, both, or neither."""
     specimen = specimen_without_contact(rng)
     drift, bent = str(rng.choice(DRIFTS)), str(rng.choice(DISTORTIONS, p=(0.7, 0.1, 0.1, 0.1)))
     realisations, periods = int(rng.integers(3, 9)), int(rng.integers(2, 5))
@@ -239,8 +239,8 @@ def repeated_noise(rng: np.random.Generator, folder: Path) -> Said:
     plan = (OddMultisine if rng.random() < 0.5 else WhiteNoise)(**band, **counted)
     omega = 2 * np.pi * repetition_hz * np.array(plan.lines)
     size = float(10 ** rng.uniform(-4, -1.7))
-    # Frequencies drift by less than a bandwidth, as a specimen does that warms.
-    course, rate = size * drifted(rng, realisations), synthetic.RATE
+    # Frequencies drift by less than a bandwidth, as when a specimen warms up.
+    course, rate = size * draw_drift(rng, realisations), synthetic.RATE
     time_s = np.arange(round((0.25 + periods / repetition_hz) * rate)) / rate
     noise_m_per_s = float(10 ** rng.uniform(-4.5, -2.5))
     strength = float(10 ** rng.uniform(-2.5, -1))
@@ -303,8 +303,8 @@ LIGHT_RATE_HZ = 25_600.0
 FULL_SCALE_M_PER_S = 1.0
 
 
-def darkened(rng: np.random.Generator, velocity: np.ndarray, first: int, stop: int) -> tuple[str, np.ndarray]:
-    """Draw drop-outs between two samples: how often, how long, in bursts or not, and what is shown."""
+def darken(rng: np.random.Generator, velocity: np.ndarray, first: int, stop: int) -> tuple[str, np.ndarray]:
+    """Draw drop-outs between two samples: rate, length, bursts, and the shown signal."""
     per_s = float(10 ** rng.uniform(-0.5, 2))
     count = max(1, round(per_s * (stop - first) / LIGHT_RATE_HZ))
     starts = rng.integers(first, stop - 200, count)
@@ -348,13 +348,13 @@ def dark_recording(rng: np.random.Generator, folder: Path) -> Said:
             settle_s = 0.0
             plan = SineSweep(amplitude_vpp=0.02, settle_s=0.0, **ends)
             part = synthetic.Part("sweep", 0.0, length_s, {"start_hz": 0.9 * hz})
-        acceleration, velocity = filtered(specimen, motion.displacement_m)
+        acceleration, velocity = filter_motion(specimen, motion.displacement_m)
         largest = max(np.max(np.abs(velocity)), 0.01 * np.max(np.abs(acceleration)))
         within = float(10 ** rng.uniform(-2.5, 0)) * 0.5 / largest
         base = synthetic.Motion(within * motion.displacement_m, within * acceleration)
         noise_m_per_s = float(10 ** rng.uniform(-6, -4))
         light = within * velocity + noise_m_per_s * rng.standard_normal(velocity.size)
-        about, dark = darkened(
+        about, dark = darken(
             rng, light, round(settle_s * LIGHT_RATE_HZ), light.size - round(0.5 * LIGHT_RATE_HZ)
         )
         about += f"; {plan!r}, {within * np.max(np.abs(velocity)):.2g} m/s, noise {noise_m_per_s:.2g}"
@@ -374,7 +374,7 @@ def dark_recording(rng: np.random.Generator, folder: Path) -> Said:
         told = not {"noise", "chance"} & {each.value for each in other.not_stated}
         is_told = is_told and told
         off = abs(other.value - one.value)
-        # A0 holds at its frequency, which is another one where drop-outs hide the largest response.
+        # The amplitude holds at its own frequency, which differs where drop-outs hide the largest response.
         is_same = one.quantity == other.quantity or not one.quantity.startswith("base amplitude")
         if told and is_same and not off <= SURELY * other.expanded + STEADY * abs(one.value):
             faults.append(f"{other.quantity} {other.text}, not {one.value:.5g}")

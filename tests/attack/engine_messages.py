@@ -41,12 +41,12 @@ REQUESTS: tuple[dict[str, Any], ...] = (
 
 
 def framed(text: bytes, payload: bytes = b"") -> bytes:
-    """Put a message on the wire."""
+    """Return a message with its frame header."""
     return HEAD.pack(MAGIC, len(text), len(payload)) + text + payload
 
 
 def broken_frame(chance: random.Random) -> bytes:
-    """Give something that begins like a message, and lies in its head or ends too soon."""
+    """Return data that begins like a message, and has a wrong header or ends too soon."""
     text = mutated_json(chance.choice(REQUESTS), chance)
     match chance.randrange(4):
         case 0:
@@ -70,14 +70,14 @@ class Trial:
         self.descriptors = process.descriptors
 
     def send(self, chance: random.Random) -> str:
-        """Send one broken message, and say how it was taken; TimeoutError when it never was."""
+        """Send one broken message and return how it was answered; raise TimeoutError without an answer."""
         if chance.random() < 0.15:
-            return self._at_the_door(chance)
-        viewer = self._let_in()
+            return self._send_without_token(chance)
+        viewer = self._open_viewer()
         if chance.random() < 0.1:
-            return self._spoiled(viewer, broken_frame(chance))
+            return self._send_and_end(viewer, broken_frame(chance))
         request = chance.choice(REQUESTS)
-        # What is right brings the engine into its other states.
+        # Valid requests bring the engine into other states.
         is_right = chance.random() < 0.15
         viewer.sendall(framed(json.dumps(request).encode() if is_right else mutated_json(request, chance)))
         taken = self._answer(viewer)
@@ -86,17 +86,17 @@ class Trial:
         return taken
 
     def close(self) -> None:
-        """Leave."""
+        """Close the connection."""
         self.hang_up()
 
     def hang_up(self) -> None:
-        """Close the viewer's connection; the next message opens another."""
+        """Close the viewer's connection; the next message opens a new one."""
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
 
     def status_faults(self) -> tuple[str, ...]:
-        """Ask as a viewer would, and look at the process from outside."""
+        """Return faults of the engine: no status, a traceback, too much memory or too many descriptors."""
         process = self._process
         with EngineClient.attach(self._address) as client:
             client.stop("off")
@@ -112,14 +112,14 @@ class Trial:
             if is_so
         )
 
-    def _at_the_door(self, chance: random.Random) -> str:
-        with closing(self._connected()) as stranger:
+    def _send_without_token(self, chance: random.Random) -> str:
+        with closing(self._connect()) as stranger:
             hello = mutated_json({"ask": "hello", "token": "x" * 43, "role": "visiting"}, chance)
             said = framed(hello) if chance.random() < 0.5 else broken_frame(chance)
-            return "door: " + self._spoiled(stranger, said)
+            return "door: " + self._send_and_end(stranger, said)
 
-    def _spoiled(self, connection: socket.socket, said: bytes) -> str:
-        """Say something that may be cut, and leave: the other side may answer or hang up."""
+    def _send_and_end(self, connection: socket.socket, said: bytes) -> str:
+        """Send data that may be incomplete and end the connection; the engine may answer or close it."""
         with suppress(OSError):
             connection.sendall(said)
             connection.shutdown(socket.SHUT_WR)
@@ -130,17 +130,17 @@ class Trial:
 
     def _answer(self, connection: socket.socket) -> str:
         try:
-            head = self._exactly(connection, HEAD.size)
+            head = self._receive(connection, HEAD.size)
             magic, text, payload = HEAD.unpack(head)
-            facts = json.loads(self._exactly(connection, text))
-            self._exactly(connection, payload)
+            facts = json.loads(self._receive(connection, text))
+            self._receive(connection, payload)
         except ConnectionError:
             return "hung up"
         assert magic == MAGIC
         return "refused" if "refused" in facts else "answered"
 
     @staticmethod
-    def _exactly(connection: socket.socket, count: int) -> bytes:
+    def _receive(connection: socket.socket, count: int) -> bytes:
         found = b""
         while len(found) < count:
             piece = connection.recv(min(count - len(found), 1 << 16))
@@ -149,12 +149,12 @@ class Trial:
             found += piece
         return found
 
-    def _connected(self) -> socket.socket:
+    def _connect(self) -> socket.socket:
         return socket.create_connection((self._address.host, self._address.port), LONGEST_S)
 
-    def _let_in(self) -> socket.socket:
+    def _open_viewer(self) -> socket.socket:
         if self._viewer is None:
-            self._viewer = self._connected()
+            self._viewer = self._connect()
             self._viewer.sendall(self._hello)
             assert self._answer(self._viewer) == "answered"
         return self._viewer
@@ -165,7 +165,7 @@ LOOK_EVERY = 25
 
 
 def attack(shard: Shard) -> Tally:
-    """Send broken messages to an engine without a bench, or with a virtual one as it comes."""
+    """Send broken messages to an engine without a bench, or with a virtual bench."""
     tally = shard.tally(NAME)
     words = ("vibench.acquisition.engine", "--attendance", "unattended", "--forgotten-s", "36000")
     with ServedProcess(*words) as process, closing(Trial(process)) as trial:

@@ -135,7 +135,7 @@ WRITERS = {
 
 @cache
 def good_files() -> Mapping[str, bytes]:
-    """Make a good file of each suffix."""
+    """Return a valid file of each suffix."""
     with tempfile.TemporaryDirectory() as name:
         made = {}
         for suffix, write in WRITERS.items():
@@ -145,14 +145,14 @@ def good_files() -> Mapping[str, bytes]:
 
 
 def mapping(suffix: str) -> bytes:
-    """Say what the channels of a good file are."""
+    """Return the channel mapping of a valid file."""
     first, second = NAMES.get(suffix, ("1", "2"))
     rate = "" if suffix in SAYS_ITS_RATE else f"sample_rate_hz = {RATE_HZ}.0"
     return MAPPING.format(first=first, second=second, rate=rate).encode()
 
 
 def reading(suffix: str, content: bytes, *options: str) -> Case:
-    """Let `vibench import` read a file of this suffix and content."""
+    """Return a case in which `vibench import` reads a file of this suffix and content."""
     name = f"broken{suffix}"
     return Case(("import", name, *options), {name: content, "map.toml": mapping(suffix)})
 
@@ -161,7 +161,7 @@ MAKING = ("--mapping", "map.toml", "--out", "new.h5", "--json")
 
 
 def mutant(chance: random.Random) -> Case:
-    """Break a file of a suffix chosen by chance."""
+    """Break a file of a random suffix."""
     suffix = chance.choice(tuple(WRITERS))
     content = good_files()[suffix]
     if suffix in TEXT and chance.random() < 0.8:
@@ -172,7 +172,7 @@ def mutant(chance: random.Random) -> Case:
 
 
 def faults(case: Case, ending: Ending) -> tuple[str, ...]:
-    """Say what was wrong: a failed import leaves nothing, and one that was done leaves what it says."""
+    """Return the faults of an import: leftovers after a failure, or a wrong result."""
     wanted = {"new.h5"} if ending.code == 0 and "--out" in case.arguments else set()
     unwanted = set(ending.made) ^ wanted
     return (*ending.faults, *(f"{name} left or missing" for name in sorted(unwanted)))

@@ -41,7 +41,7 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def broken_scpi(chance: random.Random) -> bytes:
-    """Give one line for the generator; it may hold several commands, and need not end one."""
+    """Return one line for the generator; it may hold several commands, and may lack its end."""
     units = []
     for _ in range(chance.choice((1, 1, 1, 2, 5))):
         unit = chance.choice(COMMANDS)
@@ -68,7 +68,7 @@ USB_METHODS = ("Identify", "BulkOut", "BulkIn", "Control")
 
 
 def broken_usb(chance: random.Random) -> tuple[str, bytes]:
-    """Give a method of the served USB device, and a frame for it that is nearly right."""
+    """Return a method of the served USB device, and a nearly valid frame for it."""
     method = chance.choice(USB_METHODS)
     tag = chance.randrange(1, 256)
     header = struct.pack("<BBBBIBBH", chance.choice((1, 2, 128, 7)), tag, ~tag & 255, 0, 0, 1, 10, 0)
@@ -124,11 +124,11 @@ SMALL = tuple(edge for edge in EDGES if edge < 2**31)
 
 
 def broken_call(chance: random.Random) -> tuple[str, bytes]:
-    """Give a method of the driver, and a request for it that is nearly right."""
+    """Return a method of the driver, and a nearly valid request for it."""
     name = chance.choice(CALLS) if chance.random() < 0.6 else chance.choice(SERVICE.methods).name
     method = SERVICE.methods_by_name[name]
     request = getattr(nidaqmx_pb2, method.input_type.name)()
-    # Half of the requests are right as far as is known, so that tasks come to run.
+    # Half of the requests are valid as far as is known, so that tasks can run.
     _fill(request, chance, 0 if chance.random() < 0.5 else STRANGE)
     content = request.SerializeToString()
     path = f"/{SERVICE.full_name}/{name}"
@@ -144,14 +144,14 @@ def _fill(message: Any, chance: random.Random, strange: float) -> None:
         is_known = field.name in USUAL
         is_strange = chance.random() < strange
         if field.message_type is not None:
-            if field.default_value != []:  # not repeated
+            if field.default_value != []:  # repeated fields would be too many
                 _fill(getattr(message, field.name), chance, strange)
                 getattr(message, field.name).SetInParent()
             continue
         if not is_known and not is_strange:
             continue
         give = _any_value if is_strange else _usual_value
-        with suppress(ValueError, TypeError, UnicodeEncodeError):  # what no client could put into a message
+        with suppress(ValueError, TypeError, UnicodeEncodeError):  # impossible in a message
             if field.default_value == []:
                 count = chance.choice((0, 1, 3, 1000))
                 getattr(message, field.name).extend(give(field, chance) for _ in range(count))
@@ -180,7 +180,7 @@ def _any_value(field: FieldDescriptor, chance: random.Random) -> Any:
             return chance.choice((*SMALL, -1, -(2**31)))
 
 
-# --- the trial ------------------------------------------------------------------------------
+# --- the attack -----------------------------------------------------------------------------
 
 UNEXPECTED = (
     "Exception calling application",
@@ -202,17 +202,17 @@ class Trial:
         self._line = socket.create_connection(self._scpi, LONGEST_S)
 
     def send(self, chance: random.Random) -> str:
-        """Send one broken message, and say how it was taken; raises TimeoutError when it never was."""
+        """Send one broken message and return how it was answered; raise TimeoutError without an answer."""
         match chance.randrange(4):
             case 0:
-                return "scpi: " + self._say(chance)
+                return "scpi: " + self._send_line(chance)
             case 1:
                 return "usb: " + self._call(*broken_usb(chance), chance)
             case _:
                 return "daqmx: " + self._call(*broken_call(chance), chance)
 
     def close(self) -> None:
-        """Leave."""
+        """Close the connections."""
         self._line.close()
         self._channel.close()
 
@@ -227,8 +227,8 @@ class Trial:
         request = nidaqmx_pb2.GetSystemInfoAttributeUInt32Request(attribute_raw=0x1272)
         version(request.SerializeToString(), timeout=LONGEST_S)
 
-    def _say(self, chance: random.Random) -> str:
-        if chance.random() < 0.2:  # a client that leaves without having read
+    def _send_line(self, chance: random.Random) -> str:
+        if chance.random() < 0.2:  # a client that leaves without reading
             self._line.close()
             self._line = socket.create_connection(self._scpi, LONGEST_S)
         try:
@@ -265,7 +265,7 @@ class Trial:
 
 
 def faults(process: ServedProcess, before: int) -> tuple[str, ...]:
-    """Look at the process from outside."""
+    """Return faults of the process: a traceback, too much memory or too many descriptors."""
     more = process.descriptors - before
     found = (
         ("a traceback", "Traceback (most recent call last)" in process.err),

@@ -1,8 +1,8 @@
-"""Odd replies of instruments while whole commands run: one sentence, the right exit code, and silence.
+"""Odd replies of instruments while complete commands run: one sentence, the right exit code, and silence.
 
-The simulated instruments reply as none should, from some call on, once or always: empty, endless, not a
+The simulated instruments give invalid replies, from some call on, once or always: empty, endless, not a
 number, control sequences, a wrong rate or count, an error. The real pyvisa, nidaqmx and sounddevice receive
-the replies in a process of each command; a witness looks at the outputs when the command has ended.
+the replies in the process of each command; a witness checks the outputs at its end.
 """
 
 import json
@@ -90,7 +90,7 @@ CARD = (
 
 
 def drawn(chance: random.Random, kind: str) -> dict[str, Any]:
-    """Draw what is odd about an instrument, and from which call on."""
+    """Choose at random what is odd about an instrument, and from which call on."""
     odd: dict[str, Any] = {
         "kind": kind,
         "after": chance.choice((0, 0, 1, 2, 5, 20, 60)),
@@ -106,7 +106,7 @@ def drawn(chance: random.Random, kind: str) -> dict[str, Any]:
 
 
 def mutant(chance: random.Random, played: Callable[[random.Random], bytes]) -> Case:
-    """Choose an instrument, what is odd about it, and the command that uses it."""
+    """Choose an instrument, its oddity, and the command that uses it."""
     kind = chance.choice(tuple(RIGS))
     plan = NOISE if kind == "output" or (kind == "sound card" and chance.random() < 0.5) else DWELL
     files = {"plan.toml": (PLAN + plan).encode(), "answers.toml": ANSWERS}
@@ -135,7 +135,7 @@ def mutant(chance: random.Random, played: Callable[[random.Random], bytes]) -> C
 
 
 def prepare(text: str) -> Callable[[], None]:
-    """Build the bench, make an instrument odd, and return the witness, which is asked at the end."""
+    """Build the bench, make an instrument odd, and return the witness, which is called at the end."""
     from vibench.acquisition import save_toml
     from vibench.acquisition.drivers import _daqmx, _sound_card
     from vibench.acquisition.rig import load_rig
@@ -144,14 +144,14 @@ def prepare(text: str) -> Callable[[], None]:
 
     odd = json.loads(text)
     os.environ |= {"VIBENCH_STATE_DIR": str(Path.cwd() / "state"), "VIBENCH_LOCK_DIR": str(Path.cwd())}
-    # A hung server, sooner than usual; a card that is late because the computer is busy, later.
+    # A hung server times out sooner than usual; a card that is late on a busy computer, later.
     _daqmx.CALL_DEADLINE_S, _sound_card._LATEST_S = 15.0, 60.0
     rig = _slow(load_rig(ROOT / "hardware_configs" / f"{RIGS[odd['kind']]}.toml"))
     made: list[Any] = []
     for each in (AFG1022, World):
-        _noted(each, made)
+        _note(each, made)
     played: dict[str, float] = {}
-    _watched(World, played)
+    _watch(World, played)
     held = ExitStack()
     if "query" in odd:
         _reply_oddly(AFG1022, odd)
@@ -178,7 +178,7 @@ def prepare(text: str) -> Callable[[], None]:
 
 
 def _slow(rig: Any) -> Any:
-    """Return a rig of few samples."""
+    """Return a rig with a low sample rate."""
     daq = {"sample_rate_hz": 5120.0}
     if rig.daq.output is not None:
         daq["output"] = rig.daq.output.model_copy(update=daq)
@@ -189,7 +189,7 @@ def _is_closed(generator: Any) -> bool:
     return bool(generator.settings(1).relay.value == "closed")
 
 
-def _noted(kind: type, made: list[Any]) -> None:
+def _note(kind: type, made: list[Any]) -> None:
     original = kind.__init__
 
     def create(self: Any, *given: Any, **named: Any) -> None:
@@ -199,8 +199,8 @@ def _noted(kind: type, made: list[Any]) -> None:
     kind.__init__ = create  # type: ignore[misc]
 
 
-def _watched(world: Any, played: dict[str, float]) -> None:
-    """Note the last voltage of every analogue output."""
+def _watch(world: Any, played: dict[str, float]) -> None:
+    """Record the last voltage of every analogue output."""
     play, silence = world.play, world.silence
 
     def watched_play(self: Any, channel: str, volts: Any, rate_hz: float) -> None:
@@ -296,7 +296,7 @@ def _odd_fields(fields: dict[str, Any], chance: random.Random) -> dict[str, Any]
 
 
 def _serve(rig: Any, held: ExitStack) -> Any:
-    """Start the instruments apart from the bench, which then is opened as a real one."""
+    """Start the instruments separately; the bench is then opened like a real one."""
     from datetime import UTC, datetime
 
     from vibench.acquisition.rig import KnobSheet, save_knob_sheet
@@ -377,7 +377,7 @@ def _odd_block(how: str, block: Any, flags: int, chance: random.Random) -> tuple
     return block, flags
 
 
-# --- the judgement ---------------------------------------------------------------------------
+# --- verdict ---------------------------------------------------------------------------------
 
 
 def harmful(text: str) -> list[str]:
@@ -388,7 +388,7 @@ def harmful(text: str) -> list[str]:
 
 
 def faults(case: Case, ending: Ending) -> tuple[str, ...]:
-    """Return what is wrong with an ending; empty if nothing is."""
+    """Return the faults of an ending."""
     said = f"{ending.out}\n{ending.err}"
     odd = json.loads(case.prepare[1])
     is_cut_off = odd.get("reply", 0) >= len(REPLIES) and odd["always"]
@@ -406,7 +406,7 @@ def faults(case: Case, ending: Ending) -> tuple[str, ...]:
 
 
 def _usual(kind: str, *options: str) -> Case:
-    """Return a measurement without a fault: one that fails is not evidence."""
+    """Return a measurement without a fault; it must succeed, or the attack would prove nothing."""
     odd = {"kind": kind, "how": "as usual", "after": 0, "always": True, "seed": 0}
     return Case(
         ("measure", "plan.toml", "--bench", "bench.toml", "--out", "out", *options),
@@ -417,8 +417,8 @@ def _usual(kind: str, *options: str) -> Case:
 
 
 def attack(shard: Shard) -> Tally:
-    """Let instruments reply oddly to whole commands."""
-    from .recordings_mutants import restructured
+    """Let instruments reply oddly to complete commands."""
+    from .recordings_mutants import restructure
 
     tally = shard.tally("replies")
     with CommandRunner() as runner, tempfile.TemporaryDirectory(prefix="vibench_replies_") as name:
@@ -432,7 +432,7 @@ def attack(shard: Shard) -> Tally:
             shutil.rmtree(folder / "out")
 
         def played(chance: random.Random) -> bytes:
-            return restructured("point.h5", recorded, chance)
+            return restructure("point.h5", recorded, chance)
 
         for number, chance in shard.chances(tally):
             case = mutant(chance, played)

@@ -15,7 +15,7 @@ def mutated_json(document: Any, chance: random.Random) -> bytes:
     """Change one to three places of a document; at times a few of its bytes too."""
     changed = json.loads(json.dumps(document))
     for _ in range(chance.randint(1, 3)):
-        changed = _changed(changed, chance)
+        changed = _change(changed, chance)
     text = json.dumps(changed).encode()
     if chance.random() < 0.04:
         depth = chance.choice((50, 900, 20_000))
@@ -23,8 +23,8 @@ def mutated_json(document: Any, chance: random.Random) -> bytes:
     return mutated_bytes(text, chance) if chance.random() < 0.1 else text
 
 
-def _changed(document: Any, chance: random.Random) -> Any:
-    """Go down at random, and replace what is found there."""
+def _change(document: Any, chance: random.Random) -> Any:
+    """Go down to a random place and replace the value there."""
     if chance.random() < 0.93:
         if isinstance(document, dict) and document:
             key = chance.choice(list(document))
@@ -37,17 +37,17 @@ def _changed(document: Any, chance: random.Random) -> Any:
                         chance.choice(("unknown", "", "ask", "kind", key * 2)): value_of(chance),
                     }
                 case _:
-                    return {**document, key: _changed(document[key], chance)}
+                    return {**document, key: _change(document[key], chance)}
         if isinstance(document, list) and document:
             at = chance.randrange(len(document))
             if chance.random() < 0.2:
                 return document + [document[at]] * chance.choice((1, 3, 300))
-            return [*document[:at], _changed(document[at], chance), *document[at + 1 :]]
+            return [*document[:at], _change(document[at], chance), *document[at + 1 :]]
     if isinstance(document, int | float) and chance.random() < 0.5:
         return chance.choice(NUMBERS)
     return value_of(chance)
 
 
 def value_of(chance: random.Random) -> Any:
-    """Give a value of any type."""
+    """Return a value of any type."""
     return chance.choice((chance.choice(NUMBERS), chance.choice(TEXTS), chance.choice(OTHERS)))

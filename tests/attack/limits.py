@@ -1,4 +1,4 @@
-"""Limits for commands that read damaged files: allowed endings, bounds, and violations found."""
+"""Limits for commands that read damaged files: allowed exit codes, time, memory, and faults."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ STOPPED = 3
 
 @dataclass(frozen=True)
 class Case:
-    """A command, and the files of the folder in which it is run."""
+    """A command, and the files of the folder in which it runs."""
 
     arguments: tuple[str, ...]
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -37,7 +37,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Ending:
-    """How a command's process ended."""
+    """How the process of a command ended."""
 
     code: int
     """Exit code; the negative number of the signal that ended it."""
@@ -53,7 +53,7 @@ class Ending:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What must not be, whatever was given: empty when the command behaved."""
+        """All violations of the limits; empty if there is none."""
         return tuple(said for said, is_so in self._possible_faults() if is_so)
 
     def _possible_faults(self) -> tuple[tuple[str, bool], ...]:

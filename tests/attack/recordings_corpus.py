@@ -1,4 +1,4 @@
-"""Small intact recordings to be mutated: three excitations, a gap, a result, an interrupted one."""
+"""Small intact recordings to be mutated: three excitations, a gap, a result, an interrupted recording."""
 
 import shutil
 import tempfile
@@ -30,7 +30,7 @@ def _dwell(folder: Path, name: str, **more: object) -> object:
     motion = sine(SETTLE_S + DWELL_S, 260.0, 1e-6)
     plan = Dwell(amplitude_vpp=2e-2, frequency_hz=260.0, settle_s=SETTLE_S, duration_s=DWELL_S)
     part = Part("dwell", SETTLE_S, SETTLE_S + DWELL_S, {"frequency_hz": 260.0})
-    # The mass moves as the base does, thrice as far: what it is matters to no check of a file.
+    # m0 moves like the base with three times the amplitude; no check of a file depends on it.
     velocity = 3 * np.gradient(motion.displacement_m, 1 / RATE)
     return begun_recording(folder, plan, motion, velocity, [part], name=name, **more)
 
@@ -64,7 +64,7 @@ def _save_result(path: Path) -> None:
 
 @cache
 def good_recordings() -> dict[str, bytes]:
-    """Make one of each sort; the bytes of each file, by its name."""
+    """Return the bytes of one recording of each kind, by file name."""
     with tempfile.TemporaryDirectory(prefix="vibench_corpus_") as name:
         folder = Path(name)
         for writer in (_dwell(folder, "dwell"), _sweep(folder), _noise(folder)):
@@ -73,7 +73,7 @@ def good_recordings() -> dict[str, bytes]:
         shutil.copy(folder / "dwell.h5", folder / "with_result.h5")
         _save_result(folder / "with_result.h5")
         cut = _dwell(folder, "cut_off", samples=7000)
-        cut._committer.close()  # what is left when its program ends here
+        cut._committer.close()  # the state of a file whose program ended here
         cut._disk.close()
         part = part_of(folder / "cut_off.h5")
         kept = part.read_bytes()

@@ -1,7 +1,7 @@
-"""Single bits turned over in recordings: each is noticed, or changes no number that analysis gives.
+"""Single flipped bits in recordings: each is detected, or changes no result of the analysis.
 
-Each flip is judged in a fork of its own: it refuses the file, or its numbers are compared with those of the
-good file, bit for bit. Even numbers turn a bit of the whole file over, odd ones a bit outside the samples.
+Each flip is judged in a forked process: the file is refused, or its results are compared with those of the
+intact file, bit for bit. Even numbers flip a bit of the whole file, odd numbers a bit outside the samples.
 """
 
 import hashlib
@@ -29,8 +29,8 @@ FINISHED = ("dwell.h5", "sweep.h5", "noise.h5", "with_result.h5", "recovered.h5"
 
 
 @cache
-def beside_samples(name: str) -> tuple[range, ...]:
-    """Give the bytes of a file in which no samples are."""
+def ranges_without_samples(name: str) -> tuple[range, ...]:
+    """Return the byte ranges of a file that contain no samples."""
     content = good_recordings()[name]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, name)
@@ -47,12 +47,12 @@ def beside_samples(name: str) -> tuple[range, ...]:
     )
 
 
-def flipped(number: int, chance: random.Random) -> tuple[str, int, bytes]:
-    """Turn a bit over; gives the file's name, the place, and the bytes."""
+def flip_bit(number: int, chance: random.Random) -> tuple[str, int, bytes]:
+    """Flip a bit; return the file name, the position, and the content."""
     name = chance.choice(FINISHED)
     data = bytearray(good_recordings()[name])
     if number % 2:
-        parts = beside_samples(name)
+        parts = ranges_without_samples(name)
         place = chance.choice(chance.choices(parts, [len(each) for each in parts])[0])
     else:
         place = chance.randrange(len(data))
@@ -61,7 +61,7 @@ def flipped(number: int, chance: random.Random) -> tuple[str, int, bytes]:
 
 
 def numbers_of(path: Path) -> str:
-    """Give a checksum of every number that analysis gives of a recording, or the sentence that refuses it."""
+    """Return a checksum of all results of a recording, or the sentence that refuses it."""
     results = analyse_files((path,), "flips", Simulation.LEFT_OUT)
     if results.failures:
         return f"refused: {results.failures[0].sentence}"
@@ -87,7 +87,7 @@ def numbers_of(path: Path) -> str:
 
 
 def verdict_of_file(path: Path) -> tuple[str, float, int]:
-    """Say in a process of its own what a file's numbers are, and what processor time and memory it took."""
+    """Return checksum or error of a file, processor time [s] and memory [bytes], from a forked process."""
     reading, writing = os.pipe()
     before_bytes = resident_bytes()
     number = os.fork()
@@ -109,18 +109,18 @@ def verdict_of_file(path: Path) -> tuple[str, float, int]:
     _, status, usage = os.wait4(number, 0)
     if os.WIFSIGNALED(status):
         said = f"died: signal {os.WTERMSIG(status)}"
-    # A forked process begins with all that its parent holds, a whole test run for example.
+    # A forked process begins with the memory of its parent, for example of a whole test run.
     return said, usage.ru_utime + usage.ru_stime, max(0, usage.ru_maxrss * 1024 - before_bytes)
 
 
 def resident_bytes() -> int:
-    """Memory that this process holds now."""
+    """Return the resident memory of this process [bytes]."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize()
 
 
 def faults(said: str, expected: str, took_s: float, peak_bytes: int) -> tuple[str, ...]:
-    """Return what is wrong with an outcome; empty if nothing is."""
+    """Return the faults of an outcome."""
     found: list[tuple[str, bool]] = [
         (said[:300], said.startswith(("traceback", "died"))),
         (
@@ -134,7 +134,7 @@ def faults(said: str, expected: str, took_s: float, peak_bytes: int) -> tuple[st
 
 
 def attack(shard: Shard) -> Tally:
-    """Turn bits over."""
+    """Flip bits."""
     tally = shard.tally("flips")
     with tempfile.TemporaryDirectory(prefix="vibench_flips_") as folder:
         expected: dict[str, Any] = {}
@@ -142,12 +142,12 @@ def attack(shard: Shard) -> Tally:
             path = Path(folder, name)
             path.write_bytes(content)
             if name in FINISHED:
-                numbers_of(path)  # what is imported and compiled here is there in every fork
+                numbers_of(path)  # modules imported and compiled here are available in every fork
                 expected[name] = verdict_of_file(path)[0]
                 if expected[name].startswith(("refused", "traceback", "died")):
                     raise RuntimeError(f"{name} should be good, and was {expected[name]}")
         for number, chance in shard.chances(tally):
-            name, place, content = flipped(number, chance)
+            name, place, content = flip_bit(number, chance)
             path = Path(folder, name)
             path.write_bytes(content)
             said, took_s, peak_bytes = verdict_of_file(path)

@@ -1,8 +1,8 @@
-"""Campaigns killed at a random moment, or at the n-th write, sync, rename or commit, and resumed, and killed.
+"""Campaigns that are killed repeatedly and resumed: at a random moment, or at the n-th operation on a file.
 
-Each number is one campaign of short points, dwells and streamed noise in turn, killed up to `KILLS` times
-and then left to its end. One process imports everything and forks itself for each run: a kill ends a fork.
-With a preloaded library (`system_calls.c`) exact system calls kill, or fail, before, inside and after.
+Each number is one campaign of short points, with dwells or streamed noise, killed up to `KILLS` times and
+then run to its end. One process imports everything and forks itself for each run. With a preloaded library
+(`system_calls.c`) exact system calls kill or fail before, inside and after the call.
 """
 
 import ctypes
@@ -91,7 +91,7 @@ class KilledCampaigns:
         )
 
     def run(self, folder: Path, *options: str, kind: str = "", number: int = 0, moment_s: float = 0.0) -> Any:
-        """Measure the campaign of a folder, or die at the n-th operation of a kind, or at a moment."""
+        """Measure the campaign of a folder, or be killed at the n-th operation of a kind or at a moment."""
         order = {"folder": str(folder), "options": options, "kind": kind, "number": number, "s": moment_s}
         self._server.stdin.write(json.dumps(order) + "\n")
         self._server.stdin.flush()
@@ -108,7 +108,7 @@ class KilledCampaigns:
 
 @dataclass(frozen=True)
 class Kept:
-    """What must not be lost by a kill and what follows it."""
+    """What must survive a kill and the runs after it."""
 
     seals: dict[str, str]
     """Of the recordings that the journal calls done, by file."""
@@ -116,17 +116,17 @@ class Kept:
     """Counts that a recording under way had committed, by file and channel."""
 
 
-def laid(folder: Path, bench: str) -> None:
+def write_campaign(folder: Path, bench: str) -> None:
     """Write campaign and bench into a folder."""
     text = (ROOT / "hardware_configs" / f"{bench}.toml").read_text(encoding="utf-8")
     (folder / "bench.toml").write_text(text.replace(*RATE), encoding="utf-8")
     (folder / "campaign.toml").write_text(CAMPAIGNS[bench], encoding="utf-8")
 
 
-def kept_in(out: Path) -> Kept:
-    """Look at what a kill has left."""
+def state_of(out: Path) -> Kept:
+    """Return what exists after a kill."""
     journal = out / "killed.campaign.sqlite"
-    points = read_journal(journal) if journal.exists() and _is_begun(journal) else ()
+    points = read_journal(journal) if journal.exists() and _has_begun(journal) else ()
     seals = {each.file: each.seal for each in points if each.state is JournalPointState.DONE}
     committed = {}
     for part in out.glob("*.h5.part"):
@@ -139,7 +139,7 @@ def kept_in(out: Path) -> Kept:
     return Kept(seals, committed)
 
 
-def _is_begun(journal: Path) -> bool:
+def _has_begun(journal: Path) -> bool:
     connection = sqlite3.connect(journal)
     try:
         return (
@@ -150,8 +150,8 @@ def _is_begun(journal: Path) -> bool:
 
 
 def lost(kept: Kept, out: Path) -> list[str]:
-    """Say what is not there any more, after a later run."""
-    now = kept_in(out)
+    """Return what has been lost after a later run."""
+    now = state_of(out)
     said = [
         f"{file} was done, and is not, or not with its seal"
         for file, seal in kept.seals.items()
@@ -172,7 +172,7 @@ def lost(kept: Kept, out: Path) -> list[str]:
 
 
 def at_the_end(out: Path, points: int) -> list[str]:
-    """Say what is wrong with a campaign that came to its end."""
+    """Return the faults of a completed campaign."""
     journal = read_journal(out / "killed.campaign.sqlite")
     said = [f"{each.name} is {each.state}" for each in journal if each.state is not JournalPointState.DONE]
     said += [
@@ -191,21 +191,21 @@ def at_the_end(out: Path, points: int) -> list[str]:
     return said
 
 
-def attacked(
+def attack_one(
     runs: KilledCampaigns,
     chance: random.Random,
     tally: Tally,
     kills: int = KILLS,
     kinds: tuple[str, ...] = KINDS,
 ) -> list[str]:
-    """Kill one campaign up to ``kills`` times, let it end, and say what was lost or wrong."""
+    """Kill one campaign up to ``kills`` times, let it end, and return losses and faults."""
     bench = chance.choice(tuple(CAMPAIGNS))
     with tempfile.TemporaryDirectory(prefix="vibench_kills_") as name:
         folder = Path(name)
-        laid(folder, bench)
+        write_campaign(folder, bench)
         out, said = folder / "out", []
         for attempt in range(kills):
-            kept = kept_in(out) if out.exists() else Kept({}, {})
+            kept = state_of(out) if out.exists() else Kept({}, {})
             kind = chance.choice(kinds)
             most = CALLS[kind.split()[0]] if kind in CALL_KINDS else MOST_OPERATIONS[kind]
             ended = runs.run(
@@ -224,7 +224,7 @@ def attacked(
                 said += [f"run {attempt} ended with {ended['code']}: {ended['err']}"] if ended["code"] else []
                 break
             tally.count(kind, ended["took_s"])
-        kept = kept_in(out) if out.exists() else Kept({}, {})
+        kept = state_of(out) if out.exists() else Kept({}, {})
         ended = runs.run(folder, *(("--resume",) if out.exists() else ()))
         if ended["code"] != 0:
             return [*said, f"the last run ended with {ended['code']}: {ended['err']}"]
@@ -232,11 +232,11 @@ def attacked(
 
 
 def attack(shard: Shard) -> Tally:
-    """Kill campaigns; each number is one of them, and what is counted are kills."""
+    """Kill campaigns; each number is one campaign, and kills are counted."""
     tally = shard.tally("kills")
     with KilledCampaigns() as runs:
         for number, chance in shard.chances(tally):
-            if said := attacked(runs, chance, tally):
+            if said := attack_one(runs, chance, tally):
                 tally.findings.append(Finding("kills", shard.seed, number, tuple(said[:5]), ""))
     return tally
 
@@ -250,14 +250,14 @@ def built_library(folder: Path) -> Path:
 
 
 def attack_calls(shard: Shard) -> Tally:
-    """Let exact system calls kill or fail; each number is one campaign, and what is counted are faults."""
+    """Let exact system calls kill or fail; each number is one campaign, and faults are counted."""
     tally = shard.tally("calls")
     with (
         tempfile.TemporaryDirectory(prefix="vibench_calls_") as folder,
         KilledCampaigns(built_library(Path(folder))) as runs,
     ):
         for number, chance in shard.chances(tally):
-            if said := attacked(runs, chance, tally, kinds=CALL_KINDS):
+            if said := attack_one(runs, chance, tally, kinds=CALL_KINDS):
                 tally.findings.append(Finding("calls", shard.seed, number, tuple(said[:5]), ""))
     return tally
 
@@ -269,7 +269,7 @@ LATEST_S = 4.0
 
 
 def serve() -> None:
-    """Fork for each line of standard input, and say on standard output how the run ended."""
+    """Fork for each line of standard input, and print how the run ended."""
     import vibench.cli.environment  # noqa: I001 - numpy reads its setting, so it comes first
     import vibench.cli.__main__
     import vibench.cli.measure  # noqa: F401
@@ -295,7 +295,7 @@ def serve() -> None:
 
 
 def _become_run(order: dict[str, Any], err: int) -> None:
-    """Never returns."""
+    """Run a campaign in this forked process; never returns."""
     silent = os.open(os.devnull, os.O_RDWR)
     os.dup2(silent, 0)
     os.dup2(silent, 1)
@@ -323,7 +323,7 @@ def _become_run(order: dict[str, Any], err: int) -> None:
 
 
 def _prepare_to_die(kind: str, number: int, moment_s: float) -> None:
-    """Arrange for the end of this process; odd numbers end it before the operation, even ones behind it."""
+    """Arrange the end of this process: odd numbers end it before the operation, even numbers after it."""
     match kind:
         case "moment":
             threading.Timer(moment_s, _die).start()

@@ -1,7 +1,7 @@
-"""Recordings that somebody broke, or made to harm: bytes, structure, and everything that stands in a file.
+"""Broken and malicious recordings: changed bytes, structure, and contents.
 
-What was changed with HDF5's own means keeps its seal, loses it as an old recording, or is sealed anew as by
-somebody who wants it believed: only the last two get past the seal.
+A file changed by HDF5 keeps its seal, loses it like an old recording, or is sealed again as by a forger: only
+the last two pass the check of the seal.
 """
 
 import json
@@ -78,18 +78,18 @@ NOT_MADE = (OSError, RuntimeError, ValueError, TypeError, LookupError, OverflowE
 
 
 def mutant(chance: random.Random) -> Case:
-    """Break a recording chosen by chance, and choose the command that reads it."""
+    """Break a random recording, and choose the command that reads it."""
     good = good_recordings()
     name = chance.choice(tuple(good))
     if chance.random() < 0.3:
         content = mutated_bytes(good[name], chance, tuple(good.values()))
     else:
-        content = restructured(name, good[name], chance)
+        content = restructure(name, good[name], chance)
     return reading(name, content, chance)
 
 
 def reading(name: str, content: bytes, chance: random.Random) -> Case:
-    """Let a command read a broken recording; a growing one may be recovered."""
+    """Return a case in which a command reads a broken recording; a growing recording may be recovered."""
     files = {name: content, SECRET: b"root:x:0:0" * 4000}
     commands: list[tuple[str, ...]] = [
         ("analyse", name, "--json", "--no-simulate"),
@@ -106,8 +106,8 @@ def reading(name: str, content: bytes, chance: random.Random) -> Case:
     return Case(chance.choice(commands), files)
 
 
-def restructured(name: str, content: bytes, chance: random.Random) -> bytes:
-    """Change a few things through HDF5, and see to the seal."""
+def restructure(name: str, content: bytes, chance: random.Random) -> bytes:
+    """Change a few things by HDF5, and then the seal."""
     with tempfile.TemporaryDirectory(prefix="vibench_mutant_") as folder:
         path = Path(folder, name)
         path.write_bytes(content)
@@ -124,13 +124,13 @@ def restructured(name: str, content: bytes, chance: random.Random) -> bytes:
                     ArithmeticError,
                     MemoryError,
                 ):
-                    continue  # HDF5 does not make such a file, or it claims more than there is
+                    continue  # HDF5 refuses to write this file, or the file claims more data than it has
             if not name.endswith(".part"):
-                _see_to_the_seal(file, chance)
+                _change_seal(file, chance)
         return path.read_bytes()
 
 
-def _see_to_the_seal(file: h5py.File, chance: random.Random) -> None:
+def _change_seal(file: h5py.File, chance: random.Random) -> None:
     what = chance.choice(("keep", "lose", "lose", "renew", "renew"))
     if what == "keep" or "seal" not in file:
         return
@@ -179,7 +179,7 @@ def _put(item: h5py.HLObject, name: str, chance: random.Random) -> None:
 
 
 def _change_known_attribute(file: h5py.File, chance: random.Random) -> None:
-    """Change what matters most."""
+    """Change one of the most important attributes."""
     names = (
         "sample_rate_hz",
         "samples",
@@ -208,7 +208,7 @@ def _change_channel(file: h5py.File, chance: random.Random) -> None:
 
 
 def _scale_channel(file: h5py.File, chance: random.Random) -> None:
-    """Make a channel consistently absurd."""
+    """Scale a channel by an absurd factor in all its attributes."""
     attributes = file[chance.choice(("drive_voltage", "base_acceleration", "m0_velocity"))].attrs
     factor = chance.choice((1e-300, 1e300, -1.0, 1e20, 1e-20))
     for name in ("physical_per_volt", "scale_factor", "add_offset"):
@@ -261,7 +261,7 @@ def _declare(file: h5py.File, chance: random.Random) -> None:
     file.attrs["samples"] = count
 
 
-def _point_outside(file: h5py.File, chance: random.Random) -> None:
+def _add_external_link(file: h5py.File, chance: random.Random) -> None:
     role = chance.choice(("drive_voltage", "m0_velocity", "events", "configuration"))
     length = file["m0_velocity"].shape[0]
     kept = dict(file[role].attrs)
@@ -284,7 +284,7 @@ def _point_outside(file: h5py.File, chance: random.Random) -> None:
             made.attrs[key] = each
 
 
-def _link_in_a_circle(file: h5py.File, _: random.Random) -> None:
+def _add_circular_link(file: h5py.File, _: random.Random) -> None:
     file["configuration/again"] = file["/"]
 
 
@@ -302,7 +302,7 @@ def _change_rows(file: h5py.File, chance: random.Random) -> None:
 
 
 def _change_json(file: h5py.File, chance: random.Random) -> None:
-    """Change a value deep inside a text, or the whole text."""
+    """Change a value deep inside a JSON text, or the whole text."""
     group = file["configuration"]
     name = chance.choice(sorted(group))
     said = json.loads(bytes(group[name][()]).decode())
@@ -348,8 +348,8 @@ def _change_result(file: h5py.File, chance: random.Random) -> None:
 
 CHANGES: tuple[Callable[[h5py.File, random.Random], None], ...] = (
     _change_attribute, _change_known_attribute, _change_known_attribute, _change_channel, _change_channel,
-    _scale_channel, _change_rate, _replace_dataset, _replace_dataset, _declare, _point_outside,
-    _link_in_a_circle,
+    _scale_channel, _change_rate, _replace_dataset, _replace_dataset, _declare, _add_external_link,
+    _add_circular_link,
     _change_rows, _change_rows, _change_json, _change_json, _change_json, _change_result,
 )  # fmt: skip
 

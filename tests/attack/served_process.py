@@ -18,7 +18,7 @@ PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 class ServedProcess:
-    """A Python module that runs until it is closed, in a folder and with a state folder of its own."""
+    """A Python module that runs until it is closed, with a separate working folder and state folder."""
 
     def __init__(self, *words: str) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="vibench_attack_")
@@ -37,16 +37,16 @@ class ServedProcess:
 
     @property
     def out(self) -> str:
-        """What it has written on standard output."""
+        """Its standard output so far."""
         return (self.folder / "out.txt").read_text(encoding="utf-8", errors="replace")
 
     @property
     def err(self) -> str:
-        """What it has written on standard error."""
+        """Its standard error so far."""
         return (self.folder / "err.txt").read_text(encoding="utf-8", errors="replace")
 
     def until(self, is_there: Callable[[str], bool]) -> str:
-        """Wait until its output is as it should be."""
+        """Wait until a condition on the standard output holds; return the output."""
         give_up_s = time.monotonic() + STARTING_S
         while not is_there(said := self.out):
             if time.monotonic() > give_up_s or self._process.poll() is not None:
@@ -56,27 +56,27 @@ class ServedProcess:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still runs."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     @property
     def resident_bytes(self) -> int:
-        """Its memory now."""
+        """Its resident memory [bytes]."""
         return int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]) * PAGE
 
     @property
     def peak_bytes(self) -> int:
-        """Its largest memory so far."""
+        """Its largest resident memory so far [bytes]."""
         status = Path(f"/proc/{self._process.pid}/status").read_text().splitlines()
         return 1024 * next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
 
     @property
     def descriptors(self) -> int:
-        """How many files and sockets it holds."""
+        """Its number of open files and sockets."""
         return sum(1 for _ in Path(f"/proc/{self._process.pid}/fd").iterdir())
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         self._process.terminate()
         try:
             self._process.wait(20.0)

@@ -1,7 +1,7 @@
-"""Mutants by number, in shards whose results are saved after each and added up.
+"""Numbered mutants in shards; results are saved after each mutant and can be added up.
 
-Mutant ``n`` of a seed is the same in every shard and on every computer, so that a finding is named by two
-numbers and can be made again.
+Mutant ``n`` of a seed is the same in every shard and on every computer, so that two numbers identify a
+finding and reproduce it.
 """
 
 import json
@@ -16,7 +16,7 @@ from typing import Any, Self
 
 @dataclass(frozen=True)
 class Finding:
-    """A mutant that did what none may do."""
+    """A mutant that violated a limit."""
 
     target: str
     seed: int
@@ -28,7 +28,7 @@ class Finding:
 
 @dataclass
 class Tally:
-    """What was tried, how it ended, and what was found."""
+    """Number of tried mutants, their endings, and findings."""
 
     target: str
     tried: int = 0
@@ -42,14 +42,14 @@ class Tally:
     shard: str = ""
 
     def count(self, ending: object, took_s: float = 0.0, peak_bytes: int = 0) -> None:
-        """Add one that was tried."""
+        """Count one tried mutant."""
         self.tried += 1
         self.codes[str(ending)] = self.codes.get(str(ending), 0) + 1
         self.worst_s = max(self.worst_s, took_s)
         self.worst_bytes = max(self.worst_bytes, peak_bytes)
 
     def add(self, other: Self) -> None:
-        """Add what another shard of the same target has seen."""
+        """Add the results of another shard of the same target."""
         if other.target != self.target:
             raise ValueError(f"{other.target} and {self.target} are different targets")
         self.tried += other.tried
@@ -61,7 +61,7 @@ class Tally:
         self.done += other.done
 
     def line(self) -> str:
-        """Say it in one line."""
+        """Return the tally as one line of text."""
         codes = ", ".join(f"{code}: {count}" for code, count in sorted(self.codes.items()))
         return (
             f"{self.target}: {self.tried} tried ({codes}), {len(self.findings)} found; "
@@ -71,7 +71,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Shard:
-    """Which mutants of a seed are tried here: every ``of``-th of the first ``count``, from ``part`` on."""
+    """The mutants of a seed in this shard: every ``of``-th of ``count``, beginning with ``part``."""
 
     seed: int
     count: int
@@ -88,9 +88,9 @@ class Shard:
         return range(self.part, self.count, self.of)
 
     def tally(self, target: str) -> Tally:
-        """Return the tally of a target as the file has it, or a new one.
+        """Return the saved tally of a target, or a new tally.
 
-        Raises ValueError when the file is of another seed or shard.
+        Raises ValueError if the file belongs to another seed or shard.
         """
         mine = f"{self.part + 1}/{self.of} of seed {self.seed}"
         kept = () if self.saved is None or not self.saved.exists() else saved_tallies(self.saved)
@@ -100,7 +100,7 @@ class Shard:
         return found
 
     def chances(self, tally: Tally) -> Iterator[tuple[int, random.Random]]:
-        """Give each number that is not in the tally, with the source of chance for its mutant."""
+        """Yield each number that is not in the tally, with the random generator of its mutant."""
         for number in self.numbers[tally.done :]:
             if time.monotonic() > self.until_s:
                 return
@@ -111,7 +111,7 @@ class Shard:
 
 
 def save(tally: Tally, path: Path) -> None:
-    """Write what a shard has seen of a target into its file, which is whole at any moment."""
+    """Save the results of a shard for a target; the file is replaced as a whole."""
     kept = saved_tallies(path) if path.exists() else []
     tallies = [*(each for each in kept if each.target != tally.target), tally]
     unfinished = path.with_suffix(".tmp")
@@ -120,7 +120,7 @@ def save(tally: Tally, path: Path) -> None:
 
 
 def saved_tallies(path: Path) -> list[Tally]:
-    """Read what a shard has written."""
+    """Read the saved results of a shard."""
     return [_tally(content) for content in json.loads(path.read_text(encoding="utf-8"))]
 
 

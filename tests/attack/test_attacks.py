@@ -1,6 +1,6 @@
-"""A few hundred broken files and messages of every kind, the same ones each time: ``pytest -m attack``.
+"""A few hundred reproducible broken files and messages of every kind: ``pytest -m attack``.
 
-More of them, with other seeds and for hours: ``python -m tests.attack --help``.
+Longer attacks with other seeds: ``python -m tests.attack --help``.
 """
 
 import pytest
@@ -36,5 +36,5 @@ def test_no_mutant_violates_the_limits_of_its_attack(attack, count):
     tally = attack(Shard(SEED, count))
     assert tally.tried == count
     assert tally.findings == [], tally.line()
-    # An attack whose every message is turned away at the first look says little.
+    # An attack whose messages are all refused at once proves little.
     assert len(tally.codes) > 1

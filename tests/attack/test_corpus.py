@@ -1,7 +1,7 @@
 """Files found by attacks: each is refused in one sentence, quickly and without leftovers.
 
-`corpus/campaign` and `corpus/study` are read as such, `corpus/imports` by `vibench import`. Whatever an
-attack finds is made small and put there, under a name that says what is wrong with it.
+Files of `corpus/campaign` and `corpus/study` are read as TOML, files of `corpus/imports` by `vibench import`.
+A file found by an attack is reduced and stored there, with a name that states its fault.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from .limits import Case
 CORPUS = Path(__file__).with_name("corpus")
 
 
-def found(folder: str) -> list[Path]:
+def files_in(folder: str) -> list[Path]:
     return sorted((CORPUS / folder).iterdir())
 
 
@@ -26,7 +26,7 @@ def runner():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("path", [*found("campaign"), *found("study")], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*files_in("campaign"), *files_in("study")], ids=lambda path: path.stem)
 def test_a_broken_toml_file_is_refused_with_its_name_in_the_error(runner, path):
     ending = runner.run(toml_files.reading(path.parent.name, path.read_bytes()))
     assert (ending.code, ending.faults, ending.made) == (1, (), ())
@@ -34,7 +34,7 @@ def test_a_broken_toml_file_is_refused_with_its_name_in_the_error(runner, path):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("path", found("imports"), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", files_in("imports"), ids=lambda path: path.stem)
 def test_a_broken_imported_file_is_refused_with_its_name_in_the_error(runner, path):
     case = imported_files.reading(path.suffix, path.read_bytes(), *imported_files.MAKING)
     ending = runner.run(case)

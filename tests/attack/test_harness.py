@@ -1,4 +1,4 @@
-"""The attack harness: numbered mutants, shards and their sums, judgement of commands."""
+"""The attack harness: numbered mutants, shards, sums of results, and limits of commands."""
 
 import random
 import time
@@ -70,7 +70,7 @@ def test_tallies_of_shards_are_added_up(tmp_path):
 def test_a_shard_continues_from_its_file(tmp_path):
     path = tmp_path / "shard.json"
 
-    def tried(count, part=0):
+    def tally_after(count, part=0):
         shard = Shard(7, count, part, 2, saved=path)
         tally = shard.tally("toml")
         for number, _ in shard.chances(tally):
@@ -78,11 +78,11 @@ def test_a_shard_continues_from_its_file(tmp_path):
             assert tally.done == (saved_tallies(path)[0].done if path.exists() else 0)
         return tally
 
-    assert tried(3).codes == {"0": 1, "2": 1}
-    assert tried(7).codes == {"0": 1, "2": 1, "4": 1, "6": 1}
-    assert tried(7) == saved_tallies(path)[0]
+    assert tally_after(3).codes == {"0": 1, "2": 1}
+    assert tally_after(7).codes == {"0": 1, "2": 1, "4": 1, "6": 1}
+    assert tally_after(7) == saved_tallies(path)[0]
     with pytest.raises(ValueError, match="holds shard 1/2 of seed 7, not 2/2 of seed 7; give another file"):
-        tried(7, part=1)
+        tally_after(7, part=1)
 
 
 def test_an_empty_document_can_be_mutated():
@@ -93,7 +93,7 @@ def test_an_empty_document_can_be_mutated():
 
 
 @pytest.mark.thorough
-def test_a_command_runs_in_its_own_process():
+def test_a_command_runs_in_a_separate_process():
     with CommandRunner() as runner:
         good = runner.run(reading("campaign", (ROOT / "campaigns" / "paper.toml").read_bytes()))
         bad = runner.run(reading("campaign", b"name = 3"))

@@ -1,4 +1,4 @@
-"""Recordings are attacked: few in every run, more with ``-m attack``, hours by `tests.attack`."""
+"""Attacks on recordings: short in every test run, longer with ``-m attack``, for hours by `tests.attack`."""
 
 import random
 import shutil
@@ -15,8 +15,8 @@ FOUND = (("recordings", 1, 40), ("recordings", 2, 361))
 """Mutants that once did what none may do: sentences of 50 000 letters."""
 
 
-def found_again(name, seed, number):
-    """Try one mutant that was found once."""
+def faults_of_mutant(name, seed, number):
+    """Run one mutant that an attack has found."""
     case = recordings_mutants.mutant(random.Random(f"{seed}:{number}"))
     with CommandRunner() as runner:
         return runner.run(case).faults
@@ -25,11 +25,11 @@ def found_again(name, seed, number):
 @pytest.mark.parametrize(("name", "seed", "number"), FOUND)
 @pytest.mark.attack
 def test_faults_found_by_earlier_attacks_stay_fixed(name, seed, number):
-    assert found_again(name, seed, number) == ()
+    assert faults_of_mutant(name, seed, number) == ()
 
 
 @pytest.mark.thorough
-def test_valid_recordings_give_reproducible_results(tmp_path):
+def test_an_intact_recording_gives_reproducible_results(tmp_path):
     for name in ("dwell.h5", "with_result.h5"):
         path = tmp_path / name
         path.write_bytes(good_recordings()[name])
@@ -83,7 +83,7 @@ def test_faults_at_exact_system_calls_lose_or_repeat_no_point(faults):
 def test_twelve_kills_of_a_campaign_lose_or_repeat_no_point():
     tally = Tally("kills")
     number = kills = 0
-    # Whether a campaign ends before the moment of its kill depends on the machine: so its number varies.
+    # Whether a campaign ends before its kill depends on the computer, so the number of kills varies.
     while kills < 12:
         tally.add(recordings_kills.attack(Shard(seed=3, count=number + 1, part=number)))
         kills = sum(tally.codes.get(kind, 0) for kind in recordings_kills.KINDS)

@@ -1,4 +1,4 @@
-"""System calls that report an error with or without success: the program checks the disk."""
+"""System calls that report an error with or without having succeeded: the program checks the disk."""
 
 import errno
 import os
@@ -127,7 +127,7 @@ def library(tmp_path_factory):
     return built_library(tmp_path_factory.mktemp("library"))
 
 
-def ended(library, code, folder, call, when, fault="ENOSPC"):
+def run_with_fault(library, code, folder, call, when, fault="ENOSPC"):
     faults = {**FAULTS, "EINTR": errno.EINTR}
     arguments = (folder, list(CALLS).index(call), WHEN.index(when), faults[fault])
     return subprocess.run(
@@ -143,18 +143,18 @@ def ended(library, code, folder, call, when, fault="ENOSPC"):
 @pytest.mark.thorough
 @pytest.mark.parametrize("code", [EXPORT, STOP, ANNOUNCEMENT])
 def test_a_file_is_reported_as_written_only_if_it_exists(library, tmp_path, code):
-    refused = ended(library, code, tmp_path, "rename", "before")
+    refused = run_with_fault(library, code, tmp_path, "rename", "before")
     assert "No space left on device" in refused.stderr
     assert [each.name for each in tmp_path.iterdir()] == (["file.coming"] if code is ANNOUNCEMENT else [])
-    (tmp_path / "file.coming").unlink(missing_ok=True)  # the caller of `rename` removes it
-    made = ended(library, code, tmp_path, "rename", "after")
+    (tmp_path / "file.coming").unlink(missing_ok=True)  # as the caller of `rename` does
+    made = run_with_fault(library, code, tmp_path, "rename", "after")
     assert (made.returncode, made.stderr) == (0, "")
     assert [each.name for each in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_text() == "all of it"
 
 
-def test_an_export_succeeds_if_only_its_leftover_remains(library, tmp_path):
-    made = ended(library, EXPORT, tmp_path, "unlink", "before")
+def test_an_export_succeeds_if_only_its_temporary_file_cannot_be_removed(library, tmp_path):
+    made = run_with_fault(library, EXPORT, tmp_path, "unlink", "before")
     assert (made.returncode, made.stderr) == (0, "")
     assert (tmp_path / "file").read_text() == "all of it"
 
@@ -163,7 +163,7 @@ def test_an_export_succeeds_if_only_its_leftover_remains(library, tmp_path):
 def test_a_result_is_reported_as_added_only_if_it_is_stored(library, tmp_path, when):
     path = tmp_path / "dwell.h5"
     path.write_bytes(good_recordings()["dwell.h5"])
-    made = ended(library, RESULT, tmp_path, "rename", when)
+    made = run_with_fault(library, RESULT, tmp_path, "rename", when)
     assert (made.returncode == 0) == (b"all of it" in path.read_bytes()) == (when == "after")
     assert [each.name for each in tmp_path.iterdir()] == ["dwell.h5"]
 
@@ -182,7 +182,7 @@ def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path
     folder.mkdir()
     for name in ("cut_off.h5.part", "dwell.h5"):
         (folder / name).write_bytes(good_recordings()[name])
-    made = ended(library, HDF5_WRITERS[writer] + IN_FORKS, folder, "pwrite", when, fault)
+    made = run_with_fault(library, HDF5_WRITERS[writer] + IN_FORKS, folder, "pwrite", when, fault)
     assert made.stderr == ""
     assert {line.split()[1] for line in made.stdout.splitlines()} == {"1"}, made.stdout
 
@@ -191,7 +191,7 @@ def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path
 @pytest.mark.parametrize("when", WHEN)
 def test_recordings_are_listed_despite_an_unremovable_catalogue(library, tmp_path, when):
     (tmp_path / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
-    listed = ended(library, CATALOGUE, tmp_path, "unlink", when)
+    listed = run_with_fault(library, CATALOGUE, tmp_path, "unlink", when)
     assert (listed.stdout, listed.stderr) == ("1 1\n", "")
 
 
@@ -240,7 +240,7 @@ def test_a_read_error_is_not_reported_as_damage(library, tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
-    made = ended(library, READERS, folder, "pwrite", "before")
+    made = run_with_fault(library, READERS, folder, "pwrite", "before")
     assert made.stderr == ""
     assert len(made.stdout.splitlines()) == 4, made.stdout
 
@@ -248,7 +248,7 @@ def test_a_read_error_is_not_reported_as_damage(library, tmp_path):
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_a_rename_that_reports_an_error_after_success_does_not_end_the_campaign(library, tmp_path, number):
-    recordings_kills.laid(tmp_path, "virtual_rig_streaming")
+    recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
     with KilledCampaigns(library) as runs:
         run = runs.run(tmp_path, kind="rename after ENOSPC", number=number)
     assert (run["code"], run["err"]) == (0, "")
@@ -258,12 +258,12 @@ def test_a_rename_that_reports_an_error_after_success_does_not_end_the_campaign(
 @pytest.mark.thorough
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_a_point_recovered_after_a_journal_failure_is_not_repeated(library, tmp_path, when):
-    recordings_kills.laid(tmp_path, "virtual_rig_streaming")
+    recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
     out = tmp_path / "out"
     with KilledCampaigns(library) as runs:
         refused = runs.run(tmp_path, kind="ftruncate before ENOSPC", number=4)
         assert "All committed samples are safe in out/weak.h5.part" in refused["err"]
-        # The seventh synchronisation of a resume is the commit that would count the recovered recording.
+        # The seventh sync of a resume is the commit that would count the recovered recording.
         refused = runs.run(tmp_path, "--resume", kind=f"fsync {when} EIO", number=7)
         assert "the journal out/killed.campaign.sqlite cannot be read or written" in refused["err"]
         assert [path.name for path in out.glob("*.h5*")] == ["weak.h5"]

@@ -51,7 +51,7 @@ _KEY = re.compile(r"(?m)(?P<key>[A-Za-z_][A-Za-z0-9_]*)\s*=")
 
 
 def mutated_toml(text: str, chance: random.Random, others: tuple[str, ...] = ()) -> bytes:
-    """Change a few values, keys, lines or tables of a TOML file; at times a few of its bytes too."""
+    """Change a few values, keys, lines or tables of a TOML file; sometimes a few bytes too."""
     changes = [_other_value] * 6 + [_near_number] * 3 + [_other_key] * 2
     changes += [_without_line, _line_twice, _lines_exchanged, _other_table]
     if others:
@@ -63,7 +63,7 @@ def mutated_toml(text: str, chance: random.Random, others: tuple[str, ...] = ())
 
 
 def any_value(chance: random.Random) -> str:
-    """Write a value of any type, as TOML."""
+    """Return a value of any type as TOML."""
     match chance.randrange(4):
         case 0:
             return _quoted(chance.choice(TEXTS))
@@ -82,7 +82,7 @@ def _other_value(text: str, chance: random.Random) -> str:
     if not found:
         return text
     one = chance.choice(found)
-    # More often another value of the same type than one that the first look refuses.
+    # Values of the same type are chosen more often, since others are refused at once.
     match one.lastgroup, chance.random() < 0.6:
         case "number", True:
             value = chance.choice(NUMBERS)
@@ -94,7 +94,7 @@ def _other_value(text: str, chance: random.Random) -> str:
 
 
 def _near_number(text: str, chance: random.Random) -> str:
-    """Scale a number, or turn its sign: what a slip of the pen does."""
+    """Scale a number or change its sign, as a typing error does."""
     found = [each for each in _VALUE.finditer(text) if each.lastgroup == "number"]
     if not found:
         return text
@@ -165,7 +165,7 @@ _FIELD = re.compile(r"[^,;\s]+")
 
 
 def mutated_fields(text: str, chance: random.Random) -> bytes:
-    """Change a few fields or lines of a table of text; at times a few of its bytes too."""
+    """Change a few fields or lines of a text table; sometimes a few bytes too."""
     for _ in range(chance.randint(1, MOST_AT_ONCE)):
         text = chance.choice((_other_field, _other_field, _without_line, _line_twice, _lines_exchanged))(
             text, chance
@@ -175,7 +175,7 @@ def mutated_fields(text: str, chance: random.Random) -> bytes:
 
 
 def _other_field(text: str, chance: random.Random) -> str:
-    # The head says what the rest is, so it is changed as often as all the rest.
+    # The header describes all other lines, so it is changed as often as all other lines together.
     room = text if chance.random() < 0.5 else text[:1500]
     found = list(_FIELD.finditer(room))
     if not found:

@@ -81,12 +81,12 @@ GOOD = {"good.toml": (ROOT / "campaigns" / "quick.toml").read_bytes(), "samples.
 
 
 def reading(kind: str, content: bytes) -> Case:
-    """Let the command of a kind read a file of this content."""
+    """Return a case in which the command of a kind reads a file with this content."""
     return Case(KINDS[kind][1], {**GOOD, BROKEN: content})
 
 
 def mutant(chance: random.Random) -> Case:
-    """Break a file of a kind chosen by chance."""
+    """Break a file of a random kind."""
     kind = chance.choice(tuple(KINDS))
     texts, _ = KINDS[kind]
     return reading(kind, mutated_toml(chance.choice(texts), chance, texts))

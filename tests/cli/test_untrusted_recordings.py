@@ -9,7 +9,7 @@ import pytest
 
 from vibench.acquisition.recording import _seal
 
-from ..attack.altered_recordings import noted
+from ..attack.altered_recordings import write_journal
 from ..attack.recordings_corpus import good_recordings
 
 LICENCE = ("--license", "https://creativecommons.org/licenses/by/4.0/")
@@ -123,7 +123,7 @@ def test_every_command_refuses_or_warns_about_a_recording_without_its_seal(viben
 @pytest.mark.thorough
 @pytest.mark.parametrize("how", [pytest.param("copied over", marks=pytest.mark.slow), "sealed anew"])
 def test_a_swapped_recording_is_refused_by_every_command(vibench_here, folder, how):
-    noted(folder, ("dwell", "noise"))
+    write_journal(folder, ("dwell", "noise"))
     assert {code for code, _ in outputs_of_all_commands(vibench_here, folder).values()} == {0}
     if how == "copied over":
         shutil.copy(folder / "noise.h5", folder / "dwell.h5")

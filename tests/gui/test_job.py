@@ -50,12 +50,12 @@ def dwell(name, duration_s):
 def bench(qapp, own_state, tmp_path_factory):
     """A window with an open bench; one engine serves all tests of this module."""
     folder = tmp_path_factory.mktemp("job")
-    # Unattended: a busy machine must not end a run here; tests of the engine check that a silent
-    # window ends one.
+    # Unattended, since a busy machine must not end a run here; tests of the engine check that
+    # a blocked window ends a run.
     context = AppContext(Settings(folder / "window.ini"), partial(start_engine, Supervision.UNATTENDED))
     context.choose_folder(folder / "recordings")
     window = Window(context, PAGES)
-    # Not in real time: a simulated converter could overrun on a busy machine.
+    # Not in real time: a simulated converter could lose samples on a busy machine.
     window.pages["Rig"].choice.pace.setCurrentIndex(list(PACES).index("free"))
     window.show()
     yield window
@@ -76,14 +76,14 @@ def press(qtbot, window, key, modifier=Qt.KeyboardModifier.NoModifier):
     qtbot.keyClick(QApplication.focusWidget() or window, key, modifier)
 
 
-def recorded(window):
-    """Open the newest recording."""
+def newest_row(window):
+    """Return the row of the newest recording."""
     (row,) = window.context.bridge.status.rows
     return row
 
 
 def space_freezes_the_picture_and_opens_nothing(qtbot, bench):
-    """Space opened the focused list, and the Esc that closed it ended the run."""
+    """Space must not open the focused list, since the Esc that closes the list would end the run."""
     card = bench.pages[RUN].watch_card
     bench.tick()
     press(qtbot, bench, Qt.Key.Key_Space)
@@ -114,7 +114,7 @@ def test_a_measurement_takes_five_key_presses_from_start_to_recording(bench, qtb
     space_freezes_the_picture_and_opens_nothing(qtbot, bench)
     qtbot.waitUntil(lambda: bench.pages[RUN].is_done, timeout=PATIENCE_MS)
     assert len(keys) <= 5
-    row = recorded(bench)
+    row = newest_row(bench)
     assert row.state == "recorded", row.reason
     reach(qtbot, bench, EngineState.READY)
     bench.tick()
@@ -298,7 +298,7 @@ def test_esc_silences_the_drive_from_any_focus(bench, qtbot, place):
     qtbot.keyClick(focus, Qt.Key.Key_Escape)
     reach(qtbot, bench, EngineState.READY)
     assert time.monotonic() - began_s < STOPPED_S
-    row = recorded(bench)
+    row = newest_row(bench)
     assert row.state == "stopped"
     assert ABORT_KEY in row.reason
     with open_recording(row.file) as recording:
@@ -315,8 +315,8 @@ def test_a_hold_keeps_the_drive_on_and_a_stop_ramps_it_down(bench, qtbot):
     reach(qtbot, bench, EngineState.RUNNING)
     bench.banner.stop_requested.emit()
     reach(qtbot, bench, EngineState.READY)
-    assert recorded(bench).state == "stopped"
-    with open_recording(recorded(bench).file) as recording:
+    assert newest_row(bench).state == "stopped"
+    with open_recording(newest_row(bench).file) as recording:
         assert (recording.state, recording.reason) == ("stopped", OPERATOR_STOP)
     qtbot.waitUntil(lambda: OPERATOR_STOP in bench.pages[RUN].summary.sentence, timeout=PATIENCE_MS)
     said = [notice.text for notice in bench.strip.notices if "Campaign ended" in notice.text]
@@ -352,7 +352,7 @@ def test_the_live_plots_show_the_run(bench, qtbot):
     qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
     bench.user_actions.abort()
     reach(qtbot, bench, EngineState.READY)
-    with open_recording(recorded(bench).file) as recording:
+    with open_recording(newest_row(bench).file) as recording:
         assert any("tapped the table" in event.text for event in recording.events)
 
 
@@ -370,9 +370,9 @@ def test_the_current_noise_average_can_be_rejected(bench, qtbot):
     qtbot.waitUntil(lambda: card.averages.text().endswith(" of 12"), timeout=PATIENCE_MS)
     card.reject_button.click()
     reach(qtbot, bench, EngineState.READY)
-    with open_recording(recorded(bench).file) as recording:
+    with open_recording(newest_row(bench).file) as recording:
         assert [each.text for each in recording.events if each.kind == "mark"] == [REJECTED]
-    assert analyse(Path(recorded(bench).file)).response.periodic.realisations == 11
+    assert analyse(Path(newest_row(bench).file)).response.periodic.realisations == 11
 
 
 def test_an_error_message_disappears_when_its_request_is_fulfilled(bench, qtbot):

@@ -56,7 +56,7 @@ def curve(number):
 
 @pytest.fixture
 def long_recording(tmp_path):
-    """Steps of a sine on four channels at the full rate, some of them near full scale."""
+    """Return a stepped sine on four channels at the full rate, with some samples near full scale."""
     samples = round(LONG_S * RATE_HZ)
     plan = SteppedSine(amplitude_vpp=1.0, frequencies_hz=tuple(100.0 + n for n in range(STEPS)))
     header = RecordingHeader(
@@ -83,7 +83,7 @@ def long_recording(tmp_path):
         return writer.finish(RecordingState.COMPLETE, "the plan was carried out")
 
 
-def simulated():
+def simulated_progress():
     progress = SimulationProgress(5e-6, 2 * SIMULATED, "")
     time_s = np.arange(5000) / 50e3
     for model in ("hertz", "linear"):
@@ -104,7 +104,7 @@ class Action:
     is_done: Callable[[], bool] = lambda: True
 
 
-def first_looks(window):
+def show_pages(window):
     for name in window.pages:
         yield Action(f"show {name}", lambda name=name: window.show_page(name))
 
@@ -152,7 +152,7 @@ def of_compare(window, recording, folder):
 
 
 def of_simulate(window):
-    progress, simulate = simulated(), window.pages[SIMULATE]
+    progress, simulate = simulated_progress(), window.pages[SIMULATE]
     yield Action("look at Simulate", lambda: window.show_page(SIMULATE))
     for points in ("points", "more points"):
         for step, plot in zip(simulate.plots.steps(progress), simulate.plots.plots, strict=True):
@@ -219,7 +219,7 @@ def of_frame(window):
 
 def actions(window, recording, long_recording, folder):
     """User actions that were slow or may become slow."""
-    yield from first_looks(window)
+    yield from show_pages(window)
     yield from of_files(window, recording, long_recording)
     yield from of_compare(window, recording, folder)
     yield from of_simulate(window)

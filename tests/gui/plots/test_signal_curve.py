@@ -21,7 +21,7 @@ def plot(qtbot):
     return plot
 
 
-def drawn(plot):
+def drawn_data(plot):
     (item,) = plot.getPlotItem().listDataItems()
     return item.getData()
 
@@ -32,7 +32,7 @@ def test_an_impact_of_three_samples_is_visible_in_two_seconds(plot, place):
     first = round(place * RATE_HZ)
     samples[first : first + 3] = (0.5, 1.0, -0.5)
     SignalCurve(plot, curve_style(0)).set_samples(samples, RATE_HZ)
-    time_s, values = drawn(plot)
+    time_s, values = drawn_data(plot)
     assert len(values) < 4000
     assert values.max() == 1.0
     assert values.min() == -0.5
@@ -44,7 +44,7 @@ def test_zooming_in_shows_individual_samples(plot):
     curve = SignalCurve(plot, curve_style(0))
     curve.set_samples(samples, RATE_HZ)
     plot.setXRange(1.0, 1.01, padding=0)
-    time_s, values = drawn(plot)
+    time_s, values = drawn_data(plot)
     np.testing.assert_allclose(values, np.sin(2 * np.pi * 100 * time_s), atol=1e-9)
     assert time_s[0] <= 1.0
     assert time_s[-1] >= 1.01

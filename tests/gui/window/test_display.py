@@ -9,7 +9,7 @@ import pytest
 from vibench.gui import __main__ as display
 
 
-def started(tmp_path, **environment):
+def start_window(tmp_path, **environment):
     own = {"PATH": os.environ["PATH"], "HOME": str(tmp_path), "PYTHONPATH": os.environ.get("PYTHONPATH", "")}
     command = [sys.executable, "-m", "vibench.gui", "--settings", str(tmp_path / "window.ini")]
     return subprocess.run(
@@ -20,7 +20,7 @@ def started(tmp_path, **environment):
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a display")
 @pytest.mark.parametrize("given", [{}, {"DISPLAY": ":97"}], ids=["none", "dead"])
 def test_a_missing_display_is_reported_in_one_sentence(tmp_path, given):
-    result = started(tmp_path, **given)
+    result = start_window(tmp_path, **given)
     assert result.returncode == 1
     assert result.stderr.startswith("The window cannot be opened: ")
     assert len(result.stderr.splitlines()) == 1
@@ -29,10 +29,10 @@ def test_a_missing_display_is_reported_in_one_sentence(tmp_path, given):
 
 
 def test_missing_libraries_are_reported_with_the_packages_to_install(monkeypatch):
-    def refused(path):
+    def refuse(path):
         raise OSError("libxcb-cursor.so.0: cannot open shared object file: No such file or directory")
 
-    monkeypatch.setattr(display.ctypes, "CDLL", refused)
+    monkeypatch.setattr(display.ctypes, "CDLL", refuse)
     said = display._plugin_trouble()
     assert "libxcb-cursor0 is missing" in said
     assert "apt-get install" in said
@@ -45,7 +45,7 @@ def test_qt_that_cannot_be_loaded_is_reported_in_one_sentence(tmp_path):
     package.mkdir()
     missing = "libglib-2.0.so.0: cannot open shared object file"
     (package / "__init__.py").write_text(f'raise ImportError("{missing}")\n')
-    result = started(tmp_path, PYTHONPATH=str(tmp_path), QT_QPA_PLATFORM="offscreen")
+    result = start_window(tmp_path, PYTHONPATH=str(tmp_path), QT_QPA_PLATFORM="offscreen")
     assert result.returncode == 1
     assert result.stderr.startswith(
         f"The window cannot be opened: Qt cannot be loaded ({missing}); on Debian: "

@@ -10,7 +10,7 @@ from vibench.gui.widgets.notice import Notice, NoticeKind, notice_of
 from vibench.gui.window.banner import MessageStrip
 
 
-def shown(strip):
+def shown_text(strip):
     return strip.findChild(QLabel).text()
 
 
@@ -22,7 +22,7 @@ def test_the_message_strip_shows_event_reaction_and_advice(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(Notice(NoticeKind.WARNING, "The disk is nearly full.", "Recording goes on.", "Make room."))
-    text = shown(strip)
+    text = shown_text(strip)
     assert (
         text.index("The disk is nearly full.") < text.index("Recording goes on.") < text.index("Make room.")
     )
@@ -81,4 +81,4 @@ def test_messages_do_not_move_clickable_widgets(window, qapp):
     assert places() == before
     assert window.strip.isVisible()
     window.tick()
-    assert "Alt+O" in shown(window.strip)
+    assert "Alt+O" in shown_text(window.strip)

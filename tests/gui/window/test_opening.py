@@ -14,7 +14,7 @@ from vibench.gui.widgets.theme import DARK
 from vibench.gui.window.menus import SettingsDialog, show_about, show_manual
 
 
-def dropped(window, *paths):
+def drop(window, *paths):
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
     window.dropEvent(
@@ -32,14 +32,14 @@ def test_a_dropped_file_opens_on_its_page_and_is_listed_as_recent(window, tmp_pa
     test = tmp_path / "mine.toml"
     measurement = window.context.selection.measurement.model_copy(update={"name": "mine"})
     save_toml(measurement, test)
-    dropped(window, test)
+    drop(window, test)
     assert window.page is window.pages[TEST]
     assert window.context.selection.measurement.name == "mine"
     campaign, rig = shipped("campaigns/quick.toml"), shipped("hardware_configs/lab_rig.toml")
-    dropped(window, campaign)
+    drop(window, campaign)
     assert window.page is window.pages[QUEUE]
     assert window.context.selection.campaign.name == "quick"
-    dropped(window, rig)
+    drop(window, rig)
     assert window.page is window.pages[RIG]
     assert window.context.selection.rig.virtual is None
     assert window.context.recent_files == (rig, campaign, test)
@@ -48,7 +48,7 @@ def test_a_dropped_file_opens_on_its_page_and_is_listed_as_recent(window, tmp_pa
     assert [each.text() for each in menu.actions()] == [str(rig), str(campaign), str(test)]
     menu.actions()[2].trigger()
     assert window.page is window.pages[TEST]
-    dropped(window, tmp_path)
+    drop(window, tmp_path)
     assert window.page is window.pages[FILES]
 
 
@@ -61,7 +61,7 @@ def test_unsupported_files_are_reported_and_change_nothing(window, tmp_path, nam
     if content is not None:
         (tmp_path / name).write_bytes(content)
     before = window.page
-    dropped(window, tmp_path / name)
+    drop(window, tmp_path / name)
     assert window.page is before
     assert name in window.strip.notices[-1].what
     assert window.context.recent_files == ()
@@ -70,7 +70,7 @@ def test_unsupported_files_are_reported_and_change_nothing(window, tmp_path, nam
 @pytest.mark.thorough
 def test_a_file_that_is_not_a_recording_is_reported_on_the_files_page(window, qtbot, tmp_path):
     (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
-    dropped(window, tmp_path / "broken.h5")
+    drop(window, tmp_path / "broken.h5")
     assert window.page is window.pages[COMPARE]
     qtbot.waitUntil(lambda: bool(window.strip.notices), timeout=100_000)
     assert "broken.h5" in window.strip.notices[-1].what

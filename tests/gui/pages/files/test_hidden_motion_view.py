@@ -12,18 +12,18 @@ from vibench.gui.widgets.theme import DARK
 
 
 @pytest.fixture(scope="module")
-def shaken(tmp_path_factory):
+def shaken_recording(tmp_path_factory):
     return shaken_world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
 
 
 @pytest.mark.thorough
-def test_p_is_drawn_between_the_stops_in_the_visible_range(shared_context, shaken, wait_for):
+def test_p_is_drawn_between_the_stops_in_the_visible_range(shared_context, shaken_recording, wait_for):
     pictures = Pictures(DARK, shared_context.background)
     pictures.resize(900, 600)
     pictures.setCurrentWidget(pictures.hidden_motion)
     pictures.show()
     view = pictures.hidden_motion
-    with open_recording(shaken.path) as recording:
+    with open_recording(shaken_recording.path) as recording:
         levels = {role: kept_levels(recording, role) for role in recording.roles}
         pictures.show_recording(RecordingOverview(recording, levels), "")
         wait_for(lambda: not view.is_busy)
@@ -31,7 +31,7 @@ def test_p_is_drawn_between_the_stops_in_the_visible_range(shared_context, shake
         pictures.time_histories.show_range(1.0, 1.4)
         wait_for(lambda: "tracked in 100 %" in view.caption.text())
         time_s, p = view.tracked.getData()
-        true = np.interp(time_s, np.arange(shaken.p.size) / 51_200, shaken.p)
+        true = np.interp(time_s, np.arange(shaken_recording.p.size) / 51_200, shaken_recording.p)
         assert np.sqrt(np.mean((p - true) ** 2)) < 0.5e-6
         assert sorted(line.value() for line in view._stops) == pytest.approx([-45e-6, 45e-6])
         pictures.show_recording(None, "")
@@ -40,7 +40,7 @@ def test_p_is_drawn_between_the_stops_in_the_visible_range(shared_context, shake
 
 @pytest.mark.thorough
 def test_choosing_another_specimen_identifies_the_gaps_again(
-    shared_context, shaken, wait_for, tmp_path, monkeypatch
+    shared_context, shaken_recording, wait_for, tmp_path, monkeypatch
 ):
     """With gaps 1 um too small the track is lost; collisions then identify the gaps."""
     described = tmp_path / "tight.toml"
@@ -51,7 +51,7 @@ def test_choosing_another_specimen_identifies_the_gaps_again(
     pictures.setCurrentWidget(pictures.hidden_motion)
     pictures.show()
     view = pictures.hidden_motion
-    with open_recording(shaken.path) as recording:
+    with open_recording(shaken_recording.path) as recording:
         levels = {role: kept_levels(recording, role) for role in recording.roles}
         pictures.show_recording(RecordingOverview(recording, levels), "")
         pictures.time_histories.show_range(0.6, 2.2)
