@@ -75,7 +75,7 @@ def recorded(tmp_path):
 
 
 @pytest.mark.thorough
-def test_the_live_twin_reports_p_and_a_change_ends_the_run_if_planned(running, tmp_path):
+def test_the_live_twin_reports_hidden_motion_and_a_change_ends_the_run_if_planned(running, tmp_path):
     client = running(campaign(STOPPING))
     told = until(client, is_tracked).twin
     assert told.stops_m == pytest.approx((-45e-6, 45e-6), rel=1e-2)

@@ -232,7 +232,7 @@ class TestKnobs:
             confirm_by_sheet(path)(turned.knobs)
 
     @pytest.mark.parametrize("age", [timedelta(hours=-1), timedelta(hours=37)])
-    def test_a_knob_sheet_of_another_day_is_refused(self, rig, tmp_path, age):
+    def test_a_knob_sheet_that_is_too_old_or_from_the_future_is_refused(self, rig, tmp_path, age):
         path = tmp_path / "knobs.toml"
         old = confirm_simulated(rig.knobs).model_copy(update={"confirmed": datetime.now(UTC) - age})
         save_knob_sheet(old, path)

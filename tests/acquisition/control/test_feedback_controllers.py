@@ -119,7 +119,7 @@ def test_the_base_level_is_reached_despite_a_wrong_shaker_model(new_control_benc
     assert max(b / a for a, b in pairwise(loudest[2:-1])) <= 1.25 * (1 + 1e-9)
 
 
-def test_an_unreachable_base_level_is_flagged_and_the_setting_stays_within_the_plan(new_control_bench):
+def test_an_unreachable_base_level_is_flagged_and_the_voltage_stays_within_the_plan(new_control_bench):
     bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.2)
     plan = HeldDwell(
         amplitude_vpp=0.05,
@@ -227,7 +227,7 @@ def test_an_unsettled_motion_gives_no_resonance(
     assert (found["motion"], found["lock"], found["frequency_hz"]) == ("unsettled", "not met", None)
 
 
-def test_a_plan_without_a_level_plays_its_setting_throughout(new_control_bench):
+def test_a_plan_without_a_base_level_plays_a_constant_generator_voltage(new_control_bench):
     bench = new_control_bench()
     plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)
     bench.carry_out(Measurement(name="open", excitation=plan, ramp_s=0.2))

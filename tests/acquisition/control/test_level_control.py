@@ -23,12 +23,12 @@ def test_level_control_converges_whenever_the_level_is_reachable(gain, start_vpp
     assert setting_vpp <= 5.0
 
 
-def test_level_control_never_exceeds_the_planned_setting():
+def test_level_control_stays_between_the_minimum_and_the_planned_voltage():
     assert CONTROL.next_vpp(4.9, MeasuredLevel(1.0, 0.0), 10.0) == 5.0
     assert CONTROL.next_vpp(2.1e-3, MeasuredLevel(100.0, 0.0), 10.0) == 2e-3
 
 
-def test_an_insignificant_level_error_does_not_change_the_setting():
+def test_an_insignificant_level_error_does_not_change_the_generator_voltage():
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.3), 10.0) == 1.0
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.1), 10.0) > 1.0
 
@@ -46,6 +46,6 @@ def test_the_level_uncertainty_matches_repetitions_with_correlated_periods():
     assert np.sqrt(np.mean(np.square(stated))) == pytest.approx(np.std(means), rel=0.2)
 
 
-def test_the_level_of_too_few_periods_is_fully_uncertain():
+def test_the_uncertainty_of_a_level_from_too_few_periods_equals_the_level():
     few = measured_level(np.full(10, 3.0 + 0j))
     assert few.uncertainty == few.amplitude == 3.0

@@ -104,7 +104,7 @@ def test_the_uncertainty_of_the_scatter_covers_repeated_measurements():
     assert scatter.std() <= np.mean([each.scatter_u for each in found])
 
 
-def test_too_few_periods_are_unsettled():
+def test_a_motion_with_too_few_periods_is_unsettled():
     assert judgement_of(points(40), RULE).steadiness is Steadiness.UNSETTLED
 
 

@@ -34,7 +34,7 @@ def test_a_feedback_plan_is_unchanged_after_writing_and_reading_json(plan):
 
 
 @every_plan
-def test_a_preview_shows_the_recorded_steps_at_the_largest_setting(plan):
+def test_a_preview_shows_the_recorded_steps_at_the_largest_voltage(plan):
     shown = plan.excitation.preview(2048.0)
     assert shown.peak_v == pytest.approx(0.5 * plan.excitation.amplitude_vpp, rel=0.01)
     recorded_s = sum(step.record_s for step in plan.excitation.steps())
@@ -50,7 +50,7 @@ def test_the_duration_of_a_feedback_plan_includes_silence_and_ramps(plan):
 @pytest.mark.parametrize(
     "plan", [each for each in SMART if any(each.excitation.held_accelerations())], ids=lambda each: each.name
 )
-def test_the_setting_needed_for_a_held_level_is_checked_against_its_limit(plan, rig):
+def test_the_voltage_needed_for_a_held_base_level_is_checked_against_its_limit(plan, rig):
     held = list(plan.excitation.held_accelerations())
     (check,) = [each for each in limit_checks(plan, rig) if "hold the base's level" in each.what]
     assert check.value == max(needed_vpp(rig, acceleration, at_hz) for at_hz, acceleration in held)

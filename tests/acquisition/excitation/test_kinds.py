@@ -91,7 +91,7 @@ def test_the_band_contains_all_played_frequencies(excitation):
     assert all(low_hz <= each <= high_hz for each in (*tones, excitation.highest_frequency_hz))
 
 
-def test_a_resonance_search_covers_the_whole_range():
+def test_the_band_of_resonance_tracking_is_its_search_range():
     assert by_kind["resonance_tracking"].band_hz == (240, 290)
 
 
@@ -114,11 +114,11 @@ def test_a_resonance_search_covers_the_whole_range():
         ("branch_continuation", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
     ],
 )
-def test_each_kind_declares_what_sets_the_base_motion(kind, level):
+def test_each_kind_declares_a_generator_voltage_or_a_held_base_acceleration(kind, level):
     assert by_kind[kind].level_at(250.0) == level
 
 
-def test_a_settled_sine_without_a_base_level_plays_its_setting():
+def test_a_settled_sine_without_a_base_level_plays_a_constant_voltage():
     plain = SettledSine(amplitude_vpp=1, frequencies_hz=(200, 210))
     assert plain.level_at(200.0) == RelativeSetting(1.0)
     assert not list(plain.held_accelerations())

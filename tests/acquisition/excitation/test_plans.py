@@ -57,7 +57,7 @@ def test_the_steps_of_a_plan_are_reproducible(plan):
     ]
 
 
-def test_a_preview_stays_within_half_the_peak_to_peak_setting(plan):
+def test_a_preview_stays_within_half_the_peak_to_peak_voltage(plan):
     shown = plan.preview(4096.0)
     assert shown.peak_v <= plan.amplitude_vpp / 2 * (1 + 1e-12)
     assert shown.peak_v == pytest.approx(np.max(np.abs(shown.volts)))
@@ -195,7 +195,7 @@ def test_a_stepped_sweep_has_the_phase_of_the_ideal_sweep_after_every_step(sweep
     assert elapsed_s == pytest.approx(sweep.duration_s, rel=1e-9)
 
 
-def test_the_mean_frequency_of_a_linear_sweep_is_the_mean_of_its_ends():
+def test_the_mean_frequency_of_a_linear_sweep_is_the_mean_of_start_and_stop():
     sweep = SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=200)
     assert sweep.cycles(200.0) == pytest.approx(250.0 * 200.0, rel=1e-14)
 
@@ -228,7 +228,7 @@ def test_a_sweep_down_mirrors_the_sweep_up():
     np.testing.assert_allclose(rising, falling[::-1], rtol=1e-12)
 
 
-def test_only_the_first_step_of_a_sweep_settles_and_all_form_one_segment():
+def test_only_the_first_step_of_a_sweep_settles_and_all_steps_form_one_segment():
     steps = list(SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=10, settle_s=2).steps())
     assert steps[0].settle_s == 2
     assert {step.settle_s for step in steps[1:]} == {0.0}

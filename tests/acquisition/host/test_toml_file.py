@@ -66,7 +66,7 @@ def test_an_unknown_kind_of_excitation_is_refused_with_the_known_kinds(tmp_path,
         ('values = [1.0, "fast"]\n', "values.1 = 'fast': give a number"),
     ],
 )
-def test_errors_name_the_key_of_the_kind_that_the_file_intends(tmp_path, text, told):
+def test_errors_name_the_key_of_the_variant_that_the_file_uses(tmp_path, text, told):
     file = tmp_path / "plan.toml"
     said = refusal(load_toml, file, text, Plan)
     assert said.startswith(f"{file}: {told}")

@@ -114,7 +114,7 @@ class TestDefaults:
         (measurement,) = loaded(tmp_path, text).measurements
         assert measurement.excitation.duration_s == 2.0
 
-    def test_defaults_apply_to_their_kind_only(self, tmp_path):
+    def test_defaults_apply_only_to_their_kind_of_excitation(self, tmp_path):
         text = 'name = "c"\n[defaults.sine_sweep]\nstep_s = 9.0\n' + DWELL_TABLE
         assert len(loaded(tmp_path, text).measurements) == 1
 

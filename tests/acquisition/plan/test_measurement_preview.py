@@ -36,7 +36,7 @@ def test_the_previewed_spectrum_of_a_sine_is_one_line(rig):
     assert seen.spectrum_v[highest] == pytest.approx(0.75, rel=0.02)
 
 
-def test_limit_checks_are_sorted_by_use_and_violations_are_marked(rig):
+def test_limit_checks_are_sorted_by_utilisation_and_violations_are_marked(rig):
     excitation = QUICK["dwell"].excitation.model_copy(update={"amplitude_vpp": 15.0})
     seen = preview_measurement(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
     uses = [check.use for check in seen.checks]

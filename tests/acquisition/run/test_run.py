@@ -124,7 +124,7 @@ class TestCompleteRuns:
         assert lengths == {label: round(seconds * RATE) for label, seconds in expected.items()}
         assert played.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
 
-    def test_every_block_states_elapsed_time_and_setting(self, played):
+    def test_every_block_states_elapsed_time_and_generator_voltage(self, played):
         shown = played.shown
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
@@ -246,7 +246,7 @@ class TestSweepsAndSteps:
 
 class TestEndsOfARun:
     @every_state
-    def test_a_cancel_ramps_down(self, bench, tmp_path, state):
+    def test_cancelling_a_run_ramps_the_drive_down(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         run.cancel("the operator pressed stop")
         list(run)
@@ -255,7 +255,7 @@ class TestEndsOfARun:
         assert_silent_and_finished(bench, RecordingState.STOPPED)
         assert_ended_without_a_jump(bench, state)
 
-    def test_a_cancel_takes_effect_within_a_block(self, bench, tmp_path):
+    def test_cancelling_a_run_takes_effect_within_a_block(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         shown = upto(run, RunState.RECORDING)
         run.cancel()
@@ -344,7 +344,7 @@ class TestEndsOfARun:
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
     @every_state
-    def test_an_abandoned_iterator_ramps_down(self, bench, tmp_path, state):
+    def test_abandoning_the_iteration_of_a_run_ramps_the_drive_down(self, bench, tmp_path, state):
         with run_of(bench, tmp_path) as run:
             upto(run, state)
         assert run.state is RunState.STOPPED
@@ -516,7 +516,7 @@ class TestStopLevels:
         assert "measured silence" in text_of_silence(bench)
 
     @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
-    def test_a_held_run_keeps_its_setting_and_resumes_in_the_same_state(self, bench, tmp_path, state):
+    def test_a_held_run_keeps_its_voltage_and_resumes_in_the_same_state(self, bench, tmp_path, state):
         run = run_of(bench, tmp_path)
         before = upto(run, state)
         run.switch.hold()

@@ -147,7 +147,7 @@ class TestCompleteRuns:
 
 class TestEndsOfARun:
     @every_state
-    def test_a_cancel_fades_the_stream_out_after_the_written_samples(self, streaming_bench, tmp_path, state):
+    def test_a_cancelled_run_fades_out_after_the_written_samples(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
         shown = upto(run, state)
         run.cancel("the operator pressed stop")

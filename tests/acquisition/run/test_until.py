@@ -90,7 +90,7 @@ def test_each_frequency_step_ends_when_its_bound_is_met(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_noise_ends_after_a_whole_realisation_and_the_ramp_down(rig, tmp_path):
+def test_noise_with_until_ends_after_a_whole_realisation_and_a_ramp_down(rig, tmp_path):
     noise = WhiteNoise(
         amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800, repetition_hz=2, settle_s=0.5, realisations=40
     )

@@ -87,7 +87,7 @@ def test_a_stop_file_that_is_a_pipe_stops_without_a_reason():
     assert switch.request.level is StopLevel.OFF
 
 
-def test_an_undecodable_reason_still_stops():
+def test_a_stop_with_an_undecodable_reason_is_carried_out():
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke \udcff") is StopDelivery.TAKEN

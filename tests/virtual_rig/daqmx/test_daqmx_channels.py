@@ -160,7 +160,7 @@ def test_channels_have_the_names_given_by_the_program(task):
     assert [device.name for device in task.devices] == ["Dev1"]
 
 
-def test_a_setting_of_a_list_of_channels_reaches_all_of_them(task):
+def test_a_setting_of_a_channel_list_reaches_every_channel(task):
     both = task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1")
     both.ai_coupling = Coupling.AC
     assert [task.ai_channels[name].ai_coupling for name in task.channel_names] == [Coupling.AC] * 2

@@ -36,7 +36,7 @@ def test_every_device_is_listed_with_product_and_serial_number(system):
     assert all(serials)
 
 
-def test_the_ni_9234_shows_what_its_manual_states(system):
+def test_the_ni_9234_has_the_properties_stated_in_its_manual(system):
     module = system.devices["cDAQ1Mod1"]
     assert module.product_category is ProductCategory.C_SERIES_MODULE
     assert [channel.name for channel in module.ai_physical_chans] == [f"cDAQ1Mod1/ai{n}" for n in range(4)]

@@ -175,7 +175,7 @@ def test_a_software_timed_output_holds_its_value(daq):
     assert inputs.read() == 1.25
 
 
-def test_two_outputs_each_play_their_own_row(daq):
+def test_two_outputs_play_one_row_of_samples_each(daq):
     task = daq.task()
     task.ao_channels.add_ao_voltage_chan("Dev2/ao0:1")
     task.timing.cfg_samp_clk_timing(10000, samps_per_chan=200)

@@ -52,7 +52,7 @@ def test_every_kind_of_transfer_passes_unchanged(rig, proxy):
     assert proxy.control(Setup(0xA2, 3, 5, 0x82, 2)) == bytes([0x81, 0])
 
 
-def test_a_timeout_and_a_stall_look_the_same_at_both_ends(proxy):
+def test_the_proxy_raises_timeouts_and_stalls_of_the_device(proxy):
     with pytest.raises(TimeoutError):
         proxy.bulk_in(64, 1000)
     with pytest.raises(BrokenPipeError):
@@ -60,7 +60,7 @@ def test_a_timeout_and_a_stall_look_the_same_at_both_ends(proxy):
     proxy.bulk_out(bytes([1, 1, 254, 0, 4, 0, 0, 0, 1, 0, 0, 0]) + b"*CLS")
 
 
-def test_a_pulled_cable_and_a_dead_server_both_raise_no_such_device(rig, proxy):
+def test_a_pulled_cable_and_a_dead_server_raise_no_such_device(rig, proxy):
     rig.cable.pull_cable()
     with pytest.raises(OSError, match="No such device") as pulled:
         proxy.bulk_out(bytes(12))

@@ -24,7 +24,7 @@ STEP_S = USUAL_GRID.step_s
 SINE = 0.5 * np.sin(2 * np.pi * 400 * STEP_S * np.arange(20_480))
 
 
-def test_an_iepe_sensor_without_excitation_shows_nothing():
+def test_an_iepe_sensor_without_excitation_gives_no_signal():
     volts, clips = stage(SENSOR).pass_on(signals(SINE))
     assert np.all(volts == 0)
     assert not clips
@@ -53,7 +53,7 @@ def test_an_open_input_reads_zero_unless_excitation_is_on():
     assert stage(OPEN_INPUT, iepe_current_a=0.002).pass_on(signals(SINE))[1]
 
 
-def test_excitation_on_a_voltage_source_shifts_it_by_the_drop_in_the_source():
+def test_iepe_excitation_shifts_a_voltage_source_by_its_internal_voltage_drop():
     volts, _ = stage(SOURCE, iepe_current_a=0.002).pass_on(signals(SINE))
     assert volts == pytest.approx(SINE + 0.1)
 

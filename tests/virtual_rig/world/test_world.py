@@ -66,7 +66,7 @@ def phasor(volts, frequency_hz, sample_rate_hz, first_sample=0):
 
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0])
-def test_every_channel_shows_what_the_model_of_rig_and_specimen_states(frequency_hz):
+def test_every_channel_matches_the_model_of_rig_and_specimen(frequency_hz):
     world, amplitude_v = World(QUIET, Tone(frequency_hz, 5e-3)), 5e-3
     sampler = world.sample(INPUTS, 51_200.0)
     settle = 150_000
@@ -195,7 +195,7 @@ def test_an_unwired_analogue_output_has_no_effect():
     assert np.all(world.sample(INPUTS, 51_200.0).read(1000) == 0)
 
 
-def test_the_true_motion_can_be_recorded_and_is_off_by_default():
+def test_recording_the_true_motion_is_possible_and_off_by_default():
     world = World(QUIET, Tone(260.0, 3.0))
     world.advance(0.1)
     assert world.truth().shape == (0, len(MOTION_COLUMNS))

@@ -17,7 +17,7 @@ def shaken_recording(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_p_is_drawn_between_the_stops_in_the_visible_range(shared_context, shaken_recording, wait_for):
+def test_hidden_motion_is_drawn_between_the_mechanical_stops(shared_context, shaken_recording, wait_for):
     pictures = Pictures(DARK, shared_context.background)
     pictures.resize(900, 600)
     pictures.setCurrentWidget(pictures.hidden_motion)

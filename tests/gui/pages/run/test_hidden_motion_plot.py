@@ -51,7 +51,7 @@ def is_empty(curve):
     return across is None or not len(across)
 
 
-def test_the_live_plot_of_p_ends_at_the_newest_sample_between_the_stops(picture):
+def test_the_live_plot_of_hidden_motion_ends_at_the_newest_sample(picture):
     picture.show_status(status())
     time_s, p = picture.tracked.getData()
     assert time_s[-1] == 0.0
