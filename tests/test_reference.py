@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_faces import FOR_PEOPLE
+from tests.test_public_apis import FOR_PEOPLE
 
 ROOT = Path(__file__).resolve().parent.parent
 UNIT = re.compile(r"_(hz|s|m|rad|j|v|vpp|kg|a|ohm|n|db|decibel|bytes|samples|pa|m2)$")
