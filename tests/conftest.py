@@ -157,16 +157,16 @@ LONG = (
     "tests/test_wheel.py",
     "tests/test_examples.py",
 )
-"""Files of over three seconds, in the order in which they begin: one begun last would run alone.
+"""Files that take over three seconds, in starting order: a long file started last would run alone.
 
-All others are quick.
+All other files are quick.
 """
 
 
 ON_PURPOSE = ("slow", "hardware", "attack")
-"""Marks of what runs where it is asked for by -m, and otherwise never."""
+"""Marks of tests that run only when -m requests them."""
 THOROUGH = "thorough"
-"""The mark of what is left out of a run of everything; whoever names a file or folder gets it."""
+"""Mark of tests that a full run omits; naming a file or folder includes them."""
 
 
 def pytest_configure(config: pytest.Config) -> None:

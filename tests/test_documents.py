@@ -46,7 +46,7 @@ PLAIN = {
     "there and back": "up and down",
     "whoever": "anyone who",
 }
-"""Worn or foreign words that readers had to read twice, and what an engineer says."""
+"""Words that are hard to read, and their plain replacements."""
 
 
 def every_document(faults):

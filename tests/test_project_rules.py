@@ -22,11 +22,11 @@ LINES_AT_MOST = {
     "studies": 3_226,
     "virtual_rig": 6_977,
 }
-"""Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
+"""Lines of Python, stubs, templates and C++, without the C++ test program; budgets only decrease."""
 
 TITLES_CHECKED_SINCE = "fa33b4fc66a96ac303cdf07b2454bceed13e319a"
 IMPERATIVES = {"Bring", "Embed", "Exceed", "Feed", "Focus", "Need", "Proceed", "Ring", "Speed", "String"}
-"""Verbs that end like a participle or like the third person."""
+"""Imperatives that end like a participle or a third person."""
 NO_VERBS = {"A", "An", "Each", "Every", "If", "It", "No", "The", "There", "What", "Where", "Who"}
 
 

@@ -78,9 +78,9 @@ def test_writing_to_a_link_keeps_the_link_and_replaces_its_target(tmp_path):
 ROOT = Path(__file__).parents[1]
 WRITING = ("write_text", "write_bytes", "savefig", "copyfile", "copytree")
 UNFINISHED = {"coming", "unfinished", "tmp"}
-"""Names that a file has until it is whole."""
+"""Names of a file before it is complete."""
 UNFINISHED_FOR_CALLER = {"_wav.py", "_csv.py", "_uff.py", "_mat.py", "_excerpt.py"}
-"""Writers of exports: `new_file` gives them the unfinished name."""
+"""Modules that write exports: `new_file` passes them the temporary name."""
 NO_FILE_OF_A_USER = {
     "docs.py: shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)": "scratch",
     "docs.py: shutil.copytree(root / 'site', target, ignore=shutil.ignore_patterns('.doctrees'), "

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 CELL = re.compile(r"^```\{code-cell\} python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
 SHORT = {"how_accurate"}
-"""A few seconds; the others measure on the virtual rig, or follow chaos for long."""
+"""Tutorials of a few seconds; all others measure on the virtual rig or follow chaos for a long time."""
 
 
 @pytest.mark.thorough

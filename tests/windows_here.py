@@ -69,7 +69,7 @@ sees_locks = pytest.mark.skipif(
     "sys.platform != 'win32' and not hasattr(os, 'fork')",
     reason="programs that are started here lock as the true system does",
 )
-"""On tests that look for the locks of programs which they start."""
+"""Mark of tests that look for locks of programs which they start."""
 
 
 def become_windows() -> None:

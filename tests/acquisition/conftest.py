@@ -51,15 +51,15 @@ class LoopbackWorld:
     played: int = 0
     drive_factor: float = 1.0
     stays_on: bool = False
-    """Whatever the output is told."""
+    """Whether the output stays on after a stop command."""
     hum_v: float = 0.0
     base_factor: float = 1.0
     background_m_per_s2: float = 0.0
     overloads: tuple = ()
     latency_s: float = 0.0
-    """What each command to the generator takes, while samples are converted."""
+    """Duration of each generator command [s], during which samples are converted."""
     convert: Callable[[int], None] | None = None
-    """Lets so many samples be converted, which then wait."""
+    """Converts a number of samples, which then wait to be read."""
 
     def command(self, name: str, argument: object = None) -> None:
         """Record a generator command, which takes `latency_s` before it is in force."""

@@ -41,7 +41,7 @@ TARGETS: dict[str, Attack] = {
     "drifts": doubtful_recordings.attack_drifts,
     "steps": doubtful_recordings.attack_steps,
 }
-"""What can be attacked, each by its own file."""
+"""All targets; each is attacked by one module."""
 
 
 def main() -> int:

@@ -33,7 +33,7 @@ NAMES = ("dwell", "sweep")
 ROLES = ("drive_voltage", "base_acceleration", "m0_velocity")
 WARNED = ("seal is gone", "seal gone")
 READERS = ("verify", "verify folder", "analyse", "analyse folder", "export", "pack", "Files page")
-"""The catalogue does not check samples, and says so."""
+"""Readers that must detect changed samples; the catalogue states that it does not check samples."""
 
 
 def write_journal(folder: Path, names: tuple[str, ...] = NAMES) -> None:

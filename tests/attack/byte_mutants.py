@@ -19,7 +19,7 @@ EDGES = (
     2**63,
     2**64 - 1,
 )
-"""Numbers at which counts and lengths go wrong."""
+"""Values at which counts and lengths often fail."""
 FLOATS = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, -0.0, 0.0)
 MOST_AT_ONCE = 6
 

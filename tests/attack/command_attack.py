@@ -8,7 +8,7 @@ from .limits import Case, Ending
 from .tally import Finding, Shard, Tally
 
 TOLD = 600
-"""Letters of what a command said that are kept with a finding."""
+"""Number of characters of a command's output that are kept with a finding."""
 
 
 def attack_commands(

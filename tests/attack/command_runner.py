@@ -23,9 +23,9 @@ from .limits import MOST_BYTES, Case, Ending
 
 ROOT = Path(__file__).resolve().parents[2]
 GRACE_S = 2.0
-"""A command that hangs is killed this much after its time was up [s]."""
+"""Time after its time limit at which a hanging command is killed [s]."""
 ADDRESS_ROOM_BYTES = 4 * MOST_BYTES
-"""Addresses that a command may take beyond those of its imports: this protects the computer only."""
+"""Address space beyond that of the imports [bytes]; it protects the computer only."""
 
 
 class CommandRunner:

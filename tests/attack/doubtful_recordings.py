@@ -25,11 +25,11 @@ from ..analysis import synthetic_recordings as synthetic
 from .tally import Finding, Shard, Tally
 
 SURELY = 2.0
-"""Times a bound of 95 % that an error must exceed: by chance once in 16,000."""
+"""A finding exceeds twice its 95 % bound, which happens by chance once in 16,000."""
 STEADY = 2e-3
-"""What is granted to a drive, see `vibench.analysis.chaos.period`."""
+"""Allowed variation of a drive, see `vibench.analysis.chaos.period`."""
 LEAST_DISTORTION = 5e-4
-"""Of a transmission: what is reported below is nothing that anybody acts on."""
+"""Relative distortion of a transmissibility below which reports have no consequence."""
 Faults = tuple[str, ...]
 
 
@@ -299,7 +299,7 @@ attack_drifts = members("drifts", repeated_noise)
 
 
 LIGHT_RATE_HZ = 25_600.0
-"""Drop-outs are looked for above 20 kHz."""
+"""Drop-outs are searched only at sample rates above 20 kHz."""
 FULL_SCALE_M_PER_S = 1.0
 
 

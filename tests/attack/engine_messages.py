@@ -22,7 +22,7 @@ from .tally import Finding, Shard, Tally
 
 NAME = "engine"
 DESCRIPTORS_MORE = 24
-"""Those of the viewers that it holds at most, and what a bench opens."""
+"""Allowed for the connected viewers and an open bench."""
 CAMPAIGN = load_campaign(ROOT / "campaigns" / "quick.toml").model_dump(mode="json")
 RIG = load_rig("virtual_rig").model_dump(mode="json")
 REQUESTS: tuple[dict[str, Any], ...] = (
@@ -37,7 +37,7 @@ REQUESTS: tuple[dict[str, Any], ...] = (
     {"ask": "beat"},
     {"ask": "look", "since_sample": 0, "most": 100},
 )
-"""Something right of every verb, but for those that would play or end: `start`, `check` and `shutdown`."""
+"""A valid request of every kind that neither plays nor ends: not `start`, `check` or `shutdown`."""
 
 
 def framed(text: bytes, payload: bytes = b"") -> bytes:
@@ -161,7 +161,7 @@ class Trial:
 
 
 LOOK_EVERY = 25
-"""Messages between two looks at the process."""
+"""Messages between two checks of the process."""
 
 
 def attack(shard: Shard) -> Tally:

@@ -130,7 +130,7 @@ WRITERS = {
     ".h5": _hdf5, ".nc": _hdf5, ".mat": _mat, ".wav": _wav, ".tdms": _tdms,
     ".csv": _csv, ".txt": _txt, ".uff": _uff, ".unv": _unv,
 }  # fmt: skip
-"""A good file of each suffix."""
+"""Writers of a valid file of each suffix."""
 
 
 @cache

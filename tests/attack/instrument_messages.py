@@ -36,7 +36,7 @@ COMMANDS = (
     "TRAC:DEF EMEM,8192", "TRAC:DATA? EMEM", "TRAC:POIN EMEM,100", "DATA:DATA:VAL EMEM1,3,100",
     "SOUR1:PULS:DCYC 20", "SYST:BEEP", "TRAC:COPY USER0,EMEM",
 )  # fmt: skip
-"""Something of every part of the generator's manual."""
+"""Commands of every chapter of the generator's manual."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -113,13 +113,13 @@ USUAL: dict[str, tuple[Any, ...]] = {
     "channel": ("", "a"),
     "write_array": (0.0, 0.5),
 }
-"""Values that a client would give, by the names of the fields."""
+"""Values that a client would send, by field name."""
 CALLS = (
     "CreateTask", "CreateAIVoltageChan", "CreateAOVoltageChan", "CfgSampClkTiming", "StartTask",
     "ReadAnalogF64", "WriteAnalogF64", "ReadBinaryI32", "StopTask", "ClearTask", "TaskControl",
     "WaitUntilTaskDone", "CfgInputBuffer",
 )  # fmt: skip
-"""What a client calls most."""
+"""Calls that clients use most."""
 SMALL = tuple(edge for edge in EDGES if edge < 2**31)
 
 
@@ -136,7 +136,7 @@ def broken_call(chance: random.Random) -> tuple[str, bytes]:
 
 
 STRANGE = 0.25
-"""Share of fields that are left out, or have any value, in a request that is not right."""
+"""Fraction of the fields of an invalid request that are omitted or have any value."""
 
 
 def _fill(message: Any, chance: random.Random, strange: float) -> None:
@@ -188,7 +188,7 @@ UNEXPECTED = (
     "Exception serializing",
     "Error in service",
 )
-"""What gRPC says in a server's stead when the server was surprised."""
+"""Messages of gRPC about an exception in the server."""
 
 
 class Trial:
@@ -276,7 +276,7 @@ def faults(process: ServedProcess, before: int) -> tuple[str, ...]:
 
 
 LOOK_EVERY = 50
-"""Messages between two questions whether everything still answers."""
+"""Messages between two checks that all servers answer."""
 
 
 def attack(shard: Shard) -> Tally:

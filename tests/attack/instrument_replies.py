@@ -39,7 +39,7 @@ RIGS = {
     "sound card": "virtual_rig",
     "file": "virtual_rig",
 }
-"""Kinds of instruments, and the rig that each is a part of; a served one is opened as a real bench."""
+"""Kinds of instruments, and the rig of each; instruments of a served rig are opened as a real bench."""
 PLAN = """
 name = "odd"
 [[measurements]]
@@ -55,7 +55,7 @@ NOISE = (
 )
 ANSWERS = b'operator = "A. Student"\nwired = "by eye"\n'
 CONTROL = "\x1b[2J\x1b]0;title\x07\x9b31m\u202e\r\nerror: all is well\x7f"
-"""Clears the screen, names the window, reorders text and forges a line."""
+"""Clears the screen, names the window, reorders text, and forges an error line."""
 TEXTS = ("", " ", CONTROL, "x" * 100_000, "\0", "nan", "-1", "ä\ufffd")
 NUMBERS = (0, -1, 1, 2**31 - 1, -(2**31), math.nan, math.inf, -math.inf, 1e300, 5e-324, 0.5)
 REPLIES: tuple[bytes, ...] = (

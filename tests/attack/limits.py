@@ -7,13 +7,13 @@ from pathlib import Path
 LONGEST_S = 10.0
 """Processor time that a command may take over one damaged file [s]."""
 HANGS_S = 60.0
-"""Time by the clock: other programs may want the processors too, and who waits takes none of them [s]."""
+"""Time limit in real time [s]; it allows for other programs, and for waiting without processor time."""
 MOST_BYTES = 1_000_000_000
-"""Resident memory that such a command may have had at its peak."""
+"""Peak resident memory that such a command may use."""
 LONGEST_COMPLAINT = 2_000
-"""Letters of standard error: a sentence, and what it lists."""
+"""Allowed number of characters on standard error: a sentence and its list."""
 STOPPED = 3
-"""Exit code of what was stopped before its end."""
+"""Exit code of a command that was stopped."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Case:
     arguments: tuple[str, ...]
     files: Mapping[str, bytes] = field(default_factory=dict)
     prepare: tuple[str, ...] = ()
-    """A module and words for its `prepare`, called before the command in its process; it returns what is
-    called after it."""
+    """A module and arguments of its `prepare`, called before the command in its process; `prepare` returns a
+    function that is called after the command."""
     hangs_s: float = HANGS_S
 
     def lay(self, folder: Path) -> None:
@@ -40,16 +40,16 @@ class Ending:
     """How the process of a command ended."""
 
     code: int
-    """Exit code; the negative number of the signal that ended it."""
+    """Exit code, or the negative number of the signal that ended the process."""
     out: str
     err: str
     took_s: float
-    """Processor time."""
+    """Processor time [s]."""
     clock_s: float
     peak_bytes: int
-    """Largest resident memory, that of the interpreter and its libraries included."""
+    """Peak resident memory, including that of the interpreter and libraries."""
     made: tuple[str, ...] = ()
-    """Files that lie in its folder afterwards and did not before."""
+    """Files in the folder that did not exist before."""
 
     @property
     def faults(self) -> tuple[str, ...]:

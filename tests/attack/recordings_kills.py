@@ -33,16 +33,16 @@ from .tally import Finding, Shard, Tally
 
 ROOT = Path(__file__).resolve().parents[2]
 KILLS = 10
-"""Of one campaign."""
+"""Largest number of kills of one campaign."""
 KINDS = ("moment", "write", "torn write", "sync", "rename", "commit")
 CALLS = {"pwrite": 150, "fsync": 60, "rename": 8, "ftruncate": 12, "unlink": 8}
-"""System calls, and about as many as a run of these campaigns makes of each."""
+"""System calls, and their approximate number in a run of these campaigns."""
 WHEN = ("before", "inside", "after")
 FAULTS = {"kill": 0, "EIO": errno.EIO, "ENOSPC": errno.ENOSPC}
 CALL_KINDS = tuple(f"{call} {when} {fault}" for call in CALLS for when in WHEN for fault in FAULTS)
 LIBRARY = "VIBENCH_SYSTEM_CALLS"
 LONGEST_S = 120.0
-"""A campaign of a few points that has not ended by then hangs [s]."""
+"""Time after which a campaign of a few points counts as hanging [s]."""
 RATE = ("sample_rate_hz = 51200", "sample_rate_hz = 5120")
 CAMPAIGNS = {
     "virtual_rig": """
@@ -111,9 +111,9 @@ class Kept:
     """What must survive a kill and the runs after it."""
 
     seals: dict[str, str]
-    """Of the recordings that the journal calls done, by file."""
+    """Seals of the recordings that the journal lists as done, by file."""
     committed: dict[str, dict[str, bytes]]
-    """Counts that a recording under way had committed, by file and channel."""
+    """Committed counts of unfinished recordings, by file and channel."""
 
 
 def write_campaign(folder: Path, bench: str) -> None:
@@ -263,9 +263,9 @@ def attack_calls(shard: Shard) -> Tally:
 
 
 MOST_OPERATIONS = {"moment": 0, "write": 150, "torn write": 150, "sync": 60, "rename": 8, "commit": 10}
-"""About as many as a run of these campaigns has; small numbers are tried more often."""
+"""Approximate numbers of operations in a run of these campaigns; small numbers are tried more often."""
 LATEST_S = 4.0
-"""About as long as such a run takes [s]."""
+"""Approximate duration of such a run [s]."""
 
 
 def serve() -> None:

@@ -24,7 +24,7 @@ from .recordings_corpus import good_recordings
 from .tally import Shard, Tally
 
 SECRET = "secret.bin"
-"""Lies beside each mutant, and no command may show it."""
+"""A file beside each mutant whose content no command may show."""
 NUMBERS = (
     0,
     -1,
@@ -55,7 +55,7 @@ TEXTS = (
     "\x01\x7f",
 )
 MOST_SEALED_BYTES = 10_000_000
-"""Nobody waits for the seal of 10^12 samples."""
+"""Largest file that is sealed: sealing 10^12 samples would take too long."""
 JSON_VALUES: tuple[Any, ...] = (
     None, True, "", "text", -1, 0, 1e300, -1e-300, 10**400, [], {}, [[]], {"a": {}}, [1, "x", None],
     "[/bold]", 1e12, 0.1, "2026-01-01",
@@ -74,7 +74,7 @@ JSON_TEXTS = (
 
 
 NOT_MADE = (OSError, RuntimeError, ValueError, TypeError, LookupError, OverflowError, MemoryError)
-"""HDF5 makes no such file, or what it declares already is more than can be read to be changed."""
+"""Exceptions if HDF5 refuses to write a mutant, or its declared size is too large to be read."""
 
 
 def mutant(chance: random.Random) -> Case:

@@ -12,7 +12,7 @@ from typing import Self
 from .command_runner import ROOT
 
 STARTING_S = 300.0
-"""The first one after a change of the simulation compiles its kernels [s]."""
+"""Time limit of a start [s]; the first start after a change of the simulation compiles its kernels."""
 LOOK_S = 0.05
 PAGE = os.sysconf("SC_PAGE_SIZE")
 

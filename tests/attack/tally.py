@@ -23,7 +23,7 @@ class Finding:
     number: int
     faults: tuple[str, ...]
     told: str
-    """The end of what it said."""
+    """The end of its output."""
 
 
 @dataclass
@@ -33,12 +33,12 @@ class Tally:
     target: str
     tried: int = 0
     codes: dict[str, int] = field(default_factory=dict)
-    """How often each ending was seen: an exit code, or the kind of an answer."""
+    """Number of mutants per ending: an exit code, or the kind of an answer."""
     worst_s: float = 0.0
     worst_bytes: int = 0
     findings: list[Finding] = field(default_factory=list)
     done: int = 0
-    """Numbers of the shard that were tried; one number may count several times."""
+    """Number of mutants of the shard that were tried; a mutant may count several times."""
     shard: str = ""
 
     def count(self, ending: object, took_s: float = 0.0, peak_bytes: int = 0) -> None:
@@ -78,9 +78,9 @@ class Shard:
     part: int = 0
     of: int = 1
     until_s: float = inf
-    """No further mutant is begun after this time of `time.monotonic`."""
+    """Value of `time.monotonic` after which no further mutant is begun."""
     saved: Path | None = None
-    """File that keeps the tallies of this shard after each mutant; those in it are not tried again."""
+    """File with the tallies of this shard after each mutant; saved mutants are not tried again."""
 
     @property
     def numbers(self) -> range:
@@ -130,4 +130,4 @@ def _tally(content: dict[str, Any]) -> Tally:
 
 
 Attack = Callable[[Shard], Tally]
-"""Tries the mutants of a shard."""
+"""A function that tries the mutants of a shard."""

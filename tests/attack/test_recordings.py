@@ -12,7 +12,7 @@ from .recordings_corpus import good_recordings
 from .tally import Shard, Tally
 
 FOUND = (("recordings", 1, 40), ("recordings", 2, 361))
-"""Mutants that once did what none may do: sentences of 50 000 letters."""
+"""Mutants that once caused a fault: sentences of 50,000 characters."""
 
 
 def faults_of_mutant(name, seed, number):

@@ -89,7 +89,7 @@ def write(folder):
     make_file(folder / "new.h5", Study(frequencies_hz=[200.0, 260.0], amplitudes_m=[5e-6]))
 """,
 }
-"""Every place that writes HDF5."""
+"""All functions that write HDF5 files."""
 IN_FORKS = """
 import shutil
 from tests.attack.recordings_kills import LIBRARY

@@ -11,14 +11,14 @@ NUMBERS = (
     "1" + "0" * 400, "-1" + "0" * 400, "0." + "0" * 400 + "1", "0xffffffffffffffff", "1_000", "1e", "00",
     "1.5.2",
 )  # fmt: skip
-"""Numbers at which sums, counts and conversions go wrong; some are none."""
+"""Values at which sums, counts and conversions often fail; some are not numbers."""
 TEXTS = (
     "", " ", "a", "a" * 300, "x" * 100_000, "../../etc/passwd", "/", ".", "..", "con", "a/b", "a\\b",
     "é" * 130, "\u202e", "\U0001f600", "\x00", "\n", "%s%n{}", "[bold]red[/]", "[/]", "true", "nan",
     "linear", "hertz", "power:0", "power:1e9", "power:-3", "power:3+", "power:" + "9" * 400,
     "power:" + "+".join(str(each) for each in range(1, 60)),
 )  # fmt: skip
-"""Words at which names, paths and markup go wrong."""
+"""Texts at which names, paths and markup often fail."""
 OTHER_VALUES = (
     "true", "false", "[]", "{}", "[[]]", "[1, 'a', 2.5]", "{ a = 1 }",
     "{ start = 1, stop = 2, step = 1e-300 }", "{ start = 0, stop = 1e300, step = 1 }",
@@ -28,7 +28,7 @@ OTHER_VALUES = (
     "12:00:00", "[" * 900 + "]" * 900, "{a=" * 900 + "1" + "}" * 900,
     "[" + ", ".join(["1e-6"] * 5000) + "]", "[" + ", ".join(map(str, range(1, 3000))) + "]",
 )  # fmt: skip
-"""Values of the wrong type, and tables and lists that hold too much."""
+"""Values of the wrong type, and tables and lists that are too large."""
 KEYS = (
     "",
     "name",

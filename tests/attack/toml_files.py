@@ -76,7 +76,7 @@ KINDS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "study": (STUDIES, ("study", BROKEN, "--out", "answers.h5", "--estimate", "--json")),
     "mapping": ((MAPPING,), ("import", "samples.csv", "--mapping", BROKEN, "--out", "new.h5", "--json")),
 }
-"""What each kind is made from, and the command that reads it."""
+"""For each kind: valid files to start from, and the command that reads it."""
 GOOD = {"good.toml": (ROOT / "campaigns" / "quick.toml").read_bytes(), "samples.csv": SAMPLES}
 
 

@@ -24,7 +24,7 @@ def test_the_command_list_shows_the_first_help_line_of_each_command(name):
 
 
 WITHOUT_A_RESULT = {"twin", "stop", "release", "gui", "serve-rig", "bench", "schema", "warm"}
-"""What they do is done elsewhere; ``bench`` is a group, and ``schema`` prints JSON alone."""
+"""Their result is not a document; ``bench`` is a group, and ``schema`` always prints JSON."""
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS.keys() - WITHOUT_A_RESULT))

@@ -7,7 +7,7 @@ import pytest
 from vibench.sim import Harmonic, gong2025, steady_response
 
 COMPILING_S = 300
-"""For whoever runs the first of these tests after a change of the simulation."""
+"""Time limit [s] of the first test after a change of the simulation, which compiles its kernels."""
 SHORT = ("--duration", 1, "--window", 0.5)
 
 

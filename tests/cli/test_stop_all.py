@@ -29,7 +29,7 @@ with stop_on_signal(switch, sys.argv[1]):
 print(switch.request.level, switch.request.reason)
 """
 CONTAINER = ("unshare", "--user", "--map-root-user", "--pid", "--fork", "--mount-proc")
-"""Own numbers of processes, as in a container; the state folder is shared."""
+"""A process number space as in a container, with a shared state folder."""
 
 pytestmark = sees_locks
 

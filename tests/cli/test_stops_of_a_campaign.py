@@ -37,11 +37,11 @@ settle_s = 0.1
 duration_s = {duration_s}
 """
 SILENT_V = 0.02
-"""Of the recorded drive: its noise, and the last stair of a ramp."""
+"""Upper bound of a silent recorded drive: noise and the last step of a ramp."""
 LONG_S = 600.0
 PATIENCE_S = 60.0
 SOON_S = 20.0
-"""Far below what would have come next, and far above what a command takes to start."""
+"""Much shorter than the time to the next event, and much longer than the start of a command."""
 
 pytestmark = sees_locks
 

@@ -32,7 +32,7 @@ window_s = 0.2
 LONG_POINTS = 201
 LOOK_S = 0.05
 COMPILING_S = 300
-"""For whoever runs the first of these tests after a change of the simulation."""
+"""Time limit [s] of the first test after a change of the simulation, which compiles its kernels."""
 
 
 def plan(folder, text=SMALL):

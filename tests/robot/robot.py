@@ -99,11 +99,11 @@ KEYS = tuple(
 CHORDS = tuple(getattr(Qt.Key, f"Key_{name}") for name in (*"1234567ZTCAV", "Return"))
 SIZES = ((1024, 700), (1280, 800), (1920, 1080), (2560, 1440), (400, 300))
 STOPPED_S, LATE = 6.0, 8.0
-"""From STOP to the end of the run [s], and the factor that is allowed where all cores are busy."""
+"""Time from STOP to the end of the run [s], and its allowed factor on a busy computer."""
 ANSWERED_S = 300.0
-"""A page that has not answered after this long is dead; compiling for the first time takes a part of it."""
+"""Time after which a page that does not respond counts as dead [s]; it includes compilation."""
 LONGEST_DEED_S = 20.0
-"""The window's loop is held up for no longer, other work included."""
+"""Longest allowed blocking of the event loop by one action, including other work [s]."""
 TRACEBACK = "Traceback (most recent call last)"
 DWELL = Dwell(amplitude_vpp=0.5, frequency_hz=180.0, settle_s=0.2, duration_s=600.0)
 

@@ -207,7 +207,7 @@ def test_contract_options_do_not_clash_with_options_of_a_project(tmp_path):
 
 
 OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcard"})
-"""Those of which a shipped virtual bench has one."""
+"""Names of our instruments that are part of a shipped virtual bench."""
 
 
 @pytest.mark.slow

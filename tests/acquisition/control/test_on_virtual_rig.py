@@ -20,7 +20,7 @@ from vibench.sim import Harmonic, PhaseReference, gong2025, integrate, phase_res
 
 SAMPLE_RATE_HZ = 10240.0
 HEAVY_KG = 0.6
-"""A fixture that the specimen hardly moves: the base is then the sine that the simulation is given."""
+"""Fixture mass that the specimen hardly moves, so that the base is the sine of the simulation."""
 SPECIMEN = gong2025()
 
 

@@ -8,7 +8,7 @@ from vibench.acquisition.control.steadiness import ORDERS, Stroboscope
 RATE_HZ = 51200.0
 NEAR_HZ = 260.3
 FIRST_BLOCK = 52
-"""Periods that are seen before a second block tells the clocks apart: up to 0.2 degrees off."""
+"""Number of periods before a second block shows the clock difference: up to 0.2 degrees off."""
 
 
 def observe(motion, ppm=17.0, blocks=12, block_s=0.2, phase=0.3, drives=1):

@@ -29,7 +29,7 @@ class MessageLog:
         self.messages: list[str] = []
         self.states: list[ChannelSettings] = []
         self.before: Callable[[bytes], None] = _nothing
-        """What happens on the bench just before a message arrives."""
+        """Called just before a message reaches the instrument."""
         self.after: Callable[[bytes], None] = _nothing
         self._instrument = instrument
 

@@ -22,7 +22,7 @@ from vibench.acquisition.rig import Rig, load_rig
 
 PATIENCE_S = 60.0
 LOOK_S = 0.01
-"""Between two looks: whoever asks without a pause takes the time of the process that it waits for."""
+"""Pause between two requests; polling without a pause would slow down the engine."""
 
 
 @pytest.fixture(autouse=True)

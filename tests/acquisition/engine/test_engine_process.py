@@ -45,7 +45,7 @@ from vibench.virtual_rig import VirtualRig
 from .conftest import campaign, opened, until, until_exists, until_state
 
 SILENT_V = 0.02
-"""Of the recorded drive: its noise, and the last stair of a ramp."""
+"""Upper bound of a silent recorded drive: noise and the last step of a ramp."""
 
 
 def on_server(rig, virtual):

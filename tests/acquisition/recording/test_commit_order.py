@@ -19,7 +19,7 @@ from vibench.acquisition.recording._preallocate import ITEM_BYTES, preallocate
 BLOCKS, BLOCK = 40, 7
 PAGE = 4096
 SECTOR = 512
-"""What a disk writes as a whole."""
+"""Number of bytes that a disk writes as a whole."""
 
 
 @dataclass

@@ -24,12 +24,12 @@ CHILD = Path(__file__).with_name("recording_child.py")
 
 PROMISE_S = 1.0
 ENDLESS_BLOCKS = 200_000
-"""Several times what the quickest disk takes before the kill."""
+"""Several times as many as the fastest disk writes before the kill."""
 PACED_BLOCKS, BLOCKS_PER_S = 8000, 2000
 """Twenty times the speed of a real recording, for four seconds."""
 FINISHED_BLOCKS = 1500
 COMMIT_STEPS = 8
-"""A commit has four or so: a sync, the counter, and a sync; two commits are a second."""
+"""A commit has about four steps: a sync, the counter and a sync; there are two commits per second."""
 
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows cannot fork")
 

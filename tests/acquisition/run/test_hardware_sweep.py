@@ -24,9 +24,9 @@ from vibench.analysis import analyse
 RAMP = {"ramp_s": 0.4, "ramp_step_s": 0.1}
 LABORATORY_SETTLE_S = 0.1
 NOTED_CYCLES = 0.1
-"""Beyond this a run notes that its drive ended away from its plan."""
+"""Difference in cycles between drive and plan above which a run notes it."""
 FILTER_CYCLES = 0.12
-"""What the converter's filter delays, over 160 Hz."""
+"""Delay of the converter's filter, in cycles per 160 Hz of sweep range."""
 
 
 def sweep(start_hz=150.0, stop_hz=310.0, **changes):

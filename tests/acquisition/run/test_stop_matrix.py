@@ -71,7 +71,7 @@ def send(number: signal.Signals) -> Callable[[Run], None]:
 
 
 ABORT_S = BLOCK_S + 0.09
-"""A block that was being read, and three periods of the loaded shaker (checked below)."""
+"""The block being read, and three periods of the loaded shaker (checked below)."""
 STOPS = {
     "nothing": Stop(lambda run: None, "", None),
     "ramp": Stop(ask(StopLevel.RAMP), "ramp pressed", BLOCK_S + RAMP_S),
@@ -96,9 +96,9 @@ class Fault:
     happens: Callable[[object], None]
     ends_the_run: bool
     is_reachable: bool = True
-    """Whether the generator can still be told anything."""
+    """Whether commands still reach the generator."""
     is_left_in_peace: bool = True
-    """Whether leaving the bench finds everything there."""
+    """Whether the bench can be closed without an error."""
 
 
 FAULTS = {
@@ -114,7 +114,7 @@ FAULTS = {
     "disk full": Fault(lambda faults: None, ends_the_run=True),
 }
 SILENT_AFTER_FAULT_S = BLOCK_S
-"""What still answers is silenced without reading another sample."""
+"""Instruments that still answer are silenced without another block."""
 
 
 class FullDisk:
@@ -285,7 +285,7 @@ def slow_rig(rig):
 
 
 LOST_WITHIN_S, ABORTED_WITHIN_S = 1.1, 1.17
-"""By the clock, as docs/safety.md says."""
+"""Real time, as stated in docs/safety.md."""
 
 
 @pytest.mark.thorough

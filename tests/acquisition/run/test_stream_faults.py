@@ -43,7 +43,7 @@ PLAN = Measurement(
 )
 RATE_HZ = 51_200.0
 SILENT_V = 1e-3
-"""Some fifty times the converter's noise, and a four-hundredth of the rms value played."""
+"""About fifty times the converter's noise, and 1/400 of the rms of the drive."""
 
 
 @pytest.fixture

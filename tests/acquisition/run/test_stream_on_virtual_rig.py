@@ -18,8 +18,8 @@ RIG = load_rig("virtual_rig_streaming")
 RATE_HZ = RIG.daq.sample_rate_hz
 TERMINAL = RIG.generator.terminal_factor()
 DELAY = GROUP_DELAY_SAMPLES - 0.5
-"""Samples from the output to the recording: a sample is due at the end of its period, its filter is late
-by the group delay, and the hold of the output by half a sample."""
+"""Samples from the output to the recording: the group delay of the converter's filter, minus half a sample (a
+sample is recorded at the end of its period, and the output holds it for one sample)."""
 NOISE_V = RIG.virtual.converter_noise_v
 PLAN = Measurement(
     name="run",

@@ -85,9 +85,9 @@ class HelicBoard:
         self.latency_steps = round(latency_s * grid_rate_hz)
         self.version, self.is_gated, self.is_mute = 3, True, False
         self.refuses = {}
-        """Error codes by the name of the parameter that is written."""
+        """Error codes for writing parameters, by parameter name."""
         self.trips = False
-        """Whether its gate has tripped."""
+        """Whether the safety gate has tripped."""
         self._values = {name: (0,) * count for name, kind, count, _ in REGISTRY if kind != "c"}
         self._values |= {
             "firmware": (b"sim 0000000",),
@@ -118,7 +118,7 @@ class HelicBoard:
         self._closing = threading.Event()
         self._client = None
         self.is_left = threading.Event()
-        """Whether a client has come and gone."""
+        """Set when a client has disconnected."""
         self._server, self._samples = listening()
         threading.Thread(target=self._serve, name="helic board", daemon=True).start()
 

@@ -16,7 +16,7 @@ from .test_feedback import HARDENING, RATE_HZ, branch, plant
 
 HOLD, CHANGES, LEAD = 5, 20, 3
 NOISE = 3e-3, 5e-6
-"""Of a sample of base [m/s2] and m0 [m/s]: the virtual rig's, with its converter's."""
+"""Noise of a sample of base [m/s2] and m0 [m/s], on the virtual rig including its converter."""
 TARGET = 0.02
 
 

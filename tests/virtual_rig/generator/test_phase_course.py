@@ -9,7 +9,7 @@ from vibench.virtual_rig.generator.phase_course import Spacing, SteadyPhase, Swe
 DAY_S = 86_400.0
 TIMES = st.floats(0, DAY_S)
 FREQUENCIES = st.integers(1, 25_000_000_000_000)
-"""Microhertz."""
+"""Frequencies in microhertz."""
 
 
 def turn(first, second):
