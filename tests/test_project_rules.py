@@ -30,7 +30,7 @@ IMPERATIVES = {"Bring", "Embed", "Exceed", "Feed", "Focus", "Need", "Proceed", "
 NO_VERBS = {"A", "An", "Each", "Every", "If", "It", "No", "The", "There", "What", "Where", "Who"}
 
 
-@pytest.mark.timeout(300)  # mypy without a cache, beside another test, on two cores
+@pytest.mark.timeout(300)  # mypy without a cache, together with another test, on two cores
 @pytest.mark.parametrize(
     "command",
     [

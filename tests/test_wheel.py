@@ -150,7 +150,7 @@ def test_the_vibench_command_works_as_a_module_and_as_a_program(python, users_fo
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)  # all kernels are compiled: an installation has its own
+@pytest.mark.timeout(900)  # an installation compiles all its kernels at first use
 def test_a_shipped_campaign_is_measured_and_analysed_from_the_wheel(python, users_folder):
     run(python, "-m", "vibench.cli", "measure", "quick", "--out", "recordings", cwd=users_folder)
     run(python, "-m", "vibench.cli", "analyse", "recordings/noise.h5", "--out", "analysed", cwd=users_folder)

@@ -267,7 +267,7 @@ class LoopbackDigitizer:
         self._waiting = np.concatenate((self._waiting, volts), axis=1)
 
     def _integrated(self, acceleration: Samples) -> Samples:
-        """Return the velocity of this acceleration; it forgets what is some seconds old."""
+        """Return the velocity of this acceleration; contributions older than some seconds decay."""
         leak = 1 - 2 * np.pi * 0.1 / SAMPLE_RATE_HZ
         velocity, self._velocity = lfilter([1 / SAMPLE_RATE_HZ], [1, -leak], acceleration, zi=self._velocity)
         return velocity

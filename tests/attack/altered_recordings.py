@@ -202,7 +202,7 @@ ALTERATIONS: tuple[Callable[[Path, random.Random], str], ...] = (
 # --- the commands -----------------------------------------------------------------------------
 
 
-def _output(folder: Path, *arguments: str) -> tuple[int, str]:
+def run_reader(folder: Path, *arguments: str) -> tuple[int, str]:
     from vibench.cli.__main__ import main
 
     out, argv = io.StringIO(), sys.argv
@@ -235,11 +235,11 @@ def fooled_readers(folder: Path, name: str) -> list[str]:
     }
     found = []
     for word, arguments in commands.items():
-        code, text = _output(folder, *arguments)
+        code, text = run_reader(folder, *arguments)
         is_warned = word in {"analyse", "analyse folder", "export"} and any(each in text for each in WARNED)
         if code == -1 or not (code == 1 or is_warned):
             found.append(f"{word}: {code} {text[:300]}")
-    code, text = _output(folder, "catalogue", ".")
+    code, text = run_reader(folder, "catalogue", ".")
     if code == -1 or not any(line.startswith(name) and "good" not in line for line in text.splitlines()):
         found.append(f"catalogue: {code} {text[:300]}")
     try:

@@ -96,7 +96,7 @@ class Trial:
             self._viewer = None
 
     def status_faults(self) -> tuple[str, ...]:
-        """Return faults of the engine: no status, a traceback, too much memory or too many descriptors."""
+        """Request a status; return faults of the process: a traceback, too much memory or descriptors."""
         process = self._process
         with EngineClient.attach(self._address) as client:
             client.stop("off")

@@ -144,7 +144,7 @@ def _fill(message: Any, chance: random.Random, strange: float) -> None:
         is_known = field.name in USUAL
         is_strange = chance.random() < strange
         if field.message_type is not None:
-            if field.default_value != []:  # repeated fields would be too many
+            if field.default_value != []:  # a field that is not repeated
                 _fill(getattr(message, field.name), chance, strange)
                 getattr(message, field.name).SetInParent()
             continue

@@ -12,7 +12,7 @@ OTHERS = (None, True, False, [], {}, [[]], [None] * 50, {"": {}}, {"ask": "stop"
 
 
 def mutated_json(document: Any, chance: random.Random) -> bytes:
-    """Change one to three places of a document; at times a few of its bytes too."""
+    """Change one to three places of a document; sometimes a few bytes too."""
     changed = json.loads(json.dumps(document))
     for _ in range(chance.randint(1, 3)):
         changed = _change(changed, chance)

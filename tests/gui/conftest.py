@@ -108,7 +108,7 @@ def window(context, own_state, tmp_path, qapp):
 
 @pytest.fixture(scope="module")
 def lasting_window(own_state, tmp_path_factory, qapp):
-    """One window for all tests of a module: they look at it, or set first what they depend on."""
+    """One window for all tests of a module, which do not rely on its initial state."""
     folder = tmp_path_factory.mktemp("window")
     context = AppContext(Settings(folder / "window.ini"))
     window = opened(context, folder)

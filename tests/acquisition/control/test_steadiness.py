@@ -100,7 +100,7 @@ def test_the_uncertainty_of_the_scatter_covers_repeated_measurements():
     found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)
-    # Stated is one degree of freedom a period; in white noise ten coordinates make the scatter smaller.
+    # The stated value assumes one degree of freedom per period; white noise has ten, and less scatter.
     assert scatter.std() <= np.mean([each.scatter_u for each in found])
 
 

@@ -37,7 +37,7 @@ class Silent:
 
 
 def card_rig(rig, **options):
-    """Give the virtual rig with a sound card in the place of its converter and generator."""
+    """Return the virtual rig with a sound card as converter and output, and without generator."""
     by_role = {channel.role.value: channel for channel in rig.daq.channels}
     channels = tuple(
         by_role[role].model_copy(
@@ -60,10 +60,10 @@ def card_rig(rig, **options):
 
 
 class PortAudio:
-    """The calls of PortAudio 19 that sounddevice makes of one card; time passes while samples are wanted.
+    """The PortAudio 19 calls of sounddevice for one card; time advances while samples are requested.
 
-    A test may change `codes` (what opening, starting and aborting return), `reported_hz`, `most_inputs`,
-    `name`, `text`, and `heard`, which gets each block of samples and gives it with its flags, or None.
+    A test may change `codes` (results of opening, starting and aborting), `reported_hz`, `most_inputs`,
+    `name`, `text`, and `heard`, which receives each block of samples and returns it with its flags, or None.
     """
 
     def __init__(self, ffi, name=CARD):
@@ -80,7 +80,7 @@ class PortAudio:
         self.thread = None
 
     def wire(self, world, wanted):
-        """Plug the jacks of `card_rig` into a world; samples pass while ``wanted`` says so."""
+        """Connect the jacks of `card_rig` to a world; samples flow while ``wanted`` returns true."""
         self.world, self.wanted = world, wanted
         self.inputs, self.output = [f"{CARD}/in{number}" for number in range(len(WIRES))], f"{CARD}/ao0"
         self.in_v, self.out_v = CALIBRATION["input_full_scale_v"], CALIBRATION["output_full_scale_v"]
@@ -164,7 +164,7 @@ class PortAudio:
     Pa_StopStream = Pa_CloseStream = Pa_AbortStream
 
     def turn(self):
-        """Call back, block after block, as a sound card does."""
+        """Call back block by block, as a sound card does."""
         taken = tuple(Input(name, self.in_v, Coupling.AC) for name in self.inputs)
         sampler = self.world.sample(taken, self.rate_hz)
         heard = np.zeros((FRAMES, self.channels[0]), dtype=np.float32)
@@ -188,7 +188,7 @@ class PortAudio:
 
 @cache
 def simulated():
-    """Load the real sounddevice on a simulated PortAudio, once; give it."""
+    """Load the real sounddevice on a simulated PortAudio once; return the simulation."""
     from _sounddevice import ffi
 
     audio = PortAudio(ffi)
@@ -203,5 +203,5 @@ def simulated():
     found = patch("ctypes.util.find_library", lambda name: "it" if name == "portaudio" else real(name))
     with found, patch.dict(sys.modules, {"_sounddevice": SimpleNamespace(ffi=Loading())}):
         import sounddevice
-    sys.modules["sounddevice"] = sounddevice  # which the patch has taken out again
+    sys.modules["sounddevice"] = sounddevice  # the patch has removed the module
     return audio

@@ -1,4 +1,4 @@
-"""What a plan may wait for, and what is refused in a sentence."""
+"""Results that a plan may wait for, and plans with `until` that are refused."""
 
 import pytest
 from pydantic import ValidationError
@@ -51,7 +51,7 @@ def test_an_until_bound_is_given_as_percentage_or_fraction(said, meant):
 
 
 @pytest.mark.parametrize("said", ["1", "1.2.3 %", "-1 %", "0 %", "100 %", "nan %", True, 0, 1.5, "", "٣ %"])
-def test_an_invalid_bound_is_refused(said):
+def test_an_invalid_until_bound_is_refused(said):
     with pytest.raises(ValidationError):
         plan("dwell", {"response_i": said})
 
@@ -70,8 +70,8 @@ def test_a_plan_without_until_is_accepted():
 
 
 @pytest.mark.parametrize(("kind", "most_s"), [("dwell", 60), ("streamed_noise", 60), ("stepped_sine", 2)])
-def test_an_earliest_end_after_the_planned_end_is_refused(kind, most_s):
-    """Steps of less than the usual 2 s, which plans have that do not name it, are analysed at their end."""
+def test_an_until_time_longer_than_the_planned_recording_is_refused(kind, most_s):
+    """Steps shorter than the default of 2 s are analysed at their end if the plan gives no shortest_s."""
     name = sorted(ALLOWED[kind])[0]
     assert plan(kind, {name: "1 %", "shortest_s": most_s}).until.shortest_s == most_s
     with pytest.raises(ValidationError, match=r"until\.shortest_s = .* is longer than the"):

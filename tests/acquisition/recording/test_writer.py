@@ -139,7 +139,7 @@ def test_an_open_ended_recording_has_no_fixed_length(tmp_path, make_header, make
     header = make_header(expected_samples=None)
     with create_recording(tmp_path / "a.h5", header) as writer:
         claimed = disk_bytes(tmp_path)
-        for first in range(0, 200_000, 10_000):  # 200 s: three times what is reserved at the start
+        for first in range(0, 200_000, 10_000):  # 200 s is three times the duration reserved at the start
             counts, block = make_block(first, 10_000)
             writer.append(block)
     assert claimed < 20e6, "a day is declared, but only a minute may be claimed"

@@ -22,7 +22,7 @@ def drive_blocks(cycles, amplitude_v=0.1, noise_v=1e-3, offset_v=0.0, block=512,
 
 
 def excess(tones, late_s, step_s, **noise):
-    """Play tones that begin ``late_s`` too late, except for the first; return the lost cycles."""
+    """Play tones that begin ``late_s`` too late, except for the first; return the excess cycles."""
     time_s = np.arange(round(len(tones) * step_s * RATE)) / RATE
     number = np.clip(((time_s - late_s) / step_s).astype(int), 0, len(tones) - 1)
     cycles = np.cumsum(np.array(tones)[number]) / RATE

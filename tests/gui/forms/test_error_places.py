@@ -1,4 +1,4 @@
-"""Errors are shown at the field that causes them, also errors that only the whole model finds."""
+"""Errors are shown at the field that causes them, even if only the whole model finds them."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Labels of an axis do not overlap; those of a logarithmic one are at 1, 2 and 5 of every decade."""
+"""Labels of an axis do not overlap; labels of a logarithmic axis are at 1, 2 and 5 of every decade."""
 
 from itertools import pairwise
 from math import log10

@@ -1,4 +1,4 @@
-"""Vertical stripes and lines are visible, also if they are thin and many."""
+"""Vertical stripes and lines are visible, even if they are thin and many."""
 
 import pytest
 

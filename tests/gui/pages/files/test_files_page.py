@@ -88,7 +88,7 @@ def page(shared_page, folder, wait_for):
 
 @pytest.fixture
 def opened(page, folder, wait_for):
-    """Open a recording by its row, and wait for its lanes."""
+    """Open a recording by its row, and wait until its time histories are shown."""
 
     def open_row(name):
         page.table.choose(folder / name)

@@ -1,4 +1,4 @@
-"""Rows of a campaign show held levels and states."""
+"""Rows of a campaign show held base levels and states."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The bench given on the command line: an unusable one is explained and not remembered."""
+"""The bench of the command line: an unusable bench is explained and not remembered."""
 
 import pytest
 
