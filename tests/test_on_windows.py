@@ -54,7 +54,7 @@ print(is_being_recorded(path))
 """
 
 
-def ran(*words, folder=ROOT, fails=False):
+def call(*words, folder=ROOT, fails=False):
     found = subprocess.run(
         [sys.executable, *words], cwd=folder, capture_output=True, text=True, check=False, timeout=280
     )
@@ -73,11 +73,11 @@ def here(tmp_path, monkeypatch):
 def test_the_posix_functions_removed_for_windows_tests_exist_here():
     # A misspelt name, or one removed from Python, would test nothing.
     program = f"import os; print(sum(hasattr(os, each) for each in {POSIX_ONLY!r}))"
-    assert int(ran("-c", program).stdout) > 25
+    assert int(call("-c", program).stdout) > 25
 
 
 def test_windows_locks_mark_a_bench_and_a_recording_as_in_use(here):
-    said = ran("-c", LOCKS.format(folder=str(here))).stdout.splitlines()
+    said = call("-c", LOCKS.format(folder=str(here))).stdout.splitlines()
     assert "is in use by process" in said[0]
     assert said[1:] == ["True b'\\x00\\x00abc\\x00\\x00\\x00'", "False"]
 
@@ -87,20 +87,20 @@ def test_windows_locks_mark_a_bench_and_a_recording_as_in_use(here):
 def test_a_campaign_is_measured_verified_and_analysed_on_windows(here):
     rig = str(ROOT / "hardware_configs" / "virtual_rig.toml")
     measure = ("-m", "tests.windows_here", "measure", "campaign.toml", "--bench", rig, "--out", "a folder")
-    ran(*measure, folder=here)
+    call(*measure, folder=here)
     (path,) = (here / "a folder").glob("*.h5")
     with open_recording(path) as recording:
         assert recording.state.value == "complete"
         assert recording.check_seal("whole").state.value == "intact"
-    found = ran("-m", "tests.windows_here", "analyse", str(path), "--json", folder=here)
+    found = call("-m", "tests.windows_here", "analyse", str(path), "--json", folder=here)
     assert "response" in json.dumps(json.loads(found.stdout))
-    ran("-m", "tests.windows_here", "verify", "a folder", folder=here)
-    ran(*measure, folder=here, fails=True)
+    call("-m", "tests.windows_here", "verify", "a folder", folder=here)
+    call(*measure, folder=here, fails=True)
 
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_a_study_on_windows_is_solved_by_spawned_processes(here):
-    ran("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--workers", "1", folder=here)
-    again = ran("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--resume", folder=here)
+    call("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--workers", "1", folder=here)
+    again = call("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--resume", folder=here)
     assert "2 of 2 points, 0 failed (complete)" in again.stdout

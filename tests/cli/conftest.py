@@ -58,7 +58,7 @@ def vibench_here() -> Vibench:
 
 
 @pytest.fixture
-def answered(vibench_here, tmp_path):
+def output_of(vibench_here, tmp_path):
     """Run a command that must succeed in the test's folder; return its JSON, or its standard output."""
 
     def run(*arguments):

@@ -16,9 +16,9 @@ from .killed_campaign import short_points, slow_rig
 HARDWARE_CONFIGS = Path(__file__).parents[2] / "hardware_configs"
 
 
-def test_an_estimate_is_one_json_document_and_writes_no_file(answered, tmp_path):
+def test_an_estimate_is_one_json_document_and_writes_no_file(output_of, tmp_path):
     plan, bench = short_points(tmp_path, 3), slow_rig(tmp_path)
-    told = answered("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
+    told = output_of("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
     assert (told["recordings"], told["kept"], told["fits"]) == (3, 0, True)
     assert abs(told["duration_s"] - 3 * (0.6 + 0.08 + 0.3 + 0.1 + 0.08)) < 1e-6
     assert not (tmp_path / "out").exists()
@@ -43,12 +43,12 @@ def test_a_campaign_is_logged_catalogued_and_its_end_notified(vibench, tmp_path)
 
 
 @pytest.mark.thorough
-def test_a_campaign_accepts_only_a_knob_sheet_with_its_own_settings(answered, vibench_here, tmp_path):
+def test_a_campaign_accepts_only_a_knob_sheet_with_its_own_settings(output_of, vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
-    answered("bench", "check", "--bench", bench, "--knobs", knobs)
+    output_of("bench", "check", "--bench", bench, "--knobs", knobs)
     knobs.write_text(knobs.read_text().replace('"simulated"', '"A. Student"'))
-    answered(*campaign, "--out", "out")
+    output_of(*campaign, "--out", "out")
     with open_recording(next(tmp_path.glob("out/*.h5"))) as recording:
         assert recording.confirmations["operator"] == "A. Student"
     knobs.write_text(knobs.read_text().replace('"10 dB"', '"20 dB"'))

@@ -113,8 +113,8 @@ def test_missing_instruments_are_reported_in_one_sentence(refusal, tmp_path):
     assert "no instrument answers at USB0" in said
 
 
-def test_the_instruments_of_the_virtual_rig_are_listed_by_name(answered):
-    found = answered("bench", "list", "--bench", ROOT / "hardware_configs" / "virtual_rig.toml", "--json")
+def test_the_instruments_of_the_virtual_rig_are_listed_by_name(output_of):
+    found = output_of("bench", "list", "--bench", ROOT / "hardware_configs" / "virtual_rig.toml", "--json")
     assert any("1689::851" in name for name in found["visa"])
     assert any(line.startswith("vibench.generators: afg1022x, ") for line in found["plug-ins"])
     assert any(device.startswith("cDAQ1Mod1: NI 9234") for device in found["daq"])

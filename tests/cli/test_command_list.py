@@ -54,6 +54,6 @@ def test_a_prediction_without_a_file_needs_neither_scipy_nor_h5py(point):
     assert {"scipy", "h5py", "matplotlib"}.isdisjoint(loaded)
 
 
-def test_a_command_group_loads_its_own_commands(answered):
-    assert "vibench bench check [OPTIONS]" in answered("bench", "check", "--help")
+def test_a_command_group_loads_its_own_commands(output_of):
+    assert "vibench bench check [OPTIONS]" in output_of("bench", "check", "--help")
     assert isinstance(COMMANDS["bench"].load(), typer.Typer)

@@ -21,10 +21,10 @@ role = "m0_velocity"
 """
 
 
-def test_a_crate_keeps_a_folder_name_that_contains_a_dot(recorded, tmp_path):
+def test_a_crate_keeps_a_folder_name_that_contains_a_dot(h5_path, tmp_path):
     folder = tmp_path / "lauf 0.5Vpp"
     folder.mkdir()
-    recorded.rename(folder / "run.h5")
+    h5_path.rename(folder / "run.h5")
     licence = "https://creativecommons.org/licenses/by/4.0/"
     packed = CliRunner().invoke(app, ["pack", str(folder), "--license", licence])
     assert packed.exit_code == 0, packed.output
@@ -32,7 +32,7 @@ def test_a_crate_keeps_a_folder_name_that_contains_a_dot(recorded, tmp_path):
 
 
 @pytest.fixture
-def recorded(tmp_path):
+def h5_path(tmp_path):
     channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)
     header = RecordingHeader((channel,), 1000.0, 2000, Origin.SIMULATED)
     with create_recording(tmp_path / "run.h5", header) as writer:
@@ -41,43 +41,43 @@ def recorded(tmp_path):
 
 
 @pytest.fixture
-def run(recorded, monkeypatch):
+def run(h5_path, monkeypatch):
     """Run a command in the recording's folder, in this process: starting a new process takes seconds."""
-    monkeypatch.chdir(recorded.parent)
+    monkeypatch.chdir(h5_path.parent)
     return lambda *arguments: CliRunner().invoke(app, arguments)
 
 
-def test_a_recording_round_trips_through_export_and_import(run, recorded):
+def test_a_recording_round_trips_through_export_and_import(run, h5_path):
     out = run("export", "run.h5", "--to", "uff", "--until", "1.5")
     assert out.stdout.splitlines() == ["wrote run.uff", "wrote run.uff.facts.json"]
     (channel,) = json.loads(run("import", "run.uff", "--json").stdout)["channels"]
     assert (channel["name"], channel["label"], channel["samples"]) == ("1", "m0_velocity", 1500)
-    recorded.with_name("map.toml").write_text(MAPPING)
+    h5_path.with_name("map.toml").write_text(MAPPING)
     back = run("import", "run.uff", "--mapping", "map.toml", "--out", "back.h5", "--json")
     assert json.loads(back.stdout) == {"recording": "back.h5"}
-    with open_recording(recorded) as first, open_recording(recorded.with_name("back.h5")) as second:
+    with open_recording(h5_path) as first, open_recording(h5_path.with_name("back.h5")) as second:
         wanted = first.read("m0_velocity", 0, 1500)
         np.testing.assert_allclose(second.read("m0_velocity"), wanted, rtol=0, atol=1e-8)
         assert [each.label for each in second.segments] == ["dwell"]
 
 
 @pytest.mark.parametrize("folder", [".", "made", "..", "made/", "new/", "other/new"])
-def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folder):
+def test_an_export_into_a_folder_gets_the_default_file_name(run, h5_path, folder):
     """An existing folder, "." and a new folder as target all get the default file name."""
-    recorded.with_name("made").mkdir()
-    place = recorded.parent / folder
+    h5_path.with_name("made").mkdir()
+    place = h5_path.parent / folder
     out = run("export", "run.h5", "--to", "csv", "--out", folder)
     assert out.exit_code == 0, out.output
     assert (place / "run.csv").is_file()
     run("export", "run.h5", "--to", "uff", "--out", "other.uff")
-    recorded.with_name("map.toml").write_text(MAPPING)
+    h5_path.with_name("map.toml").write_text(MAPPING)
     back = run("import", "other.uff", "--mapping", "map.toml", "--out", folder)
     assert back.exit_code == 0, back.output
     assert (place / "other.h5").is_file()
     licence = "https://creativecommons.org/licenses/by/4.0/"
-    packed = run("pack", str(recorded.parent), "--license", licence, "--out", folder)
+    packed = run("pack", str(h5_path.parent), "--license", licence, "--out", folder)
     assert packed.exit_code == 0, packed.output
-    assert (place / f"{recorded.parent.name}.zip").is_file()
+    assert (place / f"{h5_path.parent.name}.zip").is_file()
 
 
 @pytest.mark.parametrize(
@@ -101,13 +101,13 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folde
         (("import", "run.h5", "--mapping", "map.toml"), "run.h5 exists, and nothing is ever overwritten"),
     ],
 )
-def test_invalid_exchanges_are_refused_without_leftovers(run, recorded, arguments, said):
-    recorded.with_name("map.toml").write_text("sample_rate_hz = 1000.0\n" + MAPPING)
+def test_invalid_exchanges_are_refused_without_leftovers(run, h5_path, arguments, said):
+    h5_path.with_name("map.toml").write_text("sample_rate_hz = 1000.0\n" + MAPPING)
     assert said in str(run(*arguments).exception)
-    assert sorted(each.name for each in recorded.parent.iterdir()) == ["map.toml", "run.h5"]
+    assert sorted(each.name for each in h5_path.parent.iterdir()) == ["map.toml", "run.h5"]
 
 
-def test_a_refusal_is_one_sentence_on_standard_error(vibench, recorded, tmp_path):
+def test_a_refusal_is_one_sentence_on_standard_error(vibench, h5_path, tmp_path):
     (tmp_path / "run.csv").touch()
     result = vibench("export", "run.h5", "--to", "csv", cwd=tmp_path)
     assert (result.returncode, result.stdout) == (1, "")

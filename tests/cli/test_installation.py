@@ -59,17 +59,17 @@ def run_without(libraries, *arguments, cwd):
     return run_vibench(WITHOUT.format(libraries=libraries, arguments=tuple(map(str, arguments))), cwd)
 
 
-def test_the_version_matches_the_package(answered):
-    assert answered("--version") == f"vibench {version('vibench')}\n"
+def test_the_version_matches_the_package(output_of):
+    assert output_of("--version") == f"vibench {version('vibench')}\n"
 
 
-def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(answered, tmp_path):
-    assert answered("study", "paper", "--out", "out.h5", "--estimate", "--json")["points"] == 17730
+def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(output_of, tmp_path):
+    assert output_of("study", "paper", "--out", "out.h5", "--estimate", "--json")["points"] == 17730
     assert not (tmp_path / "out.h5").exists()
 
 
-def test_copies_of_shipped_files_are_complete_and_never_overwrite(answered, refusal, tmp_path):
-    answered("examples", "--copy", "mine")
+def test_copies_of_shipped_files_are_complete_and_never_overwrite(output_of, refusal, tmp_path):
+    output_of("examples", "--copy", "mine")
     for folder in ("campaigns", "hardware_configs", "studies", "examples"):
         for path in shipped_folder(folder).rglob("*.toml"):
             copy = tmp_path / "mine" / folder / path.relative_to(shipped_folder(folder))
@@ -80,14 +80,14 @@ def test_copies_of_shipped_files_are_complete_and_never_overwrite(answered, refu
     assert changed.read_text(encoding="utf-8") == "changed"
 
 
-def test_every_shipped_example_has_a_unique_name(answered):
-    for line in answered("examples").splitlines()[:-1]:
+def test_every_shipped_example_has_a_unique_name(output_of):
+    for line in output_of("examples").splitlines()[:-1]:
         names = line.partition(": ")[2].split(", ")
         assert len(names) == len(set(names)), line
 
 
-def test_studies_are_listed_as_toml_files(answered):
-    listed = answered("examples", "--json")["studies"]
+def test_studies_are_listed_as_toml_files(output_of):
+    listed = output_of("examples", "--json")["studies"]
     assert {Path(each).suffix for each in listed} == {".toml"}
 
 

@@ -37,8 +37,8 @@ def plan(folder, text):
     return path
 
 
-def test_an_estimate_writes_no_file(answered, tmp_path):
-    told = answered("map", plan(tmp_path, MAP), "--out", "a", "--estimate", "--json")
+def test_an_estimate_writes_no_file(output_of, tmp_path):
+    told = output_of("map", plan(tmp_path, MAP), "--out", "a", "--estimate", "--json")
     assert (told["points"], told["coarse_points"]) == (63, 9)
     assert told["most_s"] >= told["first_s"] > 0.0
     assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
@@ -46,9 +46,9 @@ def test_an_estimate_writes_no_file(answered, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("text", [MAP, DIAGRAM], ids=["map", "diagram"])
-def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(answered, refusal, tmp_path, text):
+def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(output_of, refusal, tmp_path, text):
     asked = plan(tmp_path, text)
-    told = answered("map", asked, "--out", "a", "--json")
+    told = output_of("map", asked, "--out", "a", "--json")
     assert told["is_complete"]
     assert told["computed"] == open_map(tmp_path / "a" / FILE).computed
     with xarray.open_dataset(tmp_path / "a" / FILE, engine="h5netcdf") as labelled:
@@ -59,11 +59,11 @@ def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(answered, refusal
         assert labelled["response_i"].dims[-2:] == ("start", "frequency")
     assert {"map.h5", "map.png", "map.svg"} <= {path.name for path in (tmp_path / "a").iterdir()}
     assert "nothing is ever overwritten" in refusal("map", asked, "--out", "a")
-    assert answered("map", asked, "--out", "a", "--resume", "--json")["motions"] == told["motions"]
+    assert output_of("map", asked, "--out", "a", "--resume", "--json")["motions"] == told["motions"]
 
 
-def test_a_basin_map_reports_shares_and_kicks(answered, tmp_path):
-    told = answered("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "4", "--json")
+def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path):
+    told = output_of("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "4", "--json")
     assert sum(each["share"] for each in told["motions"]) == pytest.approx(1.0)
     assert len(told["kicks"]) == 3 * len(told["motions"])
 
@@ -75,8 +75,8 @@ def test_a_basin_map_reports_shares_and_kicks(answered, tmp_path):
         (LINE, "it needs ranges for two coordinates"),
     ],
 )
-def test_a_basin_map_explains_a_missing_boundary_exponent(answered, tmp_path, text, why):
-    printed = answered("map", plan(tmp_path, text), "--out", "a")
+def test_a_basin_map_explains_a_missing_boundary_exponent(output_of, tmp_path, text, why):
+    printed = output_of("map", plan(tmp_path, text), "--out", "a")
     assert f"The uncertainty exponent is not determined: {why}" in printed
 
 

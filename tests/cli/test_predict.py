@@ -35,9 +35,9 @@ def test_a_prediction_equals_the_engine_result_at_every_frequency(vibench, tmp_p
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_prediction_until_settled_has_kind_and_error(answered):
+def test_a_prediction_until_settled_has_kind_and_error(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", "94:260:166", "--duration", "auto")
-    periodic, chaotic = answered("predict", *asked, "--json")["points"]
+    periodic, chaotic = output_of("predict", *asked, "--json")["points"]
     assert (periodic["motion"], periodic["period"]) == ("periodic", 1)
     assert periodic["error_estimate"] < 1e-6
     assert periodic["duration_s"] < 5.0
@@ -46,24 +46,24 @@ def test_a_prediction_until_settled_has_kind_and_error(answered):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_requested_lyapunov_exponent_is_given_with_its_error(answered):
+def test_a_requested_lyapunov_exponent_is_given_with_its_error(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov")
-    (point,) = answered("predict", *asked, "--duration", 6, "--window", 1, "--json")["points"]
+    (point,) = output_of("predict", *asked, "--duration", 6, "--window", 1, "--json")["points"]
     assert point["lyapunov_per_s"] > 50
     assert 0 < point["lyapunov_error_per_s"] < 30
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_prediction_prints_a_table_and_reasons(answered):
-    printed = answered("predict", "--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT)
+def test_a_prediction_prints_a_table_and_reasons(output_of):
+    printed = output_of("predict", "--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT)
     assert "Responses I and II" in printed
     assert "\n300 Hz: event driven. No stop is touched, but the transient has not decayed" in printed
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_points_with_equal_explanations_share_one_line(answered):
+def test_points_with_equal_explanations_share_one_line(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", "200:244:2", "--duration", 8, "--window", 1)
-    told = [line for line in answered("predict", *asked, "--explain").splitlines() if " points, " in line]
+    told = [line for line in output_of("predict", *asked, "--explain").splitlines() if " points, " in line]
     assert [line.split(":")[0] for line in told] == ["11 points, 200 to 220 Hz", "12 points, 222 to 244 Hz"]
     assert "At 220 Hz: No stop is touched: abs(p) stays below 43.8 um" in told[0]
 
@@ -140,25 +140,25 @@ def test_a_non_numeric_budget_is_refused_in_a_sentence(refusal):
         assert said in refusal("predict", *FORGETFUL, f"--budget={given}")
 
 
-def test_a_requested_error_is_reached_and_stated(answered):
+def test_a_requested_error_is_reached_and_stated(output_of):
     asked = ("predict", "--amplitude", 20e-6, "--frequency", 130, "--error", "1 %", "--time", "20 s")
-    (point,) = answered(*asked, "--json")["points"]
+    (point,) = output_of(*asked, "--json")["points"]
     assert point["error_estimate"] < 1e-6
     assert point["target"]["is_met"]
     assert point["target"]["wanted_error"] == 0.01
-    assert " % reached in " in answered(*asked)
+    assert " % reached in " in output_of(*asked)
 
 
-def test_start_dependence_has_the_same_label_in_table_and_json(answered):
+def test_start_dependence_has_the_same_label_in_table_and_json(output_of):
     asked = ("predict", "--amplitude", 5e-6, "--frequency", 260, "--error", "50 %")
-    (point,) = answered(*asked, "--json")["points"]
-    (row,) = [each for each in answered(*asked).splitlines() if "chaotic" in each]
+    (point,) = output_of(*asked, "--json")["points"]
+    (row,) = [each for each in output_of(*asked).splitlines() if "chaotic" in each]
     assert (point["memory"], row.split()[-1]) == ("lost", "lost")
 
 
-def test_every_point_of_a_curve_reaches_the_requested_error(answered):
+def test_every_point_of_a_curve_reaches_the_requested_error(output_of):
     asked = ("predict", "--amplitude", 20e-6, "--frequency", "128:132:2", "--error", "0.01")
-    assert "3 of 3 points reached an error of 1 %" in answered(*asked)
+    assert "3 of 3 points reached an error of 1 %" in output_of(*asked)
 
 
 @pytest.mark.parametrize(

@@ -89,15 +89,15 @@ def test_all_commands_agree_on_a_specimen_with_one_stop(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("command", [("specimen",), ("chain", "--cells", 1, "--specimen")])
-def test_json_states_a_missing_stop_as_an_infinite_gap(answered, tmp_path, command):
-    document = answered(*command, one_sided_specimen(tmp_path), "--json")
+def test_json_states_a_missing_stop_as_an_infinite_gap(output_of, tmp_path, command):
+    document = output_of(*command, one_sided_specimen(tmp_path), "--json")
     described = document.get("options", {}).get("described", document)
     assert described["gap_m"] == [30e-6, "inf"]
 
 
-def test_a_printed_specimen_with_one_stop_loads_unchanged(answered, tmp_path):
+def test_a_printed_specimen_with_one_stop_loads_unchanged(output_of, tmp_path):
     path, own = one_sided_specimen(tmp_path), tmp_path / "own.toml"
-    own.write_text(answered("specimen", path, "--toml"), encoding="utf-8")
+    own.write_text(output_of("specimen", path, "--toml"), encoding="utf-8")
     assert load_specimen(own).specimen() == load_specimen(path).specimen()
 
 
@@ -120,24 +120,24 @@ def test_fifty_random_specimens_pass_the_bench_check_on_the_virtual_rig(tmp_path
     assert refused == []
 
 
-def test_the_specimen_list_contains_every_specimen_and_contact_law(answered):
-    said = answered("specimen", "--json")
+def test_the_specimen_list_contains_every_specimen_and_contact_law(output_of):
+    said = output_of("specimen", "--json")
     assert said["specimens"].keys() == shipped_specimens().keys()
     assert {"hertz", "linear", "rigid:0..1"} <= said["contact_laws"].keys()
     assert all(said["specimens"].values())
     assert all(said["contact_laws"].values())
 
 
-def test_a_printed_specimen_is_a_valid_file(answered, tmp_path):
-    printed = answered("specimen", "asymmetric", "--toml")
+def test_a_printed_specimen_is_a_valid_file(output_of, tmp_path):
+    printed = output_of("specimen", "asymmetric", "--toml")
     own = tmp_path / "own.toml"
     own.write_text(printed, encoding="utf-8")
     assert tomllib.loads(printed)["gap_m"] == [30e-6, 60e-6]
     assert load_specimen(own).specimen() == load_specimen("asymmetric").specimen()
 
 
-def test_the_specimen_command_prints_the_resonances_of_the_paper(answered):
-    said = answered("specimen", "gong2025", "--json")
+def test_the_specimen_command_prints_the_resonances_of_the_paper(output_of):
+    said = output_of("specimen", "gong2025", "--json")
     assert said["resonances_without_contact_hz"] == pytest.approx([94.6, 266.2, 499.6], abs=0.05)
     assert said["resonances_with_m1_held_hz"] == pytest.approx([201.5, 436.0], abs=0.05)
 
@@ -153,8 +153,8 @@ def test_an_unknown_specimen_is_reported_in_one_sentence(vibench_here, tmp_path,
     assert "gong2025" in ended.stderr
 
 
-def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(answered, tmp_path):
-    answered("specimen", "asymmetric", "--forces", "drawn")
+def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(output_of, tmp_path):
+    output_of("specimen", "asymmetric", "--forces", "drawn")
     (table,) = (tmp_path / "drawn").glob("contact_forces_hertz*.csv")
     text = table.read_text(encoding="utf-8")
     p_m, pressed_n, let_go_n = np.genfromtxt(text.splitlines(), delimiter=",", names=True).view((float, 3)).T
@@ -169,21 +169,21 @@ def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(answered, tmp_path):
     assert "-0," not in text
 
 
-def test_the_forces_of_all_laws_are_drawn(answered, tmp_path):
-    answered("specimen", "--forces", "drawn")
+def test_the_forces_of_all_laws_are_drawn(output_of, tmp_path):
+    output_of("specimen", "--forces", "drawn")
     assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("name", shipped_specimens())
-def test_every_shipped_specimen_is_reported(answered, name):
-    assert "contact law: " in answered("specimen", name)
+def test_every_shipped_specimen_is_reported(output_of, name):
+    assert "contact law: " in output_of("specimen", name)
 
 
-def test_a_specimen_is_printed_with_units_and_contact_law(answered, tmp_path):
-    said = answered("specimen", "gong2025")
+def test_a_specimen_is_printed_with_units_and_contact_law(output_of, tmp_path):
+    said = output_of("specimen", "gong2025")
     assert "masses [kg]: 0.0058, 0.0021, 0.002" in said
     assert "stiffnesses [N/m]: 23741" in said
     assert "dampings [N s/m]:" in said
     assert "contact law: hertz, stiffness 4.89108e+09" in said
     nameless = random_specimen(tmp_path, np.random.default_rng(1))
-    assert answered("specimen", nameless).splitlines()[0] == "random"
+    assert output_of("specimen", nameless).splitlines()[0] == "random"

@@ -41,22 +41,22 @@ def plan(folder, text=SMALL):
     return path
 
 
-def test_an_estimate_counts_points_and_work_without_a_file(answered, tmp_path):
+def test_an_estimate_counts_points_and_work_without_a_file(output_of, tmp_path):
     told = {}
     for duration_s in (0.5, 5.0):
         asked = plan(tmp_path, SMALL.replace("duration_s = 0.5", f"duration_s = {duration_s}"))
-        told[duration_s] = answered("study", asked, "--out", "a.h5", "--estimate", "--json")
+        told[duration_s] = output_of("study", asked, "--out", "a.h5", "--estimate", "--json")
     assert [each["points"] for each in told.values()] == [12, 12]
     assert 3.0 < told[5.0]["work_s"] / told[0.5]["work_s"] <= 10.5
-    assert "12 points, estimated work" in answered("study", asked, "--out", "a.h5", "--estimate")
+    assert "12 points, estimated work" in output_of("study", asked, "--out", "a.h5", "--estimate")
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 
 @pytest.mark.thorough
 @pytest.mark.timeout(COMPILING_S)
-def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(answered, refusal, tmp_path):
+def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(output_of, refusal, tmp_path):
     asked = plan(tmp_path)
-    said = answered("study", asked, "--out", "a.h5", "--json")
+    said = output_of("study", asked, "--out", "a.h5", "--json")
     assert (said["points"], said["kept"], said["failures"]) == (12, 12, [])
     results = open_study(tmp_path / "a.h5")
     assert np.all(results.state == PointState.DONE)
@@ -65,7 +65,7 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(an
     assert "a.h5 exists, and nothing is ever overwritten; resume it" in refusal(
         "study", asked, "--out", "a.h5"
     )
-    resumed = answered("study", asked, "--out", "a.h5", "--resume", "--workers", "1")
+    resumed = output_of("study", asked, "--out", "a.h5", "--resume", "--workers", "1")
     assert "12 of 12 points, 0 failed (complete)" in resumed
     assert (tmp_path / "a.h5").read_bytes() == before
 

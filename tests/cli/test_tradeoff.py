@@ -3,9 +3,9 @@
 import pytest
 
 
-def test_the_tradeoff_of_a_scene_lists_the_chosen_and_all_other_methods(answered, tmp_path):
+def test_the_tradeoff_of_a_scene_lists_the_chosen_and_all_other_methods(output_of, tmp_path):
     asked = ("tradeoff", "--amplitude", 5e-6, "--frequency", 100, "--model", "power:7", "--error", "0.1 %")
-    points = answered(*asked, "--json", "--out", tmp_path / "new")["points"]
+    points = output_of(*asked, "--json", "--out", tmp_path / "new")["points"]
     (chosen,) = [each for each in points if each["is_chosen"]]
     assert chosen["error"] <= 1e-3
     by_method = {each["method"]: each for each in points}
@@ -32,8 +32,8 @@ def test_an_impossible_scene_is_refused_in_one_sentence(refusal, tmp_path, argum
 
 
 @pytest.mark.thorough
-def test_tradeoff_without_a_scene_measures_the_four_cases_of_the_paper(answered, tmp_path):
-    scenes = answered("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new")["scenes"]
+def test_tradeoff_without_a_scene_measures_the_four_cases_of_the_paper(output_of, tmp_path):
+    scenes = output_of("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new")["scenes"]
     assert [each["scene"] for each in scenes] == [f"hertz, 260 Hz, {um} µm" for um in (1, 5, 10, 50)]
     assert all(sum(point["is_chosen"] for point in each["points"]) == 1 for each in scenes)
     assert (tmp_path / "new" / "tradeoff.png").is_file()

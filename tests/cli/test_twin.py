@@ -69,7 +69,7 @@ def is_tracked(status):
     return status.twin is not None and status.twin.state == "tracked" and status.twin.level is not None
 
 
-def recorded(tmp_path):
+def events_and_gaps(tmp_path):
     with open_recording(tmp_path / "dwell.h5") as recording:
         return [(each.kind, each.text) for each in recording.events], recording.gaps
 
@@ -91,7 +91,7 @@ def test_the_live_twin_reports_hidden_motion_and_a_change_ends_the_run_if_planne
     status = until(client, lambda status: status.state not in DRIVING)
     assert [each.state for each in status.rows] == ["failed"]
     assert "as on_changed_specimen requires" in status.rows[0].reason
-    events, gaps = recorded(tmp_path)
+    events, gaps = events_and_gaps(tmp_path)
     assert ("specimen", "The specimen is not what it was.") in events
     assert "limit" in dict(events)
     assert gaps == ()
@@ -122,7 +122,7 @@ def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     client.tell_change("The upper gap is 46 um.")
     client.stop("abort", "enough")
     until(client, lambda status: status.state not in DRIVING)
-    events, gaps = recorded(tmp_path)
+    events, gaps = events_and_gaps(tmp_path)
     assert ("specimen", "The upper gap is 46 um.") in events
     assert "limit" not in dict(events)
     assert gaps == ()

@@ -101,7 +101,7 @@ def own_state(tmp_path_factory):
 @pytest.fixture
 def window(context, own_state, tmp_path, qapp):
     """The complete window, without a bench."""
-    window = opened(context, tmp_path)
+    window = show_window(context, tmp_path)
     yield window
     end(window, qapp)
 
@@ -111,13 +111,13 @@ def lasting_window(own_state, tmp_path_factory, qapp):
     """One window for all tests of a module, which do not rely on its initial state."""
     folder = tmp_path_factory.mktemp("window")
     context = AppContext(Settings(folder / "window.ini"))
-    window = opened(context, folder)
+    window = show_window(context, folder)
     yield window
     end(window, qapp)
     context.background.close()
 
 
-def opened(context, folder):
+def show_window(context, folder):
     context.choose_folder(folder / "recordings")
     window = Window(context, PAGES)
     window.resize(1280, 720)

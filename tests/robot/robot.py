@@ -121,7 +121,7 @@ class Robot:
         sys.unraisablehook = lambda told: self._raised(
             type(told.exc_value), told.exc_value, told.exc_traceback
         )
-        qInstallMessageHandler(self._said)
+        qInstallMessageHandler(self._log_qt)
         self.app = application(["robot"])
         self.context = AppContext(Settings(folder / "window.ini"))
         self.context.choose_folder(folder / "recordings")
@@ -220,8 +220,8 @@ class Robot:
         self._press(self.random.choice(CHORDS), Qt.KeyboardModifier.ControlModifier)
 
     def click(self):
-        buttons = [each for each in self._seen(QAbstractButton) if each.isEnabled()]
-        tabs = [each for each in self._seen(QTabBar) if each.count()]
+        buttons = [each for each in self._visible(QAbstractButton) if each.isEnabled()]
+        tabs = [each for each in self._visible(QTabBar) if each.count()]
         if tabs and self.random.random() < 0.2:
             bar = self.random.choice(tabs)
             bar.setCurrentIndex(self.random.randrange(bar.count()))
@@ -231,7 +231,7 @@ class Robot:
             QTest.mouseClick(button, Qt.MouseButton.LeftButton)
 
     def type_value(self):
-        fields = [each for each in self._seen(QLineEdit) if each.isEnabled() and not each.isReadOnly()]
+        fields = [each for each in self._visible(QLineEdit) if each.isEnabled() and not each.isReadOnly()]
         if fields:
             field, text = self.random.choice(fields), self.random.choice(NASTY)
             self.recent.append(f"[{(field.parentWidget() or field).accessibleName()}={text[:20]!r}]")
@@ -241,20 +241,20 @@ class Robot:
             QTest.keyClick(field, self.random.choice((Qt.Key.Key_Return, Qt.Key.Key_Tab)))
 
     def choose(self):
-        boxes = [each for each in self._seen(QComboBox) if each.isEnabled() and each.count()]
+        boxes = [each for each in self._visible(QComboBox) if each.isEnabled() and each.count()]
         if boxes:
             box = self.random.choice(boxes)
             row = self.random.randrange(box.count())
             self.recent.append(f"[{box.accessibleName()}={box.itemText(row)}]")
             box.setCurrentIndex(row)
             box.activated.emit(row)
-        tables = [each for each in self._seen(QTableView) if each.model() and each.model().rowCount()]
+        tables = [each for each in self._visible(QTableView) if each.model() and each.model().rowCount()]
         if tables:
             table = self.random.choice(tables)
             table.selectRow(self.random.randrange(table.model().rowCount()))
 
     def point_at_plot(self):
-        plots = self._seen(Plot)
+        plots = self._visible(Plot)
         if plots:
             plot = self.random.choice(plots)
             at = QPoint(self.random.randrange(plot.width() + 1), self.random.randrange(plot.height() + 1))
@@ -370,7 +370,7 @@ class Robot:
 
     # Tools
 
-    def _seen(self, kind):
+    def _visible(self, kind):
         top = QApplication.activeModalWidget() or self.window
         return [each for each in top.findChildren(kind) if each.isVisible()]
 
@@ -402,6 +402,6 @@ class Robot:
             os._exit(2)
         self.find("".join(traceback.format_exception(kind, error, trace))[-1500:])
 
-    def _said(self, kind, _where, text):
+    def _log_qt(self, kind, _where, text):
         if kind in (QtMsgType.QtCriticalMsg, QtMsgType.QtFatalMsg):
             self.find(f"Qt: {text}")

@@ -150,7 +150,7 @@ class Daq:
 
 
 @contextmanager
-def refused(code, match: str | None = None, kind: type[DaqError] = DaqError) -> Iterator:
+def daq_error(code, match: str | None = None, kind: type[DaqError] = DaqError) -> Iterator:
     """Require a driver error with this code; yields the exception info."""
     with pytest.raises(kind, match=match) as caught:
         yield caught

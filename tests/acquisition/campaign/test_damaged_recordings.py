@@ -75,7 +75,7 @@ DAMAGES = (
 
 
 @pytest.fixture(scope="module")
-def recorded(new_bench, rig, tmp_path_factory):
+def whole_folder(new_bench, rig, tmp_path_factory):
     folder, bench = tmp_path_factory.mktemp("recorded"), new_bench(rig)
     run_campaign(bench, CAMPAIGN, folder)
     run_campaign(bench, CAMPAIGN, folder / "older")
@@ -83,9 +83,9 @@ def recorded(new_bench, rig, tmp_path_factory):
 
 
 @pytest.fixture
-def folder(recorded, tmp_path):
+def folder(whole_folder, tmp_path):
     """Return copies of the recordings, with their file times, for one test to damage."""
-    return shutil.copytree(recorded, tmp_path, dirs_exist_ok=True)
+    return shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
 
 
 def outcomes(point_results):

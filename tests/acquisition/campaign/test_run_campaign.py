@@ -58,7 +58,7 @@ def test_a_complete_recording_can_be_moved_during_the_campaign(bench, tmp_path, 
 
 
 @pytest.fixture(scope="module")
-def recorded(new_bench, rig, tmp_path_factory):
+def recordings(new_bench, rig, tmp_path_factory):
     """Return the folder of a finished campaign, and the set of (name, number, count) of its progress."""
     folder, seen = tmp_path_factory.mktemp("recorded"), set()
     run_campaign(
@@ -67,12 +67,12 @@ def recorded(new_bench, rig, tmp_path_factory):
     return folder, seen
 
 
-def test_progress_counts_the_recordings(recorded):
-    assert recorded[1] == {("one", 1, 3), ("two", 2, 3), ("three", 3, 3)}
+def test_progress_counts_the_recordings(recordings):
+    assert recordings[1] == {("one", 1, 3), ("two", 2, 3), ("three", 3, 3)}
 
 
-def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(bench, recorded):
-    folder, _ = recorded
+def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(bench, recordings):
+    folder, _ = recordings
     before = {path: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(RecordingError, match="give another folder, or resume the campaign"):
         run_campaign(bench, CAMPAIGN, folder)
@@ -93,10 +93,10 @@ def test_a_resume_keeps_complete_points_and_records_the_remaining_points(bench, 
     assert {outcome for _, outcome in outcomes(kept)} == {"kept"}
 
 
-def test_a_resume_with_another_plan_is_refused(bench, recorded):
+def test_a_resume_with_another_plan_is_refused(bench, recordings):
     changed = Campaign(name="c", measurements=(dwell("one", amplitude_vpp=2.0),))
     with pytest.raises(RecordingError, match=r"has changed since .*c\.campaign\.sqlite was written"):
-        run_campaign(bench, changed, recorded[0], ExistingRecordings.RESUME)
+        run_campaign(bench, changed, recordings[0], ExistingRecordings.RESUME)
 
 
 def test_a_campaign_can_skip_a_failed_measurement(bench, tmp_path):

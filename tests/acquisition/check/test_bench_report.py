@@ -21,7 +21,7 @@ SILENT_V = 5e-3
 
 
 @pytest.fixture
-def checked(bench_of):
+def check_rig(bench_of):
     def check(rig, tmp_path, fault=lambda virtual: None, **habits):
         with bench_of(rig, **habits) as (bench, virtual):
             fault(virtual)
@@ -36,8 +36,8 @@ def failed_findings(report):
     return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
 
 
-def test_a_healthy_bench_passes_and_matches_its_configuration(checked, rig, tmp_path):
-    report = checked(rig, tmp_path)
+def test_a_healthy_bench_passes_and_matches_its_configuration(check_rig, rig, tmp_path):
+    report = check_rig(rig, tmp_path)
     assert failed_findings(report) == set()
     clock = report["drive's clock"]
     told_ppm = rig.virtual.generator_clock_ppm - rig.virtual.converter_clock_ppm
@@ -57,7 +57,7 @@ def test_a_healthy_bench_passes_and_matches_its_configuration(checked, rig, tmp_
     ],
 )
 def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
-    rig, tmp_path, checked, masses_kg, stiffnesses_n_per_m, dampings_ns_per_m, gap_m
+    rig, tmp_path, check_rig, masses_kg, stiffnesses_n_per_m, dampings_ns_per_m, gap_m
 ):
     own = {
         "masses_kg": masses_kg,
@@ -68,7 +68,7 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
         "gap_m": gap_m,
     }
     heavy = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=own)})
-    report = checked(heavy, tmp_path)
+    report = check_rig(heavy, tmp_path)
     assert failed_findings(report) == set()
     assert report["base acceleration"].verdict is Verdict.OK
     for role in ("base_acceleration", "m0_velocity"):
@@ -95,28 +95,28 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
         (lambda v: v.faults.stick_output(), "drive left after stop", "switch the amplifier off"),
     ],
 )
-def test_a_bench_fault_fails_its_finding_with_advice(checked, rig, tmp_path, fault, name, advice):
-    report = checked(rig, tmp_path, fault)
+def test_a_bench_fault_fails_its_finding_with_advice(check_rig, rig, tmp_path, fault, name, advice):
+    report = check_rig(rig, tmp_path, fault)
     assert name in failed_findings(report)
     assert advice in report[name].advice
     assert report.verdict is Verdict.FAIL
 
 
 @pytest.mark.thorough
-def test_a_laser_drop_out_is_distinguished_from_hum(checked, rig, tmp_path):
+def test_a_laser_drop_out_is_distinguished_from_hum(check_rig, rig, tmp_path):
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 10.0})
-    dark = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
+    dark = check_rig(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
     assert dark.verdict is not Verdict.OK
     assert "a laser that loses its signal" in dark.advice
     virtual = rig.virtual.model_copy(update={"vibrometer_noise_m_per_s_per_rthz": 1e-3})
-    loud = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
+    loud = check_rig(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
     assert "look for mains hum" in loud.advice
 
 
 @pytest.mark.thorough
-def test_a_reversed_vibrometer_sign_gives_a_warning(checked, rig, tmp_path):
-    assert checked(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
-    report = checked(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))
+def test_a_reversed_vibrometer_sign_gives_a_warning(check_rig, rig, tmp_path):
+    assert check_rig(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
+    report = check_rig(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))
     assert report["sign of m0_velocity"].verdict is Verdict.WARN
     assert "this sensor is reversed" in report["sign of m0_velocity"].advice
     assert failed_findings(report) == set()
@@ -174,15 +174,15 @@ def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
-def test_a_wrong_load_setting_is_found_with_advice(checked, rig, tmp_path):
+def test_a_wrong_load_setting_is_found_with_advice(check_rig, rig, tmp_path):
     # The panel is set to 50 ohm and cannot be read: every amplitude is twice the setting.
-    report = checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
+    report = check_rig(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
     assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
     assert "a factor of 2 means a wrong load" in report["drive over setting"].advice
 
 
-def test_a_correct_load_setting_passes_even_if_it_cannot_be_read(checked, rig, tmp_path):
-    assert failed_findings(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
+def test_a_correct_load_setting_passes_even_if_it_cannot_be_read(check_rig, rig, tmp_path):
+    assert failed_findings(check_rig(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
 
 
 def test_a_lost_generator_raises_an_error(bench_of, rig, tmp_path):
@@ -193,8 +193,8 @@ def test_a_lost_generator_raises_an_error(bench_of, rig, tmp_path):
         virtual.faults.heal()
 
 
-def test_the_bench_report_is_a_table_and_round_trips_through_json(checked, rig, tmp_path):
-    report = checked(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
+def test_the_bench_report_is_a_table_and_round_trips_through_json(check_rig, rig, tmp_path):
+    report = check_rig(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
     assert BenchReport.model_validate_json(report.model_dump_json()) == report
     lines = report.text().splitlines()
     at = next(index for index, line in enumerate(lines) if "amplifier gain" in line)

@@ -41,7 +41,7 @@ def both_ways(request):
 
 
 @pytest.fixture
-def swept(new_control_bench, both_ways):
+def sweep_bench(new_control_bench, both_ways):
     if not both_ways:
         bench = new_control_bench(hardening=HARDENING)
         plan = SettledSine(
@@ -59,9 +59,9 @@ def swept(new_control_bench, both_ways):
     return both_ways["bench"]
 
 
-def test_jumps_up_and_down_are_bracketed_around_the_folds(swept):
-    jumps = {each["direction"]: each for each in notes_of(swept, "jump") if each["how"] == "localised"}
-    lower, upper = folds_hz(swept.oscillator, LEVEL)
+def test_jumps_up_and_down_are_bracketed_around_the_folds(sweep_bench):
+    jumps = {each["direction"]: each for each in notes_of(sweep_bench, "jump") if each["how"] == "localised"}
+    lower, upper = folds_hz(sweep_bench.oscillator, LEVEL)
     assert upper - lower > 1.0
     for direction, fold in (("up", upper), ("down", lower)):
         found = jumps[direction]
@@ -71,8 +71,8 @@ def test_jumps_up_and_down_are_bracketed_around_the_folds(swept):
         assert low - 0.3 <= fold <= high + 0.3
 
 
-def test_every_step_records_pass_branch_and_direction(swept):
-    steps = [numbers for label, numbers, *_ in swept.segments if label == "step"]
+def test_every_step_records_pass_branch_and_direction(sweep_bench):
+    steps = [numbers for label, numbers, *_ in sweep_bench.segments if label == "step"]
     assert [each["frequency_hz"] for each in steps] == [*range(116, 133, 2), *range(132, 115, -2)]
     assert [each["pass"] for each in steps] == [1] * 9 + [2] * 9
     assert steps[0]["came_from"] == "rest"
@@ -84,18 +84,18 @@ def test_every_step_records_pass_branch_and_direction(swept):
     assert max(len(json.dumps(each)) for each in steps) < 480
 
 
-def test_steps_lie_on_the_branches_of_the_closed_form(swept):
-    up = [each for each in notes_of(swept, "achieved") if each["segment"] == "step"][:9]
-    lower, upper = folds_hz(swept.oscillator, LEVEL)
+def test_steps_lie_on_the_branches_of_the_closed_form(sweep_bench):
+    up = [each for each in notes_of(sweep_bench, "achieved") if each["segment"] == "step"][:9]
+    lower, upper = folds_hz(sweep_bench.oscillator, LEVEL)
     for step in up:
         if lower < step["frequency_hz"] < upper:
-            highest = swept.oscillator.highest_seen_m(step["frequency_hz"], step["base_m_per_s2"])
+            highest = sweep_bench.oscillator.highest_seen_m(step["frequency_hz"], step["base_m_per_s2"])
             base_m = step["base_m_per_s2"] / (2 * np.pi * step["frequency_hz"]) ** 2
             assert step["response_ii"] == pytest.approx(highest / base_m, rel=0.01)
 
 
-def test_a_feedback_measurement_ends_within_the_planned_time(swept, both_ways):
-    assert swept.sample / 5120 <= duration_s(both_ways["measurement"])
+def test_a_feedback_measurement_ends_within_the_planned_time(sweep_bench, both_ways):
+    assert sweep_bench.sample / 5120 <= duration_s(both_ways["measurement"])
 
 
 def test_the_base_level_is_reached_despite_a_wrong_shaker_model(new_control_bench):

@@ -12,7 +12,7 @@ K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
 
 
 @pytest.fixture
-def held(tmp_path):
+def hold_response(tmp_path):
     """Return a function that carries out a held response on a rig and returns its notes."""
 
     def carry_out(rig, plan):
@@ -29,10 +29,10 @@ def held(tmp_path):
     return carry_out
 
 
-def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, held):
+def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, hold_response):
     plan = HeldResponse(amplitude_vpp=1, frequencies_hz=(88, 90, 92), response_m=1e-6, record_s=0.5)
     specimen = specimen_of(rig)
-    for each in held(rig, plan):
+    for each in hold_response(rig, plan):
         omega = 2 * np.pi * each.frequency_hz
         dynamic = specimen.stiffness_matrix + 1j * omega * specimen.damping_matrix
         dynamic = dynamic - omega**2 * specimen.mass_matrix
@@ -44,10 +44,10 @@ def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, held):
 
 
 @pytest.mark.thorough
-def test_an_unstable_branch_is_recorded_and_flagged(rig, held):
+def test_an_unstable_branch_is_recorded_and_flagged(rig, hold_response):
     # Between the folds of a hardening spring the motion leaves the branch faster than feedback can hold it.
     hard = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}
     hardening = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=hard)})
     plan = HeldResponse(amplitude_vpp=4, frequencies_hz=(103,), response_m=6e-6, longest_wait_s=8)
-    (found,) = held(hardening, plan)
+    (found,) = hold_response(hardening, plan)
     assert found.level is Held.OUTSIDE

@@ -24,7 +24,7 @@ def noise(**changes):
 
 
 @pytest.fixture
-def recorded(rig, tmp_path):
+def record_noise(rig, tmp_path):
     """Return a function that carries out noise on the virtual rig and opens the recording."""
 
     def record(excitation, **believed):
@@ -64,8 +64,8 @@ def random_spectrum(seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("spectrum", [corners((40, 0.01)), random_spectrum(3), random_spectrum(8)])
-def test_the_base_reaches_the_requested_spectrum(recorded, spectrum):
-    with recorded(noise(spectrum=spectrum)) as recording:
+def test_the_base_reaches_the_requested_spectrum(record_noise, spectrum):
+    with record_noise(noise(spectrum=spectrum)) as recording:
         frequency_hz, density = densities(recording, "base_acceleration")
         off_db = 10 * np.log10(density / density_at(spectrum, frequency_hz))
         assert np.mean(np.abs(off_db) < 3.0) > 0.95
@@ -79,9 +79,9 @@ def test_the_base_reaches_the_requested_spectrum(recorded, spectrum):
 
 
 @pytest.mark.thorough
-def test_an_unknown_shaker_is_equalised(recorded, rig):
+def test_an_unknown_shaker_is_equalised(record_noise, rig):
     stiff = 2 * rig.shaker.suspension_stiffness_n_per_m
-    with recorded(noise(spectrum=corners((40, 0.005))), suspension_stiffness_n_per_m=stiff) as recording:
+    with record_noise(noise(spectrum=corners((40, 0.005))), suspension_stiffness_n_per_m=stiff) as recording:
         first, *_ = notes(recording)
         _, density = densities(recording, "base_acceleration")
     assert first["worst_db"] < -6.0, "the model that begins is wrong"
@@ -89,9 +89,9 @@ def test_an_unknown_shaker_is_equalised(recorded, rig):
 
 
 @pytest.mark.thorough
-def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(recorded):
+def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(record_noise):
     limit = 5e-8
-    with recorded(noise(response_limits=corners((40, limit)), realisations=6)) as recording:
+    with record_noise(noise(response_limits=corners((40, limit)), realisations=6)) as recording:
         _, velocity = densities(recording, "m0_velocity")
         _, density = densities(recording, "base_acceleration")
         assert np.all(10 * np.log10(velocity / limit) < 3.0)
@@ -101,16 +101,16 @@ def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(recorded):
         assert notes(recording)[-1]["notched"] > 0
 
 
-def test_an_unreachable_spectrum_ends_with_a_ramp_down(recorded):
+def test_an_unreachable_spectrum_ends_with_a_ramp_down(record_noise):
     with pytest.raises(LimitExceeded, match=r"needs .* Vpp at .* allows at most amplitude_vpp = 0\.1"):
-        recorded(noise(amplitude_vpp=0.1))
+        record_noise(noise(amplitude_vpp=0.1))
 
 
-def test_a_density_above_its_abort_limit_ramps_down_the_run(recorded):
+def test_a_density_above_its_abort_limit_ramps_down_the_run(record_noise):
     # The first realisation already exceeds the limit of m0 by far, so that no equalisation can help.
     limits = corners((40, 1e-10))
     with pytest.raises(LimitExceeded, match=r"velocity of m0 reached .* dB above 1e-10; abort_db = 6"):
-        recorded(noise(response_limits=limits))
+        record_noise(noise(response_limits=limits))
 
 
 @pytest.mark.parametrize(

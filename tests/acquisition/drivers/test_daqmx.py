@@ -60,7 +60,7 @@ def rig(configured, virtual):
 
 
 @pytest.fixture
-def opened():
+def open_digitizer():
     """Return a function that opens digitizers; they are closed after the test."""
     with ExitStack() as closing:
 
@@ -73,8 +73,8 @@ def opened():
 
 
 @pytest.fixture
-def digitizer(rig, opened):
-    return opened(rig)
+def digitizer(rig, open_digitizer):
+    return open_digitizer(rig)
 
 
 class TestReading:
@@ -83,8 +83,8 @@ class TestReading:
         assert digitizer.identity.firmware.startswith("NI-DAQmx ")
         assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
 
-    def test_the_reported_rate_is_the_rate_of_the_hardware(self, rig, opened):
-        digitizer = opened(with_daq(rig, sample_rate_hz=10_000))
+    def test_the_reported_rate_is_the_rate_of_the_hardware(self, rig, open_digitizer):
+        digitizer = open_digitizer(with_daq(rig, sample_rate_hz=10_000))
         assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
 
     def test_blocks_have_consecutive_sample_numbers(self, digitizer):
@@ -99,8 +99,8 @@ class TestReading:
         row = np.concatenate([digitizer.read(samples).volts[0] for samples in (7, 512, 1, 1000, 1000)])
         assert np.max(np.abs(row - sine_fit(row, 100.0))) < A_LOST_SAMPLE_V / 10
 
-    def test_a_read_of_several_pieces_is_complete(self, rig, virtual, opened):
-        digitizer = opened(with_daq(rig, buffer_s=0.2))
+    def test_a_read_of_several_pieces_is_complete(self, rig, virtual, open_digitizer):
+        digitizer = open_digitizer(with_daq(rig, buffer_s=0.2))
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 1VPP;:OUTP1 ON")
         digitizer.start()
         digitizer.read(5120)
@@ -133,9 +133,9 @@ class TestReading:
         assert not np.shares_memory(first.volts, second.volts)
         assert np.array_equal(first.volts, kept)
 
-    def test_an_input_beyond_its_range_is_flagged_with_its_sample_range(self, rig, virtual, opened):
+    def test_an_input_beyond_its_range_is_flagged_with_its_sample_range(self, rig, virtual, open_digitizer):
         # A configured range of 1 V, while the device measures with its range of 5 V.
-        digitizer = opened(with_channel(rig, 0, range_v=1.0))
+        digitizer = open_digitizer(with_channel(rig, 0, range_v=1.0))
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 8VPP;:OUTP1 ON")
         digitizer.start()
         digitizer.read(5120)
@@ -244,10 +244,10 @@ class TestFaults:
         virtual.faults.heal()
         DaqmxDigitizer.open(rig).close()
 
-    def test_a_dead_daq_server_is_reported_as_lost_and_closing_still_works(self, configured, opened):
+    def test_a_dead_daq_server_is_reported_as_lost_and_closing_still_works(self, configured, open_digitizer):
         dying = configured.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::DAQ2::INSTR"})
         with VirtualRig(configured.model_copy(update={"generator": dying})) as virtual:
-            digitizer = opened(with_daq(configured, server=virtual.daq_address))
+            digitizer = open_digitizer(with_daq(configured, server=virtual.daq_address))
             digitizer.start()
             virtual.faults.lose_daq_server()
             for act in (lambda: digitizer.read(100), digitizer.stop, digitizer.close):

@@ -35,7 +35,7 @@ def audio():
 
 
 @pytest.fixture
-def opened(card_rig, audio):
+def card_bench(card_rig, audio):
     """Return a function that opens the bench on the card, wired to the simulated world of its rig."""
     benches = []
 
@@ -55,8 +55,8 @@ def opened(card_rig, audio):
 
 
 @pytest.mark.thorough
-def test_a_bench_with_a_sound_card_passes_its_check(opened, tmp_path):
-    report = bench_report(opened(), tmp_path)
+def test_a_bench_with_a_sound_card_passes_its_check(card_bench, tmp_path):
+    report = bench_report(card_bench(), tmp_path)
     assert [each.name for each in report.findings if each.verdict is Verdict.FAIL] == []
     assert report["drive over setting"].number == pytest.approx(1.0, abs=0.02)
     assert report["amplifier gain"].number == pytest.approx(10.0, abs=0.1)
@@ -72,9 +72,9 @@ def test_a_bench_with_a_sound_card_passes_its_check(opened, tmp_path):
     ],
     ids=lambda each: each.kind,
 )
-def test_a_sound_card_records_its_output_without_gaps(opened, tmp_path, excitation):
+def test_a_sound_card_records_its_output_without_gaps(card_bench, tmp_path, excitation):
     plan = Measurement(name="card", excitation=excitation, ramp_s=0.5, ramp_step_s=0.05)
-    path = run_measurement(opened(), plan, tmp_path / "card.h5").path
+    path = run_measurement(card_bench(), plan, tmp_path / "card.h5").path
     with open_recording(path) as recording:
         assert recording.state.value == "complete"
         assert not recording.gaps
@@ -87,14 +87,14 @@ def test_a_sound_card_records_its_output_without_gaps(opened, tmp_path, excitati
     assert analyse(path) is not None
 
 
-def test_noise_that_needs_a_generator_is_refused_before_output(opened, tmp_path):
+def test_noise_that_needs_a_generator_is_refused_before_output(card_bench, tmp_path):
     plan = Measurement(
         name="card",
         excitation=WhiteNoise(amplitude_vpp=0.5, band_start_hz=40, band_stop_hz=400),
         ramp_s=0.5,
     )
     with pytest.raises(LimitExceeded, match="range of the no function generator"):
-        run_measurement(opened(), plan, tmp_path / "card.h5")
+        run_measurement(card_bench(), plan, tmp_path / "card.h5")
 
 
 @pytest.mark.parametrize("missing", ["calibrated", "input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
@@ -127,8 +127,8 @@ def test_a_missing_sound_card_is_reported(card_rig, audio):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_an_input_overflow_is_reported_as_lost_data(opened, audio):
-    bench = opened()
+def test_an_input_overflow_is_reported_as_lost_data(card_bench, audio):
+    bench = card_bench()
     card = bench.digitizer.card
     card.most_waiting = 2000
     bench.digitizer.start()
@@ -138,8 +138,8 @@ def test_an_input_overflow_is_reported_as_lost_data(opened, audio):
         bench.digitizer.read(100)
 
 
-def test_an_output_underflow_of_a_sound_card_is_reported(opened):
-    bench = opened()
+def test_an_output_underflow_of_a_sound_card_is_reported(card_bench):
+    bench = card_bench()
     bench.output.write(np.zeros(600))
     bench.output.arm()
     bench.digitizer.start()

@@ -84,7 +84,7 @@ def until_state(client: EngineClient, *states: EngineState) -> EngineStatus:
     return until(client, lambda status: status.state in states)
 
 
-def opened(client: EngineClient, rig: Rig) -> EngineStatus:
+def open_rig(client: EngineClient, rig: Rig) -> EngineStatus:
     """Open a bench in the engine and wait until it is ready."""
     client.open(rig)
     return until_state(client, EngineState.READY)

@@ -42,7 +42,7 @@ from vibench.acquisition.plan import Campaign
 from vibench.acquisition.recording import RecordingState
 from vibench.virtual_rig import VirtualRig
 
-from .conftest import campaign, opened, until, until_exists, until_state
+from .conftest import campaign, open_rig, until, until_exists, until_state
 
 SILENT_V = 0.02
 """Upper bound of a silent recorded drive: noise and the last step of a ramp."""
@@ -60,7 +60,7 @@ def on_server(rig, virtual):
 
 
 def start_run(client, rig, tmp_path, *names):
-    opened(client, rig)
+    open_rig(client, rig)
     client.arm(campaign(*names or ("run",)), tmp_path)
     client.start()
     return until(client, lambda status: status.run is not None and status.run.segment == "dwell")
@@ -80,7 +80,7 @@ class TestRuns:
     @pytest.mark.thorough
     def test_a_bench_is_opened_checked_armed_run_and_closed(self, client, shipped_rig, tmp_path):
         assert client.status().state is EngineState.CLOSED
-        bench = opened(client, shipped_rig).bench
+        bench = open_rig(client, shipped_rig).bench
         assert bench.is_simulated
         assert bench.identities["generator"].startswith("TEKTRONIX,AFG1022")
         client.check(tmp_path)
@@ -151,7 +151,7 @@ class TestRuns:
 
 class TestStoppedChecks:
     def test_any_client_can_stop_a_check(self, client, shipped_rig, tmp_path):
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         client.check(tmp_path)
         client.stop(StopLevel.ABORT, "smoke in the laboratory")
         status = until_state(client, EngineState.READY)
@@ -160,7 +160,7 @@ class TestStoppedChecks:
 
     def test_a_check_is_stopped_if_its_viewer_is_gone(self, client, shared_engine, shipped_rig, tmp_path):
         as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
-        opened(client, shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
+        open_rig(client, shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
         client.check(tmp_path)
         with EngineClient.attach(shared_engine.address) as visitor:
             status = until_state(visitor, EngineState.READY)
@@ -171,7 +171,7 @@ class TestStoppedChecks:
         ]
 
     def test_a_stopped_check_prevents_its_campaign(self, client, shipped_rig, tmp_path):
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
         client.arm_request(orders)
         client.start()
@@ -192,7 +192,7 @@ class TestRefusals:
         client.disarm()
 
     def test_arming_a_plan_beyond_a_limit_is_refused(self, client, shipped_rig, tmp_path):
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         low = campaign("low").measurements[0]
         hard = low.excitation.model_copy(update={"amplitude_vpp": 10.0, "frequency_hz": 20.0})
         plan = Campaign(name="hard", measurements=(low.model_copy(update={"excitation": hard}),))
@@ -202,7 +202,7 @@ class TestRefusals:
 
     def test_arming_refuses_to_overwrite_an_existing_file(self, client, shipped_rig, tmp_path):
         (tmp_path / "run.h5").write_bytes(b"precious")
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
             client.arm(campaign("run"), tmp_path)
 
@@ -251,7 +251,7 @@ class TestRefusals:
 @pytest.mark.thorough
 def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, client, shipped_rig, tmp_path):
     """Arming sixty sweeps on a busy computer may exceed the usual answer timeout of five seconds."""
-    opened(client, shipped_rig)
+    open_rig(client, shipped_rig)
     sweeps = [
         {
             "name": f"s{number}",
@@ -288,7 +288,7 @@ class TestMissingViewers:
     @pytest.mark.thorough
     def test_a_drive_far_from_its_limits_gets_a_longer_viewer_timeout(self, client, shipped_rig, tmp_path):
         """A drive near its limits gets half a second only."""
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         quiet, loud = campaign("run"), campaign("run").model_dump()
         plan = client.arm_request(CampaignRequest(campaign=quiet, folder=tmp_path, longest_patience_s=3.0))
         assert 1.0 < plan.patience_s <= 3.0
@@ -344,7 +344,7 @@ class TestMissingViewers:
     def test_an_unattended_run_completes_without_requests(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         client.arm(campaign("run", duration_s=15.0), tmp_path)
         client.start()
         path = tmp_path / "run.h5"
@@ -355,7 +355,7 @@ class TestMissingViewers:
     def test_an_armed_engine_disarms_when_its_viewer_sends_no_requests(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
-        opened(client, shipped_rig)
+        open_rig(client, shipped_rig)
         client.arm(campaign("run"), tmp_path)
         # Visitors may look and leave: they do not attend.
         with EngineClient.attach(shared_engine.address) as visitor:

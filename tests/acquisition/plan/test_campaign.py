@@ -40,7 +40,7 @@ duration_s = 2
 """
 
 
-def loaded(tmp_path, text):
+def load(tmp_path, text):
     path = tmp_path / "campaign.toml"
     path.write_text(text, encoding="utf-8")
     return load_campaign(path)
@@ -99,34 +99,34 @@ class TestRoundTrips:
     @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
     def test_a_shipped_campaign_is_unchanged_after_writing_and_loading(self, tmp_path, path):
         campaign = load_campaign(path)
-        assert loaded(tmp_path, toml_text(campaign)) == campaign
+        assert load(tmp_path, toml_text(campaign)) == campaign
 
 
 class TestDefaults:
     def test_defaults_fill_in_missing_values(self, tmp_path):
         text = 'name = "c"\n[defaults]\nramp_s = 0.7\n[defaults.dwell]\nsettle_s = 9.0\n' + DWELL_TABLE
-        (measurement,) = loaded(tmp_path, text).measurements
+        (measurement,) = load(tmp_path, text).measurements
         assert measurement.ramp_s == 0.7
         assert measurement.excitation.settle_s == 9.0
 
     def test_a_value_in_a_measurement_overrides_the_default(self, tmp_path):
         text = 'name = "c"\n[defaults.dwell]\nduration_s = 9.0\n' + DWELL_TABLE
-        (measurement,) = loaded(tmp_path, text).measurements
+        (measurement,) = load(tmp_path, text).measurements
         assert measurement.excitation.duration_s == 2.0
 
     def test_defaults_apply_only_to_their_kind_of_excitation(self, tmp_path):
         text = 'name = "c"\n[defaults.sine_sweep]\nstep_s = 9.0\n' + DWELL_TABLE
-        assert len(loaded(tmp_path, text).measurements) == 1
+        assert len(load(tmp_path, text).measurements) == 1
 
     def test_a_misspelt_default_is_refused(self, tmp_path):
         text = 'name = "c"\n[defaults]\nramp_ms = 9.0\n' + DWELL_TABLE
         with pytest.raises(ConfigurationError, match=r"measurements\.0\.ramp_ms is not a known key"):
-            loaded(tmp_path, text)
+            load(tmp_path, text)
 
     def test_a_default_for_an_unknown_kind_is_refused(self, tmp_path):
         text = 'name = "c"\n[defaults.dwel]\nsettle_s = 9.0\n' + DWELL_TABLE
         with pytest.raises(ConfigurationError, match=r"measurements\.0\.dwel is not a known key"):
-            loaded(tmp_path, text)
+            load(tmp_path, text)
 
 
 class TestRefusals:
@@ -141,7 +141,7 @@ class TestRefusals:
     def test_errors_name_the_file_the_key_and_the_allowed_values(self, tmp_path):
         text = 'name = "c"\n' + DWELL_TABLE.replace("1.5", "5000")
         with pytest.raises(ConfigurationError) as refused:
-            loaded(tmp_path, text)
+            load(tmp_path, text)
         said = str(refused.value)
         assert said.startswith(str(tmp_path / "campaign.toml"))
         assert "measurements.0.excitation.dwell.amplitude_vpp = 5000" in said
@@ -149,14 +149,12 @@ class TestRefusals:
 
     def test_two_measurements_with_the_same_name_are_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match="two measurements would be recorded as 'dwell'"):
-            loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + DWELL_TABLE.replace('"dwell"\n[', '"Dwell"\n['))
+            load(tmp_path, 'name = "c"\n' + DWELL_TABLE + DWELL_TABLE.replace('"dwell"\n[', '"Dwell"\n['))
 
     def test_a_repeat_with_the_name_of_another_measurement_is_refused(self, tmp_path):
         twice = DWELL_TABLE.replace("[measurements.exc", "repeats = 2\n[measurements.exc")
         with pytest.raises(ConfigurationError, match="recorded as 'dwell-2'"):
-            loaded(
-                tmp_path, 'name = "c"\n' + twice + DWELL_TABLE.replace('name = "dwell"', 'name = "dwell-2"')
-            )
+            load(tmp_path, 'name = "c"\n' + twice + DWELL_TABLE.replace('name = "dwell"', 'name = "dwell-2"'))
 
     @pytest.mark.parametrize("name", ["", "a b", "../up", ".hidden", "a.b", "ü", "x" * 65])
     def test_a_name_must_be_a_portable_file_name(self, name):
@@ -165,11 +163,11 @@ class TestRefusals:
 
     def test_an_empty_campaign_is_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match="measurements"):
-            loaded(tmp_path, 'name = "c"\nmeasurements = []\n')
+            load(tmp_path, 'name = "c"\nmeasurements = []\n')
 
     def test_an_empty_list_of_failures_to_retry_after_is_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match=r"retry\.on = \[\]: give 1 or more"):
-            loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + "\n[retry]\nattempts = 3\non = []\n")
+            load(tmp_path, 'name = "c"\n' + DWELL_TABLE + "\n[retry]\nattempts = 3\non = []\n")
 
     def test_a_ramp_with_fewer_than_four_steps_is_refused(self):
         with pytest.raises(ValueError, match=r"ramp_step_s = 0\.1 gives fewer than 4 steps.*at most 0\.05"):
@@ -239,4 +237,4 @@ def test_the_campaigns_page_lists_valid_required_keys_of_every_kind(tmp_path):
         for keys in re.findall(r"`([^`]+)`", needs):
             excitation = f'{{ kind = "{kind}", amplitude_vpp = 0.2, {keys} }}'
             text = f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n'
-            assert loaded(tmp_path, text).measurements[0].excitation.kind == kind
+            assert load(tmp_path, text).measurements[0].excitation.kind == kind

@@ -16,15 +16,15 @@ SAMPLES = 2 * CHUNK_SAMPLES + 1000
 
 
 @pytest.fixture
-def recorded(tmp_path, make_header, make_block):
+def sample_file(tmp_path, make_header, make_block):
     counts, block = make_block(0, SAMPLES)
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=SAMPLES)) as writer:
         writer.append(block)
     return tmp_path / "a.h5", counts
 
 
-def test_overview_bins_store_the_minimum_and_maximum_of_their_samples(recorded):
-    path, counts = recorded
+def test_overview_bins_store_the_minimum_and_maximum_of_their_samples(sample_file):
+    path, counts = sample_file
     with open_recording(path) as recording:
         for row, role in zip(counts, recording.roles, strict=True):
             overview = recording.read_overview(role)
@@ -34,8 +34,8 @@ def test_overview_bins_store_the_minimum_and_maximum_of_their_samples(recorded):
                 assert (overview.low[number], overview.high[number]) == (part.min(), part.max())
 
 
-def test_h5py_alone_reads_the_overview_with_scale_and_axis(recorded):
-    path, counts = recorded
+def test_h5py_alone_reads_the_overview_with_scale_and_axis(sample_file):
+    path, counts = sample_file
     with h5py.File(path, "r") as file:
         low = file["overview/m0_velocity_low"]
         assert low.attrs["scale_factor"] == file["m0_velocity"].attrs["scale_factor"]
@@ -87,8 +87,8 @@ def test_a_recording_without_samples_has_an_empty_overview(tmp_path, make_header
         assert "default" not in file.attrs
 
 
-def test_a_file_without_an_overview_returns_none(recorded):
-    path, _ = recorded
+def test_a_file_without_an_overview_returns_none(sample_file):
+    path, _ = sample_file
     with h5py.File(path, "r+") as file:
         del file["overview"]
     with open_recording(path) as recording:

@@ -29,7 +29,7 @@ KEY = b"a key that nobody else has"
 
 
 @pytest.fixture
-def recorded(tmp_path, make_header, make_block):
+def make_file(tmp_path, make_header, make_block):
     def record(name="a.h5"):
         with create_recording(tmp_path / name, make_header()) as writer:
             writer.begin_segment("dwell", frequency_hz=260.0)
@@ -62,8 +62,8 @@ def run_example(path, *more):
     return found.returncode, found.stdout.strip()
 
 
-def test_a_recording_is_sealed_at_its_end(recorded):
-    path = recorded()
+def test_a_recording_is_sealed_at_its_end(make_file):
+    path = make_file()
     assert state_of(path) is state_of(path, "quick") is SealState.INTACT
     with open_recording(path) as recording:
         assert recording.seal == recording.check_seal(SealDepth.WHOLE).seal
@@ -84,8 +84,8 @@ def test_the_quick_check_finds_a_change_in_a_table_of_any_length(tmp_path, make_
     assert state_of(path, "quick") is state_of(path) is SealState.DAMAGED
 
 
-def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
-    path = recorded()
+def test_h5py_and_hashlib_alone_verify_a_seal(make_file):
+    path = make_file()
     with open_recording(path) as recording:
         seal = recording.seal
     assert run_example(path) == (0, f"unchanged since it was sealed: {seal}")
@@ -94,8 +94,8 @@ def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
     assert run_example(path) == (1, "changed since it was sealed: /m0_velocity")
 
 
-def test_the_h5py_example_verifies_a_signature_with_its_key_only(recorded, key_file):
-    path = recorded()
+def test_the_h5py_example_verifies_a_signature_with_its_key_only(make_file, key_file):
+    path = make_file()
     assert run_example(path, key_file)[0] == 0
     other = key_file.with_name("other")
     other.write_bytes(b"another key, which is wrong")
@@ -152,15 +152,15 @@ CHANGES = (
 @pytest.mark.thorough
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("depth", SealDepth)
-def test_the_quick_check_finds_every_change_outside_the_samples(recorded, change, depth):
-    path = recorded()
+def test_the_quick_check_finds_every_change_outside_the_samples(make_file, change, depth):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         change(file)
     assert state_of(path, depth) is SealState.DAMAGED
 
 
-def test_the_full_check_finds_a_changed_sample(recorded):
-    path = recorded()
+def test_the_full_check_finds_a_changed_sample(make_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         change_sample(file)
     with open_recording(path) as recording:
@@ -168,8 +168,8 @@ def test_the_full_check_finds_a_changed_sample(recorded):
     assert (found.state, found.sentence) == (SealState.DAMAGED, "changed since sealing: data of /m0_velocity")
 
 
-def test_a_changed_manifest_damages_the_seal_and_resealing_changes_its_digest(recorded):
-    path = recorded()
+def test_a_changed_manifest_damages_the_seal_and_resealing_changes_its_digest(make_file):
+    path = make_file()
     with open_recording(path) as recording:
         before = recording.seal
     with h5py.File(path, "r+") as file:
@@ -185,8 +185,8 @@ def test_a_changed_manifest_damages_the_seal_and_resealing_changes_its_digest(re
         assert recording.seal != before
 
 
-def test_a_recording_without_a_seal_is_reported_as_such(recorded):
-    path = recorded()
+def test_a_recording_without_a_seal_is_reported_as_such(make_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         del file["seal"]
     with open_recording(path) as recording:
@@ -202,8 +202,8 @@ def test_a_recording_without_a_seal_is_reported_as_such(recorded):
         assert "before recordings were sealed" in found.sentence
 
 
-def test_samples_of_an_unsealed_recording_are_checked_by_channel_checksums(recorded):
-    path = recorded()
+def test_samples_of_an_unsealed_recording_are_checked_by_channel_checksums(make_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         del file["seal"]
         change_sample(file)
@@ -214,8 +214,8 @@ def test_samples_of_an_unsealed_recording_are_checked_by_channel_checksums(recor
 
 
 @pytest.mark.parametrize("change", ["attribute", "dataset", "all but the group"])
-def test_an_incomplete_seal_is_invalid(recorded, change):
-    path = recorded()
+def test_an_incomplete_seal_is_invalid(make_file, change):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         if change != "dataset":
             del file["seal"].attrs["sha256"]
@@ -224,23 +224,23 @@ def test_an_incomplete_seal_is_invalid(recorded, change):
     assert state_of(path) is state_of(path, "quick") is SealState.DAMAGED
 
 
-def test_the_seal_of_another_recording_is_refused(recorded):
-    path, other = recorded(), recorded("b.h5")
+def test_the_seal_of_another_recording_is_refused(make_file):
+    path, other = make_file(), make_file("b.h5")
     with h5py.File(path, "r+") as file, h5py.File(other) as source:
         del file["seal"]
         source.copy("seal", file)
     assert state_of(path) is SealState.DAMAGED
 
 
-def test_a_renamed_finished_recording_is_checked_against_its_seal(recorded):
-    path = recorded()
+def test_a_renamed_finished_recording_is_checked_against_its_seal(make_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         change_scale(file)
     assert state_of(path.rename(part_of(path))) is SealState.DAMAGED
 
 
-def test_a_recording_without_a_seal_fails_a_check_with_a_key(recorded, key_file):
-    path = recorded()
+def test_a_recording_without_a_seal_fails_a_check_with_a_key(make_file, key_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         del file["seal"]
     assert state_of(path, key=seal_key(key_file)) is SealState.OTHER_KEY
@@ -257,8 +257,8 @@ def test_recovery_seals_a_recording(tmp_path, make_header, make_block):
     assert run_example(path)[0] == 0
 
 
-def test_a_damaged_copy_does_not_remove_its_source(recorded, tmp_path, make_header, make_block):
-    path = recorded("kept.h5")
+def test_a_damaged_copy_does_not_remove_its_source(make_file, tmp_path, make_header, make_block):
+    path = make_file("kept.h5")
     writer = create_recording(tmp_path / "a.h5", make_header())
     writer.append(make_block(0, 2000)[1])
     writer._committer.close()
@@ -284,8 +284,8 @@ def test_samples_changed_before_the_end_of_a_recording_are_not_sealed(tmp_path, 
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5.part"]
 
 
-def test_a_seal_is_signed_if_a_key_is_given(recorded, key_file, monkeypatch):
-    path = recorded()
+def test_a_seal_is_signed_if_a_key_is_given(make_file, key_file, monkeypatch):
+    path = make_file()
     with h5py.File(path) as file:
         manifest, signature = file["seal/manifest_json"][()], file["seal"].attrs["hmac_sha256"]
     assert hmac.new(KEY, manifest, hashlib.sha256).hexdigest().encode() == signature
@@ -299,8 +299,8 @@ def test_a_seal_is_signed_if_a_key_is_given(recorded, key_file, monkeypatch):
     assert state_of(path, key=seal_key(other)) is SealState.OTHER_KEY
 
 
-def test_a_seal_forged_without_the_key_is_detected(recorded, key_file):
-    path = recorded()
+def test_a_seal_forged_without_the_key_is_detected(make_file, key_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         change_sample(file)
         manifest = json.loads(file["seal/manifest_json"][()])
@@ -327,8 +327,8 @@ def test_an_invalid_key_is_refused_before_recording(tmp_path, make_header, monke
 
 
 @pytest.fixture
-def with_result(recorded):
-    path = recorded()
+def with_result(make_file):
+    path = make_file()
     arrays = {"H": ResultArray(np.arange(3.0), "1", ("f",)), "f": ResultArray(np.arange(3.0), "Hz")}
     with open_recording(path) as recording:
         recording.save_results("spectrum", arrays, {"window": "hann"})
@@ -379,8 +379,8 @@ def test_an_unsealed_result_of_an_older_version_is_read(with_result):
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.UNSEALED]
 
 
-def test_no_result_is_added_to_a_damaged_recording(recorded):
-    path = recorded()
+def test_no_result_is_added_to_a_damaged_recording(make_file):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         change_time(file)
     before = path.read_bytes()
@@ -401,8 +401,8 @@ def test_a_result_that_expands_beyond_the_size_limit_is_not_read(with_result, mo
 
 
 @pytest.mark.parametrize("what", [np.zeros(3), h5py.SoftLink("/results")])
-def test_an_invalid_group_of_results_is_refused_in_a_sentence(recorded, what):
-    path = recorded()
+def test_an_invalid_group_of_results_is_refused_in_a_sentence(make_file, what):
+    path = make_file()
     with h5py.File(path, "r+") as file:
         del file["results"]
         file["results"] = what

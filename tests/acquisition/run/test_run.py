@@ -557,7 +557,7 @@ class TestStopLevels:
 
 
 class TestRefusals:
-    def refused(self, bench, tmp_path, measurement, error):
+    def require_refusal(self, bench, tmp_path, measurement, error):
         run = run_of(bench, tmp_path, measurement)
         with pytest.raises(error) as caught:
             list(run)
@@ -568,17 +568,17 @@ class TestRefusals:
 
     def test_a_plan_beyond_a_limit_is_refused_before_output(self, bench, tmp_path):
         hard = Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)
-        text = self.refused(bench, tmp_path, changed_dwell(excitation=hard), LimitExceeded)
+        text = self.require_refusal(bench, tmp_path, changed_dwell(excitation=hard), LimitExceeded)
         assert "the stroke (at 20 Hz, peak) would be" in text
 
     def test_streamed_noise_needs_an_analogue_output(self, bench, tmp_path):
         noise = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=800, duration_s=1)
-        text = self.refused(bench, tmp_path, changed_dwell(excitation=noise), ConfigurationError)
+        text = self.require_refusal(bench, tmp_path, changed_dwell(excitation=noise), ConfigurationError)
         assert "use white_noise with more realisations" in text
 
     def test_a_bench_without_a_recorded_drive_is_refused(self, bench, tmp_path):
         bench.channels = bench.channels[1:]
-        assert "no drive_voltage channel" in self.refused(bench, tmp_path, DWELL, CheckFailed)
+        assert "no drive_voltage channel" in self.require_refusal(bench, tmp_path, DWELL, CheckFailed)
 
 
 class TestTheBenchCheck:

@@ -16,7 +16,7 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import RpcError
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 
 MODULE = "cDAQ1Mod1/ai1"
 
@@ -56,13 +56,13 @@ def test_turning_on_excitation_sets_ac_coupling(task, daq):
 
 def test_excitation_needs_ac_coupling(task):
     excited_channel(task, 0.002).ai_coupling = Coupling.DC
-    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "IEPE"):
+    with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "IEPE"):
         verify(task)
 
 
 def test_an_unsupported_sensor_current_is_refused_with_the_supported_values(task):
     excited_channel(task, 0.004)
-    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"0\.004\nPossible Values: 0, 0\.002"):
+    with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"0\.004\nPossible Values: 0, 0\.002"):
         verify(task)
 
 
@@ -102,7 +102,7 @@ def test_channel_types_other_than_voltage_are_refused_by_name(task, add):
 
 
 def test_units_other_than_volts_are_refused(task):
-    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "VOLTS"):
+    with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "VOLTS"):
         task.ai_channels.add_ai_voltage_chan(
             MODULE, units=VoltageUnits.FROM_CUSTOM_SCALE, custom_scale_name="vibrometer"
         )
@@ -118,7 +118,7 @@ def test_a_terminal_configuration_the_device_does_not_have_is_refused(task):
 def test_an_unreachable_rate_is_refused_with_the_available_rates(task, rate_hz):
     task.ai_channels.add_ai_voltage_chan(MODULE)
     task.timing.cfg_samp_clk_timing(rate_hz)
-    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"1651\.61 to 51200"):
+    with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"1651\.61 to 51200"):
         verify(task)
 
 
@@ -141,7 +141,7 @@ def test_a_multiplexer_shares_its_rate_among_the_channels(task):
     ],
 )
 def test_missing_inputs_and_invalid_combinations_are_refused(task, names, code):
-    with refused(code):
+    with daq_error(code):
         task.ai_channels.add_ai_voltage_chan(names)
 
 
@@ -170,7 +170,7 @@ def test_overloads_can_be_read_only_while_the_task_is_running(task, daq):
     daq.world.gain = 6.0  # 12 V on ai1
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-10, max_val=10)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
-    with refused(DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING):
+    with daq_error(DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING):
         _ = task.in_stream.overloaded_chans_exist
     assert np.max(task.read(2560)) == 10.0
     assert task.in_stream.overloaded_chans_exist
@@ -182,5 +182,5 @@ def test_the_ni_9234_refuses_queries_about_overloads(task):
     task.ai_channels.add_ai_voltage_chan(MODULE)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
     task.start()
-    with refused(DAQmxErrors.ATTR_NOT_SUPPORTED, "NI 9234"):
+    with daq_error(DAQmxErrors.ATTR_NOT_SUPPORTED, "NI 9234"):
         _ = task.in_stream.overloaded_chans_exist

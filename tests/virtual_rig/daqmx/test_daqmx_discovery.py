@@ -8,7 +8,7 @@ from nidaqmx.constants import ProductCategory
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.system import System
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.daqmx.channels import channel_names
 from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with, expand
@@ -50,14 +50,14 @@ def test_the_usb_4431_has_one_output(system):
 
 
 def test_missing_device_features_are_refused_by_name(system):
-    with refused(DAQmxErrors.ATTR_NOT_SUPPORTED, r"(?s)analogue output.*cDAQ1Mod1"):
+    with daq_error(DAQmxErrors.ATTR_NOT_SUPPORTED, r"(?s)analogue output.*cDAQ1Mod1"):
         _ = system.devices["cDAQ1Mod1"].ao_voltage_rngs
     with pytest.raises(DaqError, match=r"Device\.PCI_BUS_NUM"):
         _ = system.devices["Dev1"].pci_bus_num
 
 
 def test_an_unknown_device_is_refused_with_a_list_of_devices(system):
-    with refused(DAQmxErrors.INVALID_DEVICE_ID, "Dev1"):
+    with daq_error(DAQmxErrors.INVALID_DEVICE_ID, "Dev1"):
         _ = system.devices["Dev9"].product_type
 
 

@@ -8,7 +8,7 @@ from nidaqmx import Task
 from nidaqmx.constants import AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 
 PATIENCE_S = 20.0
 
@@ -63,5 +63,5 @@ def test_a_task_can_be_closed_while_a_callback_is_registered(daq):
 
 def test_events_for_the_wrong_direction_are_refused(task):
     task.timing.cfg_samp_clk_timing(1000)
-    with refused(DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_NOT_FOR_INPUT):
+    with daq_error(DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_NOT_FOR_INPUT):
         task.register_every_n_samples_transferred_from_buffer_event(10, lambda *event: 0)

@@ -8,7 +8,7 @@ from nidaqmx.constants import AcquisitionType, LoggingMode, LoggingOperation
 from nidaqmx.error_codes import DAQmxErrors
 from nptdms import TdmsFile
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 
 RATE_HZ = 2000.0
 
@@ -58,10 +58,10 @@ def test_log_files_are_replaced_and_other_modes_refused(task, tmp_path):
         lambda: logging(task, path, LoggingMode.LOG),
         lambda: logging(task, path, operation=LoggingOperation.OPEN),
     ):
-        with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE):
+        with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE):
             refusal()
     logging(task, tmp_path / "no_folder" / "x.tdms")
-    with refused(DAQmxErrors.GENERIC_FILE_IO):
+    with daq_error(DAQmxErrors.GENERIC_FILE_IO):
         task.start()
     logging(task, path, LoggingMode.OFF)
     task.start()
@@ -70,5 +70,5 @@ def test_log_files_are_replaced_and_other_modes_refused(task, tmp_path):
 
 def test_outputs_are_not_logged(daq, tmp_path):
     output = daq.outputs("Dev1/ao0", 1)
-    with refused(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS):
+    with daq_error(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS):
         logging(output, tmp_path / "x")

@@ -6,7 +6,7 @@ from nidaqmx.constants import AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 from vibench.acquisition import AcquisitionError
 from vibench.virtual_rig.daqmx import acquisition as _acquisition
 from vibench.virtual_rig.daqmx.rig import WallPace
@@ -21,14 +21,14 @@ def task(daq):
 
 def test_buffers_and_reads_larger_than_the_memory_are_refused(daq, task):
     task.timing.cfg_samp_clk_timing(10_000, samps_per_chan=GIANT)
-    with refused(DAQmxErrors.PAL_MEMORY_FULL):
+    with daq_error(DAQmxErrors.PAL_MEMORY_FULL):
         task.start()
     task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000)
     interpreter = task._interpreter
-    with refused(DAQmxErrors.PAL_MEMORY_FULL):
+    with daq_error(DAQmxErrors.PAL_MEMORY_FULL):
         interpreter.read_analog_waveforms(task._handle, 1 << 30, 1.0, [], NoTiming)
     task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=2**32 - 1)
-    with refused(DAQmxErrors.PAL_MEMORY_FULL):
+    with daq_error(DAQmxErrors.PAL_MEMORY_FULL):
         task.start()
     output = daq.outputs("Dev1/ao0", 1)
     with pytest.raises(DaqError):
@@ -48,7 +48,7 @@ def test_unread_samples_are_lost_when_memory_is_full(daq, task, monkeypatch):
     daq.server.let_pass(4.0)
     assert len(task.read(100)) == 100
     daq.server.let_pass(8.0)
-    with refused(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE):
+    with daq_error(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE):
         task.read(100)
 
 
@@ -64,5 +64,5 @@ def test_a_failed_simulation_is_reported_to_every_reader(connect, pace):
     assert np.size(task.read(500)) == 500
     daq.world.voltage = fail
     for _ in range(2):
-        with refused(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, "motion was lost"):
+        with daq_error(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, "motion was lost"):
             task.read(5000)

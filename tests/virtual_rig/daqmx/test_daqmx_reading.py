@@ -15,7 +15,7 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 
 RATE_HZ = 10240.0
 
@@ -83,7 +83,7 @@ def test_a_finite_task_gives_its_samples_and_no_more(daq):
     assert task.is_task_done()
     assert task.in_stream.avail_samp_per_chan == 200
     np.testing.assert_allclose(task.read(READ_ALL_AVAILABLE), closed_form((1,), 0, 200)[0], atol=1e-9)
-    with refused(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE):
+    with daq_error(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE):
         task.read(1)
 
 
@@ -172,7 +172,7 @@ def test_a_committed_task_stays_reserved_after_a_stop(task, daq):
     task.start()
     task.stop()
     rival = daq.inputs("cDAQ1Mod1/ai0")
-    with refused(DAQmxErrors.PAL_RESOURCE_RESERVED):
+    with daq_error(DAQmxErrors.PAL_RESOURCE_RESERVED):
         rival.start()
     task.control(TaskMode.TASK_UNRESERVE)
     rival.start()

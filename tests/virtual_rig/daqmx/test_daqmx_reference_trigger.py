@@ -8,7 +8,7 @@ from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError, DaqReadError
 
-from tests.virtual_rig.conftest import refused, signal
+from tests.virtual_rig.conftest import daq_error, signal
 from vibench.virtual_rig.daqmx.rig import WallPace
 
 RATE_HZ, SAMPLES, BEFORE = 10_000.0, 300, 120
@@ -42,7 +42,7 @@ def test_a_trigger_before_the_pretrigger_samples_are_complete_is_ignored(daq, ta
     task.start()
     daq.server.let_pass((BEFORE - 1) / RATE_HZ)
     daq.server.edge("/Dev1/PFI1")
-    with refused(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
+    with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(SAMPLES, timeout=0.02)
     assert caught.value.samps_per_chan_read == 0
     daq.server.edge("/Dev1/PFI1")
@@ -93,16 +93,16 @@ def test_unsupported_reference_triggers_are_refused(daq, task):
     reference = task.triggers.reference_trigger
     for kept in (1, SAMPLES - 1, SAMPLES + 5):
         reference.cfg_dig_edge_ref_trig("PFI1", kept)
-        with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE):
+        with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE):
             task.start()
     by_line(task, "/Dev1/PFI8")
-    with refused(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING):
+    with daq_error(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING):
         task.start()
     by_line(task)
     task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
-    with refused(DAQmxErrors.REF_TRIG_WHEN_CONTINUOUS):
+    with daq_error(DAQmxErrors.REF_TRIG_WHEN_CONTINUOUS):
         task.start()
     other = daq.inputs("Dev2/ai0", RATE_HZ, samples=SAMPLES)
     other.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev2/PFI12")
-    with refused(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING):
+    with daq_error(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING):
         other.start()

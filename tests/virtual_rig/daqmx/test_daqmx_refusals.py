@@ -10,7 +10,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqReadError, RpcError
 from session_pb2 import Session
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 from vibench.virtual_rig.daqmx.errors import Fault, ServerGone
 
 
@@ -26,7 +26,7 @@ def test_a_device_in_use_is_refused_with_the_name_of_its_task(daq, task):
     task.start()
     rival = daq.task("rival")
     rival.ai_channels.add_ai_voltage_chan("Dev1/ai3")
-    with refused(DAQmxErrors.PAL_RESOURCE_RESERVED, r"(?s)measure.*rival"):
+    with daq_error(DAQmxErrors.PAL_RESOURCE_RESERVED, r"(?s)measure.*rival"):
         rival.start()
     task.stop()
     rival.start()
@@ -41,9 +41,9 @@ def test_inputs_and_outputs_of_one_device_are_independent(daq, task):
 
 def test_a_task_without_channels_cannot_be_started_or_timed(daq):
     empty = daq.task()
-    with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
+    with daq_error(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
         empty.start()
-    with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
+    with daq_error(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
         empty.timing.cfg_samp_clk_timing(1000)
 
 
@@ -55,7 +55,7 @@ def test_a_running_task_cannot_be_changed(task):
         lambda: task.ai_channels.add_ai_voltage_chan("Dev1/ai3"),
         lambda: setattr(task.timing, "samp_clk_rate", 2000.0),
     ):
-        with refused(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING):
+        with daq_error(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING):
             change()
 
 
@@ -63,7 +63,7 @@ def test_a_cleared_task_is_refused_as_invalid(daq):
     task = Task("short", grpc_options=daq.options)
     interpreter, handle = task._interpreter, task._handle
     task.close()
-    with refused(DAQmxErrors.INVALID_TASK):
+    with daq_error(DAQmxErrors.INVALID_TASK):
         interpreter.start_task(handle)
 
 
@@ -72,25 +72,25 @@ def test_a_second_task_with_the_same_name_is_refused_or_attached(daq, task):
         return GrpcSessionOptions(daq.options.grpc_channel, "", initialization_behavior=behavior)
 
     new = options(SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
-    with refused(DAQmxErrors.DUPLICATE_TASK):
+    with daq_error(DAQmxErrors.DUPLICATE_TASK):
         Task("measure", grpc_options=new)
     join = options(SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION)
     with Task("measure", grpc_options=join) as joined:
         assert joined.channel_names == task.channel_names
     assert task.channel_names  # leaving the second task has not cleared the first task
-    with refused(DAQmxErrors.INVALID_TASK):
+    with daq_error(DAQmxErrors.INVALID_TASK):
         Task("nothing", grpc_options=join)
 
 
 def test_waiting_for_a_task_that_does_not_end_times_out(task):
     task.start()
-    with refused(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE):
+    with daq_error(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE):
         task.wait_until_done(timeout=0.01)
 
 
 def test_a_missing_trigger_times_out_without_samples(daq, task):
     task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
-    with refused(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
+    with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(10, timeout=0.01)
     assert caught.value.samps_per_chan_read == 0
     daq.server.edge("/Dev1/PFI0")
@@ -108,14 +108,14 @@ def test_a_task_on_the_clock_of_another_task_starts_with_that_task(daq, task):
 
 def test_a_read_past_the_end_returns_the_remaining_samples_with_an_error(daq):
     task = daq.inputs("Dev1/ai1", 1000, samples=30)
-    with refused(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE, kind=DaqReadError) as caught:
+    with daq_error(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE, kind=DaqReadError) as caught:
         task.read(50)
     assert caught.value.samps_per_chan_read == 30
 
 
 def test_a_chassis_shows_its_trigger_terminal_once_its_task_is_reserved(daq):
     task = daq.inputs("cDAQ1Mod1/ai0")
-    with refused(DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING):
+    with daq_error(DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING):
         _ = task.triggers.start_trigger.term
     task.control(TaskMode.TASK_RESERVE)
     assert task.triggers.start_trigger.term == "/cDAQ1/ai/StartTrigger"
@@ -125,7 +125,7 @@ def test_a_simulation_that_cannot_start_leaves_the_device_free(daq):
     daq.world.slowest_hz = 2000.0
     task = daq.inputs("Dev1/ai0")
     task.timing.cfg_samp_clk_timing(1000)
-    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "2000 Hz"):
+    with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "2000 Hz"):
         task.start()
     rival = daq.inputs("Dev1/ai0")
     rival.timing.cfg_samp_clk_timing(4000)
@@ -134,7 +134,7 @@ def test_a_simulation_that_cannot_start_leaves_the_device_free(daq):
 
 def test_an_unknown_attribute_is_refused_by_name_or_number(daq, task):
     channel = task.ai_channels.all
-    with refused(DAQmxErrors.ATTR_NOT_SUPPORTED, r"Channel\.AI_LOWPASS_CUTOFF_FREQ"):
+    with daq_error(DAQmxErrors.ATTR_NOT_SUPPORTED, r"Channel\.AI_LOWPASS_CUTOFF_FREQ"):
         _ = channel.ai_lowpass_cutoff_freq
     with pytest.raises(DaqError, match=r"Read\.0x7FFF"):
         task._interpreter.get_read_attribute_uint32(task._handle, 0x7FFF)
@@ -163,7 +163,7 @@ def test_an_injected_fault_reaches_the_reader_with_its_code(daq, task, code):
     fault = Fault("ReadAnalogF64", code)
     task.read(10)
     daq.server.faults.add(fault)
-    with refused(code, kind=DaqReadError):
+    with daq_error(code, kind=DaqReadError):
         task.read(10)
     daq.server.faults.remove(fault)
     task.read(10)
@@ -176,7 +176,7 @@ def test_a_restarted_server_has_no_tasks(daq, task):
         task.read(1)
     assert caught.value.rpc_code is grpc.StatusCode.UNAVAILABLE
     daq.server.faults.remove(gone)
-    with refused(DAQmxErrors.INVALID_TASK):
+    with daq_error(DAQmxErrors.INVALID_TASK):
         task.read(1)
     task._close_on_exit, task._handle = False, None
 
@@ -196,16 +196,16 @@ def test_an_invalid_enum_number_is_refused_with_the_number(daq, task, name, fiel
     request = getattr(nidaqmx_pb2, f"{name}Request")(task=Session(name="measure"), **fields)
     if hasattr(request, "physical_channel"):
         request.physical_channel = "Dev1/ai2"
-    with pytest.raises(grpc.RpcError) as refused:
+    with pytest.raises(grpc.RpcError) as daq_error:
         getattr(nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel), name)(request)
-    assert ("ni-error", str(DAQmxErrors.INVALID_ATTRIBUTE_VALUE.value)) in refused.value.trailing_metadata()
-    assert "Requested Value: 77" in refused.value.details()
+    assert ("ni-error", str(DAQmxErrors.INVALID_ATTRIBUTE_VALUE.value)) in daq_error.value.trailing_metadata()
+    assert "Requested Value: 77" in daq_error.value.details()
 
 
 def test_invalid_waveforms_are_refused(daq):
     output = daq.task("play")
     output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
     request = nidaqmx_pb2.WriteAnalogWaveformsRequest(task=Session(name="play"))
-    with pytest.raises(grpc.RpcError) as refused:
+    with pytest.raises(grpc.RpcError) as daq_error:
         nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel).WriteAnalogWaveforms(request)
-    assert "number of waveforms" in refused.value.details()
+    assert "number of waveforms" in daq_error.value.details()

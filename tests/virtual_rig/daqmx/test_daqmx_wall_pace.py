@@ -8,7 +8,7 @@ from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqReadError
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 from vibench.virtual_rig.daqmx.rig import WallPace
 
 
@@ -45,7 +45,7 @@ def test_samples_become_available_only_after_their_time(connect, clock):
     task = continuous(daq)
     task.start()
     assert task.in_stream.avail_samp_per_chan == 0
-    with refused(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError):
+    with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError):
         task.read(1, timeout=0.0)
     clock.now_s += 0.25
     wait_for(daq, 250, task)
@@ -58,7 +58,7 @@ def test_a_timeout_returns_the_samples_so_far(connect, clock):
     task.start()
     clock.now_s += 0.1
     wait_for(daq, 100, task)
-    with refused(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
+    with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(150, timeout=0.02)
     assert caught.value.samps_per_chan_read == 100
     assert task.in_stream.avail_samp_per_chan == 0
@@ -89,9 +89,9 @@ def test_a_reader_that_is_too_late_gets_a_lost_samples_error(connect, clock):
     rig = daq.server._rig
     with rig.changed:
         assert rig.changed.wait_for(lambda: rig._acquisitions[0].failure is not None, 10.0)
-    with refused(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, kind=DaqReadError):
+    with daq_error(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, kind=DaqReadError):
         task.read(10)
-    with refused(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE):
+    with daq_error(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE):
         task.is_task_done()
 
 

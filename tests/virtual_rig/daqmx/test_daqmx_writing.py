@@ -8,7 +8,7 @@ from nidaqmx.errors import DaqWriteError
 from nidaqmx.stream_writers import AnalogMultiChannelWriter, AnalogSingleChannelWriter
 from nitypes.waveform import AnalogWaveform
 
-from tests.virtual_rig.conftest import refused
+from tests.virtual_rig.conftest import daq_error
 
 RATE_HZ = 20000.0
 OUTPUT = "Dev1/ao0"
@@ -102,10 +102,10 @@ def test_samples_that_are_not_written_in_time_stop_the_output(pair, daq):
     inputs.start()
     heard = np.array(inputs.read(4000))
     assert np.flatnonzero(heard).tolist() == list(range(1000))
-    with refused(DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, kind=DaqWriteError) as caught:
+    with daq_error(DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, kind=DaqWriteError) as caught:
         outputs.write(np.ones(10))
     assert caught.value.samps_per_chan_written == 0
-    with refused(DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES):
+    with daq_error(DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES):
         outputs.is_task_done()
 
 
@@ -147,22 +147,22 @@ def test_stopping_silences_the_output_at_once(pair, daq):
 
 def test_a_value_beyond_the_limits_is_refused_and_nothing_is_played(pair, daq):
     _, outputs = pair
-    with refused(DAQmxErrors.INVALID_AO_DATA_WRITE, r"3\.6", kind=DaqWriteError):
+    with daq_error(DAQmxErrors.INVALID_AO_DATA_WRITE, r"3\.6", kind=DaqWriteError):
         outputs.write(np.array([0.0, 3.6]))
-    with refused(DAQmxErrors.OUTPUT_BUFFER_EMPTY):
+    with daq_error(DAQmxErrors.OUTPUT_BUFFER_EMPTY):
         outputs.start()
 
 
 def test_limits_beyond_the_device_are_refused(daq):
     task = daq.outputs(OUTPUT, 10)
-    with refused(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"-3\.5 to 3\.5 V"):
+    with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"-3\.5 to 3\.5 V"):
         task.control(TaskMode.TASK_VERIFY)
 
 
 def test_writing_more_than_the_buffer_size_is_refused_before_the_start(pair):
     _, outputs = pair
     outputs.out_stream.output_buf_size = 100
-    with refused(DAQmxErrors.NO_MORE_SPACE, "100 samples", kind=DaqWriteError):
+    with daq_error(DAQmxErrors.NO_MORE_SPACE, "100 samples", kind=DaqWriteError):
         outputs.write(np.zeros(101))
 
 
@@ -198,5 +198,5 @@ def test_a_waveform_object_is_played_sample_by_sample(pair):
 
 def test_writing_to_a_task_of_inputs_is_refused(daq):
     task = daq.inputs("Dev1/ai0")
-    with refused(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK):
+    with daq_error(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK):
         AnalogSingleChannelWriter(task.out_stream).write_many_sample(np.zeros(3))

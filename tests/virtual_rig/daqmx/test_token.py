@@ -14,7 +14,7 @@ from vibench.virtual_rig.usb.bus import RemoteUsbDevice
 
 
 @pytest.fixture
-def served(pytestconfig):
+def served_rig(pytestconfig):
     rig = load_rig("virtual_rig")
     resource = "USB0::0x0699::0x0353::TOKEN::INSTR"
     rig = changed(rig, generator={"resource": resource})
@@ -36,8 +36,8 @@ def test_loopback_needs_no_token_and_every_other_address_does():
     assert token_for("0.0.0.0:31763") != token_for("192.168.0.7:31763")
 
 
-def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served):
-    _, address = served
+def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served_rig):
+    _, address = served_rig
     with (
         grpc.insecure_channel(address) as channel,
         pytest.raises(nidaqmx.errors.RpcError, match=r"UNAUTHENTICATED|served with a token"),
@@ -47,8 +47,8 @@ def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served):
         RemoteUsbDevice(address)
 
 
-def test_a_bench_with_the_token_is_accepted(served, monkeypatch):
-    virtual, address = served
+def test_a_bench_with_the_token_is_accepted(served_rig, monkeypatch):
+    virtual, address = served_rig
     monkeypatch.setenv(TOKEN_VARIABLE, virtual.token)
     with bench_on(remote_rig(virtual, address)) as bench:
         assert bench.digitizer.identity.model == "NI 9234"
@@ -57,8 +57,8 @@ def test_a_bench_with_the_token_is_accepted(served, monkeypatch):
     remote.close()
 
 
-def test_a_wrong_token_is_refused(served, monkeypatch):
-    virtual, address = served
+def test_a_wrong_token_is_refused(served_rig, monkeypatch):
+    virtual, address = served_rig
     monkeypatch.setenv(TOKEN_VARIABLE, virtual.token[:-1])
     with pytest.raises(InstrumentLost, match="UNAUTHENTICATED"):
         RemoteUsbDevice(address)

@@ -98,7 +98,7 @@ def bench(rig: Rig) -> Iterator[Bench]:
 
 
 @contextmanager
-def refused() -> Iterator[None]:
+def refusal() -> Iterator[None]:
     """Require an AcquisitionError other than BrokenPromise."""
     with pytest.raises(AcquisitionError) as error:
         yield

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import refused
+from vibench.acquisition.contract.conftest import refusal
 from vibench.acquisition.instruments import PlugInKind
 
 KIND = PlugInKind.DIGITIZER
@@ -43,12 +43,12 @@ def test_samples_are_counted_from_zero_again_after_a_stop(bench: Bench) -> None:
 
 
 def test_reading_before_the_start_and_starting_twice_are_refused(bench: Bench) -> None:
-    with refused():
+    with refusal():
         bench.digitizer.read(BLOCK)
     bench.digitizer.start()
-    with refused():
+    with refusal():
         bench.digitizer.start()
-    with refused():
+    with refusal():
         bench.digitizer.read(0)
 
 
@@ -71,5 +71,5 @@ def test_reading_a_closed_converter_is_refused_and_closing_twice_is_allowed(benc
     bench.digitizer.close()
     bench.digitizer.close()
     bench.digitizer.stop()
-    with refused():
+    with refusal():
         bench.digitizer.read(BLOCK)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refused
+from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refusal
 from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.instruments import Knob, PlugInKind, Sweep
 from vibench.acquisition.rig import Rig, generator_driver
@@ -182,5 +182,5 @@ def test_closing_silences_the_output_and_may_be_repeated(bench: Bench) -> None:
     bench.generator.stop()
     bench.digitizer.start()
     assert is_quiet(bench)
-    with refused():
+    with refusal():
         bench.generator.load_sine(TONE_HZ, level)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refused
+from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refusal
 from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.instruments import AnalogOutput, IdleOutput, PlugInKind, Samples
 
@@ -74,7 +74,7 @@ def test_a_sample_beyond_the_limit_is_refused(bench: Bench, peak: float) -> None
 
 
 def test_arming_without_written_samples_is_refused(bench: Bench) -> None:
-    with refused():
+    with refusal():
         output_of(bench).arm()
 
 
@@ -95,5 +95,5 @@ def test_closing_may_be_repeated_and_ends_writing(bench: Bench) -> None:
     output = output_of(bench)
     output.close()
     output.close()
-    with refused():
+    with refusal():
         output.write(np.zeros(16))

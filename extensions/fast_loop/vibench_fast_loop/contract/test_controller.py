@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refused
+from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refusal
 from vibench.acquisition.instruments import PlugInKind, Samples
 from vibench.acquisition.rig import LoopInput, Role
 
@@ -144,5 +144,5 @@ def test_closing_silences_the_controller_and_may_be_repeated(bench: Bench) -> No
     controller.close()
     controller.close()
     assert line_v(measured_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
-    with refused():
+    with refusal():
         controller.play(series(bench))

@@ -87,7 +87,7 @@ def page(shared_page, folder, wait_for):
 
 
 @pytest.fixture
-def opened(page, folder, wait_for):
+def show_file(page, folder, wait_for):
     """Open a recording by its row, and wait until its time histories are shown."""
 
     def open_row(name):
@@ -106,7 +106,7 @@ def cell(page, name, heading):
     raise AssertionError(f"{name} is not listed")
 
 
-def drawn(page, number):
+def curve_data(page, number):
     (curve, *_) = page.time_histories.plots[number].getPlotItem().listDataItems()
     return curve.getData()
 
@@ -131,8 +131,8 @@ def test_columns_and_fields_show_their_texts_on_the_smallest_screen(page):
     assert page.findChild(LineField).width() > fonts.averageCharWidth() * 20
 
 
-def test_a_recording_without_its_seal_gets_a_warning(opened, wait_for):
-    page = opened("old.h5")
+def test_a_recording_without_its_seal_gets_a_warning(show_file, wait_for):
+    page = show_file("old.h5")
     assert "seal gone" in cell(page, "old", "Verdict")
     wait_for(lambda: page._facts.sentence.startswith("✖ seal gone: its seal is gone"))
 
@@ -171,33 +171,33 @@ def test_every_readable_recording_has_a_thumbnail(page):
     assert {name for name, picture in pictures.items() if picture is not None} == {"whole", "stopped", "old"}
 
 
-def test_an_impact_of_three_samples_is_visible_at_every_zoom(opened):
-    page = opened("whole.h5")
+def test_an_impact_of_three_samples_is_visible_at_every_zoom(show_file):
+    page = show_file("whole.h5")
     for low_s, high_s in ((0.0, 10.0), (IMPACT_S - 0.5, IMPACT_S + 0.5), (IMPACT_S - 2e-3, IMPACT_S + 2e-3)):
         page.time_histories.show_range(low_s, high_s)
         page.time_histories._draw()
-        time_s, values = drawn(page, 2)
+        time_s, values = curve_data(page, 2)
         assert np.nanmax(values) == pytest.approx(0.4, rel=1e-5)
         assert np.nanmin(values) == pytest.approx(-0.5, rel=1e-5)
         assert time_s[0] <= low_s + 0.01
         assert len(time_s) <= 2.1 * page.time_histories.width()
 
 
-def test_a_recording_without_overview_can_be_opened(opened):
-    page = opened("old.h5")
-    assert np.nanmax(drawn(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
+def test_a_recording_without_overview_can_be_opened(show_file):
+    page = show_file("old.h5")
+    assert np.nanmax(curve_data(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
 
 
-def test_a_broken_file_shows_the_reason_and_a_remedy(page, opened, folder, qtbot):
+def test_a_broken_file_shows_the_reason_and_a_remedy(page, show_file, folder, qtbot):
     with qtbot.waitSignal(page.context.noticed) as said:
         page.table.choose(folder / "broken.h5")
     assert "is not a readable HDF5 file" in said.args[0].what
     assert page.time_histories.plots == ()
-    assert len(opened("whole.h5").time_histories.plots) == 3
+    assert len(show_file("whole.h5").time_histories.plots) == 3
 
 
-def test_keys_zoom_pan_and_reset_the_view(opened, qtbot):
-    page = opened("whole.h5")
+def test_keys_zoom_pan_and_reset_the_view(show_file, qtbot):
+    page = show_file("whole.h5")
     qtbot.keyClick(page.time_histories, Qt.Key.Key_Plus)
     low_s, high_s = page.time_histories.view_s
     assert high_s - low_s == pytest.approx(6.0)
@@ -207,8 +207,8 @@ def test_keys_zoom_pan_and_reset_the_view(opened, qtbot):
     assert page.time_histories.view_s == pytest.approx((0.0, 10.0))
 
 
-def test_zoom_and_pan_are_limited_to_the_recording_and_to_a_few_samples(opened):
-    page = opened("whole.h5")
+def test_zoom_and_pan_are_limited_to_the_recording_and_to_a_few_samples(show_file):
+    page = show_file("whole.h5")
     page.time_histories.show_range(-50.0, 100.0)
     assert page.time_histories.view_s == (0.0, 10.0)
     page.time_histories.show_range(5.0, 5.0 + 1e-9)
@@ -216,8 +216,8 @@ def test_zoom_and_pan_are_limited_to_the_recording_and_to_a_few_samples(opened):
     assert high_s - low_s == pytest.approx(8 / 6400.0, rel=1e-3)
 
 
-def test_markers_measure_time_differences(opened):
-    page = opened("whole.h5")
+def test_markers_measure_time_differences(show_file):
+    page = show_file("whole.h5")
     page._markers.setChecked(True)
     markers = page.time_histories.markers
     for (_, line, *_), time_s in zip(markers.lines, (2.0, 2.5), strict=True):
@@ -262,8 +262,8 @@ def test_a_recording_from_another_folder_can_be_opened(page, record, tmp_path, q
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
-def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(opened, wait_for):
-    page = opened("whole.h5")
+def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(show_file, wait_for):
+    page = show_file("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
     for spacing in range(view.spacing.count()):
@@ -286,8 +286,8 @@ def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(opened, wai
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_opening_by_path_reads_the_recording_once(opened, folder, wait_for, monkeypatch):
-    page, read = opened("stopped.h5"), []
+def test_opening_by_path_reads_the_recording_once(show_file, folder, wait_for, monkeypatch):
+    page, read = show_file("stopped.h5"), []
 
     def counted(path):
         read.append(path)
@@ -316,8 +316,8 @@ def test_a_recording_may_finish_while_it_is_displayed(page, begin_recording, tmp
     assert said == []
 
 
-def test_time_histories_follow_the_theme_and_name_channels_and_units(opened):
-    page = opened("whole.h5")
+def test_time_histories_follow_the_theme_and_name_channels_and_units(show_file):
+    page = show_file("whole.h5")
     page.retheme(DARK)
     assert [plot.accessibleName() for plot in page.time_histories.plots] == [
         "drive voltage over time",
@@ -424,8 +424,8 @@ def test_no_hint_asks_for_a_recording_when_a_recording_is_selected(
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(opened, wait_for, qtbot):
-    page = opened("whole.h5")
+def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(show_file, wait_for, qtbot):
+    page = show_file("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
     wait_for(lambda: not view.is_busy and view.image.item.image is not None)
