@@ -11,7 +11,14 @@ from time import monotonic
 
 import pytest
 
-from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
+from vibench.acquisition import (
+    AcquisitionError,
+    StopLevel,
+    StopSwitch,
+    open_bench,
+    shipped,
+    stop_on_signal,
+)
 from vibench.acquisition.engine import EngineGone, StopDelivery, programs_to_stop, stop_engine
 from vibench.acquisition.engine._client import EngineAddress, announce
 from vibench.acquisition.stopping.program import (
@@ -125,6 +132,30 @@ def test_a_killed_program_is_reported_until_a_bench_of_its_rig_is_silent(capsys)
             assert [each.what for each in announced_programs(Program)] == ["dwell"]
     note_open_bench("lab")
     assert not list(engines_folder().iterdir()), left
+
+
+OPENED_AND_KILLED = """
+import os, signal, sys
+from pathlib import Path
+from vibench.acquisition import StopSwitch, open_bench, stop_on_signal
+with open_bench(Path(sys.argv[1])), stop_on_signal(StopSwitch(), "x"):
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_killed_program_is_reported_until_the_same_generator_is_silent(tmp_path, capsys):
+    """Two rigs may have the same name, for example after a file was copied."""
+    usual = shipped("hardware_configs/virtual_rig.toml")
+    other = tmp_path / "other.toml"
+    other.write_text(usual.read_text(encoding="utf-8").replace("::C019999::", "::C010001::"))
+    subprocess.run([sys.executable, "-c", OPENED_AND_KILLED, other], check=False)
+    with open_bench(usual):
+        pass
+    assert stop_programs("ramp", "smoke", "") == 1
+    assert "switch the amplifier off" in capsys.readouterr().err
+    with open_bench(other):
+        pass
+    assert not list(engines_folder().iterdir())
 
 
 def test_announcements_are_found_after_the_computer_was_renamed(monkeypatch):

@@ -371,7 +371,8 @@ def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None,
     with ExitStack() as silencing:
         silencing.callback(generator.close)
         silencing.callback(generator.stop)  # callbacks run in reverse order
-        note_open_bench(rig.name)
+        simulated = "simulated " if rig.virtual or rig.plays_back else ""
+        note_open_bench(simulated + next(_instruments(rig)))  # several rigs may have the same name
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)

@@ -182,7 +182,7 @@ class Program(BaseModel):
     computer: str = ""
     """Name of the computer; a state folder may be in a home folder that several computers share."""
     rigs: tuple[str, ...] = ()
-    """Names of the rigs whose benches the process has opened."""
+    """Generators of the rigs whose benches the process has opened."""
 
     @property
     def place(self) -> Place:
@@ -207,7 +207,7 @@ class Program(BaseModel):
 
 
 _RIGS: set[str] = set()
-"""Names of the rigs whose benches this process has opened."""
+"""Generators of the rigs whose benches this process has opened."""
 
 AnyProgram = TypeVar("AnyProgram", bound=Program)
 
@@ -251,7 +251,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 
 def note_open_bench(rig: str) -> None:
-    """Note that this process has silenced a rig's generator, so no earlier program can have left it on."""
+    """Note that this process has silenced the generator ``rig``: earlier programs left nothing on there."""
     _RIGS.add(rig)
     with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
         for each in unconfirmed_programs():
