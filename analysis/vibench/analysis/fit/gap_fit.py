@@ -6,21 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from vibench.acquisition.plan import Dwell
 from vibench.sim import Specimen, base_transmissibility
 
 from ..errors import NotEnoughData
 from ..signals.arrays import Complexes, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE
-from ..sine.collision_region import Edge
-from ..sine.dwell_analysis import DwellAnalysis
-from ..sine.sweep import SweepResponse
+from ..sine.dwell_analysis import DwellAnalysis, DwellPlan
 from ..sine.sweep_analysis import SweepAnalysis
 from .collision_numbers import CALM, COLLIDING, peakedness
 from .parameters import FittedValue, Parameter, parameter_value, with_values
 from .specimen_fit import SpecimenFit
 
-_RELATIVE = 3
-"""Column of p in `base_transmissibility`."""
+_M0, _RELATIVE = 0, 3
+"""Columns of m0 and p in `base_transmissibility`."""
+_MOST_APART = 0.03
+"""Largest logarithmic ratio of measured to linear motion of m0; smooth motion with contact differs more."""
 _STEP_HZ = 0.02
 """Frequency step for the curvature of the transmissibility, 1 % of the narrowest resonance [Hz]."""
 _STEP = 1e-4
@@ -28,7 +29,7 @@ _STEP = 1e-4
 _EDGE_POINTS = 41
 _APPROACH_S = 1.0
 _LEAST_INTERVALS = 3
-"""Minimum number of intervals for fitting a line to A0."""
+"""Minimum number of intervals before an onset for fitting a line to A0."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,7 @@ def _narrowest(found: Sequence[Onset], linear: Specimen) -> FittedValue:
     )
 
 
-def fit_gap(
-    sweeps: Sequence[SweepAnalysis],
-    linear: Specimen,
-    fit: SpecimenFit | None = None,
-) -> FittedValue:
+def fit_gap(sweeps: Sequence[SweepAnalysis], linear: Specimen, fit: SpecimenFit | None = None) -> FittedValue:
     """Return the gap from the onset of collisions with the narrowest bounds.
 
     Raises NotEnoughData when no sweep enters a colliding region.
@@ -76,71 +73,57 @@ def fit_gap(
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit)]
     if not found:
         raise NotEnoughData(
-            "no sweep goes from motion without collisions to collisions, so the gap is not determined; "
-            "sweep with more drive, or start at a frequency without collisions"
+            "no sweep goes from motion without collisions, as the specimen predicts it, to collisions, so "
+            "the gap is not determined; sweep with more drive, or start at a frequency without collisions"
         )
     return _narrowest(found, linear)
 
 
 def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = None) -> Iterator[Onset]:
-    """Yield the gap at every onset of collisions in a sweep.
+    """Yield the gap at the first onset of collisions in a sweep, if linear motion of m0 precedes it.
 
-    The bounds of the gap include the bounds of the edge, and the uncertainty of drive and linear specimen.
+    The bounds of the gap include the bounds of the edge, the uncertainty of drive and linear specimen, and
+    twice the difference between measured and linear motion of m0.
     """
     reach = float(norm.ppf(0.5 + 0.5 * DEFAULT_CONFIDENCE))
-    rate = sweep.response.sweep_rate_hz_per_s
-    for region in sweep.collisions.regions:
-        if region.reaches_start:
+    motion, rate = sweep.response, sweep.response.sweep_rate_hz_per_s
+    # Between two regions the masses may still collide, smoothly.
+    for edge in (each.start for each in sweep.collisions.regions[:1] if not each.reaches_start):
+        last = int(np.argmin(np.abs(motion.time_s - edge.time_s))) - 1
+        before = slice(max(0, last - round(_APPROACH_S / motion.interval_s)), max(0, last))
+        hz, a0_m = motion.frequency_hz[before], motion.drive_amplitude_m[before]
+        if hz.size < _LEAST_INTERVALS or sweep.collisions.is_unexplained[before].any():
             continue
-        edge = region.start
-        drive = _approach(sweep.response, edge)
-        near = np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS)
-        filled = drive.at(near) * np.abs(swept_relative(linear, near, rate))
-        at_edge = np.array([edge.frequency_hz])
-        spread = reach * np.hypot(drive.relative_sd, _linear_spread(linear, fit, at_edge, rate))
+        apart = _apart(motion.response_ii[before], np.abs(swept_response(linear, hz, rate)[:, _M0]))
+        if not apart < _MOST_APART:
+            continue
+        # A line over frequency, because collisions disturb the base motion.
+        line = np.polynomial.Polynomial.fit(hz, a0_m, 1)
+        drive_sd = float(np.median(motion.sd_drive_amplitude_m[before] / a0_m))
+        near = np.append(edge.frequency_hz, np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS))
+        filled = line(near) * np.abs(swept_response(linear, near, rate)[:, _RELATIVE])
+        spread = reach * np.hypot(drive_sd, _linear_spread(linear, fit, near[:1], rate)) + 2 * apart
         yield Onset(
             frequency_hz=edge.frequency_hz,
-            gap_m=float(drive.at(at_edge)[0] * np.abs(swept_relative(linear, at_edge, rate))[0]),
+            gap_m=float(filled[0]),
             low_m=float(np.min(filled) * np.exp(-spread)),
             high_m=float(np.max(filled) * np.exp(spread)),
         )
 
 
-@dataclass(frozen=True)
-class _Approach:
-    """A0 before an onset, fitted as a line over frequency, because collisions disturb the base motion."""
-
-    slope: float
-    offset_m: float
-    relative_sd: float
-
-    def at(self, frequency_hz: Reals) -> Reals:
-        return np.asarray(self.offset_m + self.slope * frequency_hz)
+def _apart(measured: Reals | float, linear: Reals) -> float:
+    """Return the largest relative difference of measured and linear motion."""
+    return float(np.max(np.abs(np.log(measured / linear))))
 
 
-def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
-    """Fit A0 to the intervals before an onset, without the last interval."""
-    last = int(np.argmin(np.abs(measured.time_s - edge.time_s))) - 1
-    first = max(0, last - round(_APPROACH_S / measured.interval_s))
-    if last - first < _LEAST_INTERVALS:
-        raise NotEnoughData(
-            f"the sweep begins {max(last, 0)} intervals before the collisions, but a fit of A0 needs "
-            f"{_LEAST_INTERVALS} intervals; begin the sweep further away"
-        )
-    before = slice(first, last)
-    slope, offset = np.polyfit(measured.frequency_hz[before], measured.drive_amplitude_m[before], 1)
-    typical = float(np.median(measured.sd_drive_amplitude_m[before] / measured.drive_amplitude_m[before]))
-    return _Approach(float(slope), float(offset), typical)
-
-
-def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float) -> Complexes:
-    """Return the phasor of p relative to the base in a linear sweep without contact, shape as frequency_hz.
+def swept_response(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float) -> Complexes:
+    """Return the columns of `base_transmissibility` in a linear sweep without contact.
 
     H - (i / 4 pi) (df/dt) d2H/df2: steady response with its lag in a sweep, to first order in the sweep rate.
     """
 
     def at(shift_hz: float) -> Complexes:
-        return np.asarray(base_transmissibility(specimen, frequency_hz + shift_hz)[:, _RELATIVE])
+        return np.asarray(base_transmissibility(specimen, frequency_hz + shift_hz))
 
     curvature = (at(_STEP_HZ) - 2.0 * at(0.0) + at(-_STEP_HZ)) / _STEP_HZ**2
     return np.asarray(at(0.0) - 1j / (4.0 * np.pi) * rate_hz_per_s * curvature)
@@ -153,21 +136,19 @@ def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate
     slopes = []
     for each in fit.values:
         value = parameter_value(linear, each.parameter)
-        shifted = [
-            abs(
-                swept_relative(
-                    with_values(linear, {each.parameter: value * np.exp(step)}), at_hz, rate_hz_per_s
-                )
-            )
+        up, down = (
+            swept_response(with_values(linear, {each.parameter: value * np.exp(step)}), at_hz, rate_hz_per_s)
             for step in (_STEP, -_STEP)
-        ]
-        slopes.append(float(np.log(shifted[0] / shifted[1])[0]) / (2.0 * _STEP))
+        )
+        slopes.append(float(np.log(np.abs(up / down))[0, _RELATIVE]) / (2.0 * _STEP))
     gradient = np.array(slopes)
     return float(np.sqrt(gradient @ fit.covariance @ gradient))
 
 
 _SAME_HZ = 0.5
 """Dwells closer than this [Hz] have the same frequency."""
+_OVERSHOOT = 1.5
+"""Largest p in the staircase of a ramp, relative to steady motion; usually below 1.2."""
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
@@ -187,23 +168,38 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onset]:
     """Yield the onset at every frequency that has dwells with and without collisions.
 
-    The lower bound is the largest relative motion without collisions. The upper bound is the smallest linear
-    motion with collisions. Collisions disturb the base, so this linear motion is scaled from the largest
-    dwell without collisions, in proportion to the generator amplitude.
+    The lower bound is the largest relative motion without collisions, where m0 moves as the specimen
+    predicts: masses may also collide smoothly. The upper bound is the smallest linear motion with collisions
+    that did not begin at a higher level, where they may have persisted from; it allows for a transient in the
+    ramp. Collisions disturb the base, so this linear motion is scaled from the largest dwell without
+    collisions, in proportion to the generator amplitude.
     """
     rest = list(dwells)
     while rest:
         at_hz = rest[0].response.drive.frequency_hz
         here = [each for each in rest if abs(each.response.drive.frequency_hz - at_hz) < _SAME_HZ]
         rest = [each for each in rest if each not in here]
-        calm = [each for each in here if peakedness(each) <= CALM]
-        colliding = [each for each in here if peakedness(each) >= COLLIDING]
+        moved, per_m = np.abs(base_transmissibility(linear, [at_hz])[0, [_M0, _RELATIVE]])
+        calm = [
+            each
+            for each in here
+            if peakedness(each) <= CALM and _apart(each.response.response_ii, moved) < _MOST_APART
+        ]
+        colliding = [each for each in here if peakedness(each) >= COLLIDING and _is_raised(each.excitation)]
         if not calm or not colliding:
             continue
         loudest = max(calm, key=lambda each: each.excitation.amplitude_vpp)
-        per_m = abs(base_transmissibility(linear, [at_hz])[0, _RELATIVE])
-        low_m = float(per_m * loudest.response.drive.amplitude_m)
+        steady_m = float(per_m * loudest.response.drive.amplitude_m)
+        low_m = steady_m * (1 - _apart(loudest.response.response_ii, moved))
         volts = min(each.excitation.amplitude_vpp for each in colliding)
-        high_m = low_m * volts / loudest.excitation.amplitude_vpp
-        if high_m > low_m:
+        high_m = _OVERSHOOT * steady_m * volts / loudest.excitation.amplitude_vpp
+        if volts > loudest.excitation.amplitude_vpp:
             yield Onset(at_hz, float(np.sqrt(low_m * high_m)), low_m, high_m)
+
+
+def _is_raised(plan: DwellPlan) -> bool:
+    """Return whether a dwell was reached from silence by rising levels at its own frequency."""
+    return isinstance(plan, Dwell) and all(
+        abs(each.frequency_hz - plan.frequency_hz) < _SAME_HZ and each.amplitude_vpp <= plan.amplitude_vpp
+        for each in plan.lead_in
+    )
