@@ -102,3 +102,21 @@ def test_noise_with_collisions_is_refused(vibench_here, tmp_path, level_vpp):
     fit = json.loads(as_json.stdout)["specimen_fit"]
     assert (fit["fits"], fit["values"]) == (False, {})
     assert fit["suspects"][0]["assumption"] == "linearity"
+
+
+DWELL = """
+[[measurements]]
+name = "dwell"
+excitation = { kind = "dwell", amplitude_vpp = 1.5, frequency_hz = 260, settle_s = 1, duration_s = 2 }
+"""
+
+
+@pytest.mark.thorough
+def test_noise_with_collisions_does_not_prevent_the_fit_of_gaps_to_a_dwell(vibench_here, tmp_path):
+    (tmp_path / "levels.toml").write_text(LEVELS.format(1.0) + DWELL)
+    vibench_here("measure", "levels.toml", "--out", "levels", "--check", "waived", cwd=tmp_path)
+    as_json = vibench_here("analyse", "levels", "--fit", "--no-simulate", "--json", cwd=tmp_path)
+    fit = json.loads(as_json.stdout)["specimen_fit"]
+    assert (fit["fits"], fit["values"], fit["tracked_from"]) == (False, {}, "dwell")
+    for gap in ("lower_gap_m", "upper_gap_m"):
+        assert fit["tracked"][gap]["low"] < 45e-6 < fit["tracked"][gap]["high"]

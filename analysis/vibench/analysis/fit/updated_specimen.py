@@ -310,11 +310,11 @@ def update_model(
         not_determined=(),
         nominal=described,
     )
-    if linear is not None and not linear.fits:
+    if linear is not None and linear.lines and not linear.fits:
         reasons.append("Gaps and contacts stay as described: the linear model does not fit.")
     else:
         updated = _with_gaps(updated, results, reasons, observer)
-        if not updated.fitted:
+        if not updated.fitted and updated.fits:
             raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(reasons)}")
     return replace(updated, not_determined=tuple(reasons))
 
