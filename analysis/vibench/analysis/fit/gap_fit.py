@@ -63,8 +63,7 @@ def fit_gap(sweeps: Sequence[SweepAnalysis], linear: Specimen, fit: SpecimenFit 
     Parameters
     ----------
     sweeps
-        Measured sweeps. The onset is the edge at which a sweep enters a colliding region; at the edge where
-        it leaves the region, collisions persist.
+        Measured sweeps; the onset is the edge at which a sweep enters its first colliding region.
     linear
         Specimen for the linear motion; its own gap is only the nominal value of the result.
     fit
@@ -95,20 +94,15 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
         if hz.size < _LEAST_INTERVALS or sweep.collisions.is_unexplained[before].any():
             continue
         apart = _apart(motion.response_ii[before], np.abs(swept_response(linear, hz, rate)[:, _M0]))
-        if not apart < _MOST_APART:
-            continue
         # A line over frequency, because collisions disturb the base motion.
         line = np.polynomial.Polynomial.fit(hz, a0_m, 1)
         drive_sd = float(np.median(motion.sd_drive_amplitude_m[before] / a0_m))
         near = np.append(edge.frequency_hz, np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS))
         filled = line(near) * np.abs(swept_response(linear, near, rate)[:, _RELATIVE])
         spread = reach * np.hypot(drive_sd, _linear_spread(linear, fit, near[:1], rate)) + 2 * apart
-        yield Onset(
-            frequency_hz=edge.frequency_hz,
-            gap_m=float(filled[0]),
-            low_m=float(np.min(filled) * np.exp(-spread)),
-            high_m=float(np.max(filled) * np.exp(spread)),
-        )
+        low_m, high_m = np.min(filled) * np.exp(-spread), np.max(filled) * np.exp(spread)
+        if apart < _MOST_APART:
+            yield Onset(edge.frequency_hz, float(filled[0]), float(low_m), float(high_m))
 
 
 def _apart(measured: Reals | float, linear: Reals) -> float:
@@ -168,11 +162,10 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onset]:
     """Yield the onset at every frequency that has dwells with and without collisions.
 
-    The lower bound is the largest relative motion without collisions, where m0 moves as the specimen
-    predicts: masses may also collide smoothly. The upper bound is the smallest linear motion with collisions
-    that did not begin at a higher level, where they may have persisted from; it allows for a transient in the
-    ramp. Collisions disturb the base, so this linear motion is scaled from the largest dwell without
-    collisions, in proportion to the generator amplitude.
+    The lower bound is the largest relative motion without collisions, where m0 moves as predicted: masses may
+    also collide smoothly. The upper bound is the smallest linear motion with collisions, that cannot persist
+    from a higher level or another frequency. As collisions disturb the base, this linear motion is scaled
+    from the largest dwell without collisions, in proportion to the generator amplitude.
     """
     rest = list(dwells)
     while rest:
