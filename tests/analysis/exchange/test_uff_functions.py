@@ -151,13 +151,21 @@ def test_a_recording_without_drive_has_no_densities(tmp_path):
             with pytest.raises(
                 NotEnoughData, match=r"need 1 s of uninterrupted excitation.*; choose a longer excerpt"
             ):
-                spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest())
+                next(spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest()))
 
 
 def test_formats_without_spectra_name_a_suitable_format(known, tmp_path):
     with pytest.raises(InvalidRequest, match=r"spectra were requested as csv.*choose uff"):
         export_functions(excerpt(known), [], Format.CSV, tmp_path / "a.csv")
     assert not list(tmp_path.iterdir())
+
+
+def test_an_existing_file_or_a_wrong_format_is_refused_before_spectra_are_computed(known, tmp_path):
+    computed = (pytest.fail("this takes minutes") for _ in "once")
+    (tmp_path / "a.uff").touch()
+    for to in (Format.UFF, Format.CSV):
+        with pytest.raises(InvalidRequest, match=r"a\.uff exists|spectra were requested as csv"):
+            export_functions(excerpt(known), computed, to, tmp_path / f"a.{to.value}")
 
 
 def test_an_import_ignores_spectra(known, tmp_path):

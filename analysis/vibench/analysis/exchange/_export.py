@@ -2,7 +2,7 @@
 
 import errno
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
@@ -205,7 +205,7 @@ def export_samples(
 
 
 def export_functions(
-    excerpt: Excerpt, functions: Sequence[UniversalFunction], to: Format, path: Path
+    excerpt: Excerpt, functions: Iterable[UniversalFunction], to: Format, path: Path
 ) -> tuple[Path, ...]:
     """Write frequency responses and spectra of an excerpt to ``path``, and its facts to a file next to it.
 
@@ -217,7 +217,7 @@ def export_functions(
     excerpt
         Excerpt from which the functions were estimated.
     functions
-        Functions in the order of writing.
+        Functions in the order of writing; requested after the format and the path are checked.
     to
         Export format that can store functions.
     path
@@ -231,9 +231,10 @@ def export_functions(
             "the tables that vibench analyse writes"
         )
     facts = facts_path(path)
-    require_unused(facts)
+    for each in (path, facts):
+        require_unused(each)
     with new_file(path) as unfinished:
-        write(excerpt, functions, unfinished)
+        write(excerpt, tuple(functions), unfinished)
     with new_file(facts) as unfinished:
         write_facts(excerpt, unfinished)
     return path, facts

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vibench.acquisition.instruments import PlugInKind
-from vibench.acquisition.plan import Family, rows_by_kind
+from vibench.acquisition.plan import Family, present_word, rows_by_kind
 
 from .analysis_kind import AnalysisKind
 from .noise import REPEATED_NOISE, STREAMED_NOISE
@@ -27,3 +27,9 @@ ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
     PlugInKind.ANALYSIS,
 )
 """Analyses, keyed by the kind of excitation; families are in the order of a report."""
+
+
+def family_of(plan: Mapping[str, Any]) -> str:
+    """Return the family of analyses of a recording's plan; empty if its kind is unknown."""
+    kind = present_word((plan.get("excitation") or {}).get("kind", ""))
+    return ANALYSES[kind].family if kind in ANALYSES else ""

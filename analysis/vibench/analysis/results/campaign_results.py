@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from vibench.acquisition import RecordingError, open_recording
-from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import Recording, copy_sentence, first_copies
 from vibench.sim import Accuracy, Specimen
 from vibench.sim.background import Observer, Progress, ignore_progress
@@ -16,7 +15,7 @@ from vibench.sim.background import Observer, Progress, ignore_progress
 from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
 from ..frequency_response.request import FrequencyResponseRequest
-from ..kinds.analyses import ANALYSES
+from ..kinds.analyses import ANALYSES, family_of
 from ..kinds.analysis_kind import AnyResult, DwellResult, Json, NoiseResult, Result, SweepResult
 from ..kinds.noise import NOISE_FAMILY
 from ..overlay.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
@@ -260,8 +259,7 @@ def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
         # A plan with values of wrong types also counts as unreadable.
         with suppress(RecordingError, AttributeError, TypeError), open_recording(path) as recording:
             first = response_role(recording)
-            kind = present_word((recording.plan.get("excitation") or {}).get("kind", ""))
-            is_noise = kind in ANALYSES and ANALYSES[kind].family == NOISE_FAMILY
+            is_noise = family_of(recording.plan) == NOISE_FAMILY
             for role in (*response_roles(recording), *(force_roles(recording) if is_noise else ())):
                 if role not in (first, scanned_role(recording)):
                     found[role] = (*found.get(role, ()), path)
@@ -278,9 +276,8 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
                 if described_shaker(recording) is not None or scanned_role(recording) is not None:
                     continue
                 needed = True
-                plan = recording.plan.get("excitation") or {}
-                if ANALYSES[present_word(plan["kind"])].family == NOISE_FAMILY:
-                    unknown.append((float(plan["amplitude_vpp"]), path))
+                if family_of(recording.plan) == NOISE_FAMILY:
+                    unknown.append((float(recording.plan["excitation"]["amplitude_vpp"]), path))
         except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
             continue  # the analysis of this file reports the reason
     for _, path in sorted(unknown) if needed and len(paths) > 1 else ():

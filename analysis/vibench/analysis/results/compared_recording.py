@@ -15,7 +15,7 @@ from ..comparison.recording_curves import predicted_curves
 from ..dynamics import RecordedLevel, recorded_level
 from ..errors import NotEnoughData, UnusableData
 from ..frequency_response.request import FrequencyResponseRequest
-from ..kinds.analyses import ANALYSES
+from ..kinds.analyses import ANALYSES, family_of
 from ..kinds.analysis_kind import AnyResult
 from ..overlay.overlay import AbstractOverlay, Simulation
 from ..recordings.checks import Verdict
@@ -80,6 +80,9 @@ def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisF
     return result, failures
 
 
+_NO_LEVEL = "{} has no level over a range of frequencies; choose a stepped sine or a sweep"
+
+
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
     """Return pairs (frequency [Hz], base amplitude [m]) of a stepped sine or a sweep, rising in frequency.
 
@@ -88,9 +91,7 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
     result, _ = kept_result(compared)
     found = drive_level(result)
     if not found:
-        raise NotEnoughData(
-            f"{compared.path.name} has no level over a range of frequencies; choose a stepped sine or a sweep"
-        )
+        raise NotEnoughData(_NO_LEVEL.format(compared.path.name))
     return found
 
 
@@ -100,6 +101,9 @@ def recorded_response(path: Path) -> RecordedLevel:
     Raises NotEnoughData when the recording is of another kind, or has a single frequency; RecordingError when
     the file is not a recording.
     """
+    with open_recording(path) as recording:  # before a long analysis
+        if family_of(recording.plan) in {"noise", "dwell"}:
+            raise NotEnoughData(_NO_LEVEL.format(path.name))
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [
         each

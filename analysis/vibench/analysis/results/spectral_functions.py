@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.acquisition.plan import present_word
+from vibench.acquisition import open_recording
 from vibench.acquisition.recording import ChannelHeader, SegmentLabel
 from vibench.acquisition.rig import Role
 
@@ -15,7 +15,7 @@ from ..exchange import Excerpt, FunctionAxis, FunctionType, UniversalFunction, e
 from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.request import FrequencyResponseRequest
 from ..frequency_response.scan import scans_of
-from ..kinds.analyses import ANALYSES
+from ..kinds.analyses import family_of
 from ..kinds.noise import NOISE_FAMILY
 from ..recordings.facts import require_checked
 from ..signals.arrays import Reals
@@ -33,8 +33,8 @@ _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP
 _UNITS = {Quantity.DISPLACEMENT: "m", Quantity.VELOCITY: "m/s", Quantity.ACCELERATION: "m/s2"}
 
 
-def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> tuple[UniversalFunction, ...]:
-    """Return the spectral functions of an excerpt.
+def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> Iterator[UniversalFunction]:
+    """Yield the spectral functions of an excerpt.
 
     These are the densities of all channels during the excitation, from segments of at most one second. For
     noise, the frequency response from base to m0 and its coherence are added; as in `analyse`, they are
@@ -52,12 +52,10 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
     """
     require_checked(excerpt.recording)
     played = _played_parts(excerpt)
-    densities = tuple(_density(played, channel) for channel in excerpt.channels)
-    kind = present_word(excerpt.recording.plan.get("excitation", {}).get("kind", ""))
-    if kind not in ANALYSES or ANALYSES[kind].family != NOISE_FAMILY:
-        return densities
-    analysis: NoiseAnalysis = analyse(excerpt.recording, request)  # type: ignore[assignment]
-    return (*_responses(analysis), *densities)
+    if family_of(excerpt.recording.plan) == NOISE_FAMILY:
+        analysis: NoiseAnalysis = analyse(excerpt.recording, request)  # type: ignore[assignment]
+        yield from _responses(analysis)
+    yield from (_density(played, channel) for channel in excerpt.channels)
 
 
 def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: Path) -> Iterator[Path]:
@@ -78,7 +76,7 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
     path
         The new file, or the pattern for the names of several files.
     """
-    found = [analyse(each, request) for each in paths]
+    found = [analyse(each, request) for each in paths if _is_scanned_noise(each)]
     scans = list(scans_of([each for each in found if isinstance(each, NoiseAnalysis)]))
     if not scans:
         raise NotEnoughData(
@@ -98,6 +96,11 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
             for node, each in zip(scan.nodes, scan.analyses, strict=True)
         ]
         yield export_scan(nodes, functions, path.with_name(f"{path.stem}{ending}{path.suffix}"))
+
+
+def _is_scanned_noise(path: Path) -> bool:
+    with open_recording(path) as recording:
+        return bool(recording.plan.get("point")) and family_of(recording.plan) == NOISE_FAMILY
 
 
 def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
