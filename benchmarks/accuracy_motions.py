@@ -262,16 +262,16 @@ class MotionBenchmark:
 
     def _periodic_advice(self) -> str:
         quick, _, reference = self.levels
-        price = f"reference takes {reference.cost / quick.cost:.1f} times as long as quick"
+        price = f"`reference` takes {reference.cost / quick.cost:.1f} times the time of `quick`"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
                 return f"Each level reduces the error; {price}."
             case [Accuracy.STANDARD]:
                 return f"Only `reference` reduces the error; {price}."
             case [Accuracy.REFERENCE]:
-                return f"Standard reduces the error, reference does not; {price}."
+                return f"`standard` reduces the error, `reference` does not; {price}."
             case _:
-                return f"No level reduces the error; {price}."
+                return f"All levels are about equally accurate; {price}."
 
 
 def _is_better(level: LevelFigures, before: LevelFigures) -> bool:

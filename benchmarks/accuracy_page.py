@@ -63,7 +63,7 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "  independent solution: scipy's DOP853 at 1e-12, restarted at every contact;",
         "- Response I and II errors: relative differences from level `reference`;",
         "- the largest Lyapunov exponent, with its standard error;",
-        "- scipy's solvers at a relative tolerance of 1e-6: speed, and in brackets the state error.",
+        "- scipy's solvers at a relative tolerance of 1e-6.",
         "",
         f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after about",
         f"{first.solver_span_s:.1g} s.",
@@ -159,7 +159,7 @@ def _motion(found: MotionBenchmark) -> Iterator[str]:
     for level in found.levels:
         yield _level(level)
     solvers = "; ".join(map(_solver, found.solvers))
-    yield from ("", f"scipy: {solvers}.")
+    yield from ("", f"scipy's speed (state error): {solvers}.")
 
 
 def _level(level: LevelFigures) -> str:

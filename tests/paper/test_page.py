@@ -77,7 +77,7 @@ def test_the_claims_page_begins_with_differences_and_agreeing_options(found):
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
     assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary
-    assert "- **third**: It is so with third. It holds under none of 1 options." in summary
+    assert "- **third**: It is so with third. It fails under all options tested (1)." in summary
 
 
 def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_number():
@@ -90,8 +90,8 @@ def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_numbe
     page = reproduction_document(
         Reproduction({"Synthetic": (found,)}, score_rows(((), ("chance",))), (), "Defaults: these.", "")
     )
-    except_it = "; with c = 3e-05 s · k it holds for 3 of 4 starts"
-    assert f"It holds under none of 1 options{except_it}." in page
+    except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
+    assert f"It fails under all options tested (1){except_it}." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
     assert "Values with c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
 
