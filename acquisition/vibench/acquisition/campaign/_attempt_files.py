@@ -23,7 +23,7 @@ from ..recording import (
 
 @dataclass(frozen=True)
 class KeptRecording:
-    """One file of a point, as found in the folder."""
+    """State of one recording of a campaign's point, as read from its file."""
 
     path: Path
     state: RecordingState | None

@@ -55,7 +55,7 @@ class LocatedJump:
 
 
 Seek = Generator[float, SettledPoint, LocatedJump]
-"""Yields a frequency to reach on the branch before the jump, and is sent the settled point there."""
+"""Yields the next frequency, approached along the branch before the jump; receives its settled point."""
 
 
 def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
@@ -106,7 +106,7 @@ _SURE = 2.0
 _SAME_LEVEL = 0.004
 """Relative tolerance of the level if settling is judged by a single order of the response."""
 _PROMPT = 0.7
-"""Exponent that reduces a correction made while the specimen still responds to the last one."""
+"""Exponent that reduces a correction made while the specimen still responds to the last correction."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class SettledState:
     """Acceleration amplitude of the base's fundamental [m/s2]."""
     held: Held
     harmonics: tuple[complex, ...]
-    """Displacement of m0, orders 1 to 4 of its period, over the base displacement at the drive frequency."""
+    """Displacement of m0 at 1 to 4 times its repetition rate, over that of the base at drive frequency."""
     drives: int = 1
     """Number of drive periods in one period of m0."""
 

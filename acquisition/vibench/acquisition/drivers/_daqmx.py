@@ -31,7 +31,7 @@ from ._overload import overload_ranges
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 20.0
 LOST_DEADLINE_S = 1.0
-"""Time limit of calls after a call that was not answered [s], so that a run ends in a bounded time."""
+"""Time limit of calls after an unanswered call [s], so that a run ends in a bounded time."""
 # One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
@@ -41,7 +41,7 @@ _CHANNEL_OPTIONS = (
 
 
 class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Ends every call that takes too long, and adds the token; the DAQmx client does neither."""
+    """Limits the time of every gRPC call, and adds the token; the DAQmx client does neither."""
 
     def __init__(self) -> None:
         self._is_lost = False
@@ -75,7 +75,7 @@ class DaqmxSession:
         return System.local() if self.options is None else System.remote(self.options)
 
     def close(self) -> None:
-        """Close the connection. Legal at any time."""
+        """Close the connection. May be called at any time."""
         if self._channel is not None:
             self._channel.close()
 
@@ -316,14 +316,14 @@ class DaqmxDigitizer:
             return int(self._open_task().in_stream.avail_samp_per_chan)
 
     def stop(self) -> None:
-        """End sampling. Legal at any time."""
+        """End sampling. May be called at any time."""
         self._is_running = False
         if self._task is not None:
             with daqmx_call(f"stopping {self._config.device}"):
                 self._task.stop()
 
     def close(self) -> None:
-        """Release the device. Legal at any time; the connection closes in any case."""
+        """Release the device and close the connection, even after an error. May be called at any time."""
         with daqmx_call(f"releasing {self._config.device}"):
             self._release()
 
