@@ -544,12 +544,12 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
         if mapping.time == "even":
             low, high = each.rates_hz
             rate_text = "no sample rate" if high == inf else f"{(low + high) / 2:.9g} samples/s"
-            runs = f", jumps {len(each.runs) - 1} times" if len(each.runs) > 1 else ""
+            runs = f", {len(each.runs) - 1} jumps of the times" if len(each.runs) > 1 else ""
             start = f", starts at {each.start_s:.9g} s" if each.start_s else ""
             trouble = f", {each.time_trouble}" if each.time_trouble else ""
             text = f"{rate_text}{start}{runs}{trouble}"
             if _is_contradicted(each, mapping):
-                text += "; where these are right, frequencies and amplitudes are wrong"
+                text += "; if the times are right, frequencies and amplitudes are wrong"
             yield f"the mapping's {given:.9g} samples/s replace the times of the file ({text})"
         elif each.time_unit is not None and mapping.time_unit not in {None, each.time_unit}:
             text = each.time_unit or "no unit"

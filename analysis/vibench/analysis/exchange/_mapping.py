@@ -31,7 +31,7 @@ _LARGEST_CORRECTION = 0.2
 
 
 def _is_another_quantity(file_unit: str) -> bool:
-    """Return whether a unit is one of motion or force; a scale cannot convert it to another quantity."""
+    """Return whether a unit is of motion or force; a scale cannot convert it to another quantity."""
     return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
 
 
@@ -42,7 +42,7 @@ def unit_in_name(name: str) -> str:
         unit = unit.replace("_", "/") if sign == "_" else unit
         is_letter = sign in {"", "_"} and (len(unit) == 1 or unit == "in")
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
-        # DIN 461 writes "a / Gal"; a longer word may be another name.
+        # DIN 461 writes "a / Gal". A word of more than four letters may belong to the name of the channel.
         is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
         if sign == "[" or is_unknown or (is_known and (not is_letter or (unit == "g" and sign))):
             return unit

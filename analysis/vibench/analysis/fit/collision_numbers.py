@@ -162,7 +162,7 @@ def numbers_from_statistics(
         numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
         if numbers.determined:
             return numbers, ""
-        why.setdefault("statistics determine no value better than the description", []).append(each.name)
+        why.setdefault("the statistics give no narrower bounds than the description", []).append(each.name)
     return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
 
 

@@ -116,8 +116,8 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
     known = {each.value: each for each in Quantity}
     if len(words) > _ABOVE_AND_BELOW or any(word not in known for word in words):
         raise InvalidRequest(
-            f"the quantity {text!r} is not known; give that of m0, a slash and that of the base, each of "
-            f"{', '.join(known)}, such as velocity/acceleration"
+            f"the quantity {text!r} is not known; give those of m0 and base, such as velocity/acceleration; "
+            f"known are {', '.join(known)}"
         )
     found = FrequencyResponseView(response=known[words[0]], base=known[words[-1]])
     return replace(found, scale=scale)

@@ -237,7 +237,7 @@ class RecordingOverview:
 
     recording: Recording
     levels: dict[str, tuple[OverviewLevel, ...]]
-    """Levels keyed by role, from fine to coarse."""
+    """Levels keyed by role, from short to long bins."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
         """Return samples ``start`` to ``stop`` (exclusive) of some channels in about ``columns`` columns.
@@ -312,7 +312,7 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
 def overview_levels(
     recording: Recording, on_read: OnRead = ignore_reading
 ) -> dict[str, tuple[OverviewLevel, ...]]:
-    """Return the extremes of every channel, from fine to coarse; ``on_read`` receives the progress."""
+    """Return extremes per bin of every channel, from short to long bins; ``on_read`` receives progress."""
     levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
@@ -324,7 +324,7 @@ def overview_levels(
 
 
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
-    """Return the stored extremes of the channel ``role``, from fine to coarse; see `has_overview`.
+    """Return the stored smallest and largest values of ``role`` per bin, from short to long bins.
 
     Raises InvalidRequest when the file contains no overview.
     """

@@ -14,11 +14,11 @@ from ._outline import Samples
 from ._ring import RingWindow
 
 _LEAST_SHARE = 0.5
-"""Minimum share of the power of a sine in its strongest line and the neighbouring lines."""
+"""Minimum share of a sine's power in its strongest spectral line and the neighbouring lines."""
 _NEIGHBOURS = 3
-"""Lines on each side that belong to a sine under a Hann window, even if its frequency changes slowly."""
+"""Neighbouring lines on each side of a sine's strongest line (Hann), even at slowly changing frequency."""
 _LEAST_LINE = 4
-"""Minimum number of periods to analyse, so that the sine's line is separate from the offset's."""
+"""Minimum number of periods to analyse; with fewer, the sine's spectral line merges with the offset's."""
 
 
 @dataclass(frozen=True)
@@ -96,14 +96,14 @@ _STRETCH_PERIODS = 25
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Smallest ratio of final to initial drive amplitude in the samples of a point; less is a ramp down."""
+"""Minimum ratio of final to initial drive amplitude in the samples of a point; less is a ramp-down."""
 _STEEPEST_POWER = 2
 """Largest power of frequency that the voltage of a sweep follows (constant displacement)."""
 
 
 @dataclass(frozen=True)
 class SinePoint:
-    """Responses and amplitudes from some consecutive drive periods."""
+    """Responses and amplitudes, computed from some consecutive drive periods."""
 
     time_s: float
     """Time of the middle of these periods [s since the first sample of the run]."""

@@ -23,7 +23,7 @@ MIXED = -1
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the normal limit; if all values are within it after half of the draws, no more are needed."""
+"""Part of the normal limit; if all values are within it after half of the draws, no more draws are made."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -87,7 +87,7 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def relative_sd(self) -> Reals:
-        """Relative scatter of the draws, shape (points,); NaN for fewer than two draws."""
+        """Relative standard deviation of the draws, shape (points,); NaN for fewer than two draws."""
         return 2 * self._sd / self._mean
 
     @cached_property

@@ -51,7 +51,7 @@ from ..signals.arrays import Reals
 
 BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256
-"""Number of drive periods shown of a motion, and samples per period."""
+"""Number of drive periods that the picture of a motion shows, and samples per period."""
 MOST_CELLS = 200_000
 """Maximum number of map cells in a window; compute larger maps with `vibench map` and open them."""
 
@@ -137,7 +137,7 @@ class SettledMotion:
     displacement_m: Reals
     """Displacement x of m0, shape (samples,)."""
     relative_m: Reals
-    """Relative displacement p = y - z, shape (samples,)."""
+    """Displacement p = y - z of m1 relative to m2, shape (samples,)."""
     gaps_m: tuple[float, float]
     line_hz: Reals
     line_m: Reals
@@ -265,7 +265,7 @@ class SimulatedSignal:
     displacement_m: Reals
     """Displacement x of m0."""
     relative_m: Reals
-    """Relative displacement p = y - z, between the stops."""
+    """Displacement p = y - z of m1 relative to m2, between the stops."""
     gaps_m: tuple[float, float]
     """Gaps of the stops at negative and at positive p."""
 
@@ -388,7 +388,7 @@ MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Shar
 
 
 def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
-    """Return responses, error, share and kind of a motion as texts."""
+    """Return the table cells of a motion: responses, error, share of starts, kind."""
     share, period = motion.share, "" if motion.period is None else f", period {motion.period}"
     return (
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",

@@ -20,9 +20,9 @@ _RINGING = 2.0
 _TOO_FAST = 0.5
 """Residual relative to order 1 that collisions usually exceed; ringing above this can hide collisions."""
 _IMPACTS = 0.1
-"""Minimum ratio of orders 2 and 3 to order 1 that shows impacts; ringing off modes causes at most 0.05."""
+"""Minimum ratio of order 2 or 3 to order 1 that shows impacts; ringing causes at most 0.05 between modes."""
 _RING_CYCLES = 5_000.0
-"""Cycles after which a mode with a damping ratio of 0.02 % has decayed to 1/500."""
+"""Number of cycles in which a mode with a damping ratio of 0.02 % decays to 1/500."""
 _ENOUGH = 0.25
 """Minimum share of a region in which orders 2 and 3 show impacts; required if no specimen is known."""
 _SMOOTH_AT_MOST = 0.1

@@ -354,7 +354,7 @@ class SpectrogramSums:
         if not (0 < highest_hz <= sample_rate_hz / 2 and self._length >= 2):
             raise InvalidRequest(
                 f"a spectrogram up to {highest_hz:g} Hz with segments of {segment_s:g} s was requested at "
-                f"{sample_rate_hz:g} samples/s; give at most half that rate, and 2 samples or more"
+                f"{sample_rate_hz:g} samples/s; give at most half of this, and segments of 2 or more samples"
             )
         if samples < self._length:
             raise NotEnoughData(

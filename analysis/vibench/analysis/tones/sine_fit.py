@@ -31,7 +31,7 @@ class Peak:
 
     frequency_hz: float
     sd_frequency_hz: float
-    """Standard deviation from the noise around the line; zero without noise."""
+    """Standard deviation [Hz], from the noise around the peak; zero without noise."""
     amplitude: float
     """Amplitude of the peak, corrected for its position between lines [unit of the spectrum]."""
     floor: float
@@ -80,7 +80,7 @@ def _peak_at(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
         )
     )
     floor = float(np.median(around)) if around.size else 0.0
-    # dd/da = 3 / (a + 1)^2; the noises of neighbouring Hann lines are correlated by 2/3.
+    # d(offset)/d(ratio) = 3 / (ratio + 1)^2. Noise of neighbouring Hann lines has a correlation of 2/3.
     sd_ratio = floor / _MEDIAN_OF_RAYLEIGH / amplitude[line] * np.sqrt(1 + ratio**2 - 4 / 3 * ratio)
     return Peak(
         frequency_hz=float((line + side * offset) * spectrum.spacing_hz),
