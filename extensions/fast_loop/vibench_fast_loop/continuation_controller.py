@@ -52,7 +52,7 @@ _NEAR = 0.3
 _SHORTEST_STEP = 1 / 64
 """Shortest step relative to the step of the plan."""
 _GROWTH, _EASY = 1.5, 3
-"""Factor by which steps grow, and maximum tries of the last point for this growth."""
+"""Factor by which steps grow, if the last point needed at most this number of tries."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 """Variations of the unknowns: frequency and first coefficient in steps, harmonics relative to the level."""
 _BELOW = 5.0
@@ -63,11 +63,11 @@ _LOWERED, _CALM = 0.3, 0.03
 """Largest decrease of the first coefficient per try [steps]; largest base harmonics relative to the level
 for a decrease. Both are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
-"""Limits of the change of base level per step of the first coefficient, on the way to the level."""
+"""Limits of the change of base level per step of the first coefficient, before the level is reached."""
 _LEAST_CHANGE = 0.01
 """Smallest change of the first coefficient from which this slope is computed [steps]."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Shares of the tolerance for fundamental and harmonics of a point; small, because folds move with level."""
+"""Parts of the tolerance allowed to fundamental and harmonics; small, because folds move with the level."""
 _BEND_HZ = 0.05
 
 
@@ -220,7 +220,7 @@ def _record(
 
 
 def _is_sine(residual: Vector, tolerance: float) -> bool:
-    """Return whether fundamental and harmonics of the base are within their shares of the tolerance."""
+    """Return whether the base moves as a sine of its level, closely enough for a point of the branch."""
     harmonics = np.hypot(residual[1::2], residual[2::2])
     return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
 
@@ -228,11 +228,11 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 _EACH = 5
 """Drive periods per change: deviations hardly grow in this time, but the upper modes follow the change."""
 _LEAD, _TRIAL = 3, 8
-"""Number of changes before the evaluated ones, and in the trial that finds the size of changes."""
+"""Number of changes before the evaluated changes, and in the trial that finds the size of the changes."""
 _CHANGED = (0, 2)
 """Coefficients that are perturbed: the first, and the third, where the specimen also drives the table."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
-"""Size of changes in the trial, and largest size, relative to the first coefficient."""
+"""Size of the drive's changes in the trial, and their largest size, relative to the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0
 """A motion counts as changed if it differs by more than this share and this many standard errors."""
 _NEVER = 1e-9

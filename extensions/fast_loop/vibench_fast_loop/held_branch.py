@@ -35,7 +35,7 @@ from vibench.sim import Branch, Specimen
 from .fast_loop import impact_branch
 
 _LEAST = 3
-"""Minimum number of points for a turn of the frequency."""
+"""Minimum number of points in which a turn of the frequency can be found."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
         return ("No motion of the branch was held.",)
     size_um = 1e6 * found.base_m
     held = (
-        f"{found.frequency_hz.size} motions held, base {size_um.min():.4g} to {size_um.max():.4g} µm, its "
-        f"harmonics relative to the fundamental at most {found.residue.max():.2g} as displacement and "
-        f"{found.residue_acceleration.max():.2g} as acceleration."
+        f"{found.frequency_hz.size} motions were held. The base moved by {size_um.min():.4g} to "
+        f"{size_um.max():.4g} µm; its harmonics were at most {found.residue.max():.2g} of the fundamental "
+        f"(in acceleration {found.residue_acceleration.max():.2g})."
     )
     sentences = [held]
     if found.folds:
