@@ -70,7 +70,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
             settings.keep_text(SettingKey.BENCH, str(bench.resolve()))
-        # Unattended, because changing the theme and saving pictures would exceed the time of an attended run.
+        # Changing the theme and saving pictures block the window; an attended run would therefore stop.
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)

@@ -119,7 +119,7 @@ class FilesPage(Page):
         self._wanted = path
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
-        # Show the page first; together with opening, it would block the event loop.
+        # Open the file only after the page is shown; both at once would block the event loop too long.
         in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:

@@ -285,7 +285,7 @@ class RigPage(Page):
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.context.selection.choose_rig(rig)  # taking over another window's engine may have changed it
+            self.context.selection.choose_rig(rig)  # may differ after taking over an engine
             self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:
