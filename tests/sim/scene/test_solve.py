@@ -337,4 +337,4 @@ def test_an_unstable_repeating_motion_is_not_periodic():
     for duration in (AutomaticDuration(), FixedDuration(0.8, 0.1)):
         found = solve_scene(Scene(specimen, drive, start=start, duration=duration))
         assert (found.motion, found.period) == (MotionKind.UNDECIDED, None)
-        assert found.ended == "it comes back after 1 drive period(s), but near no stable motion"
+        assert found.ended == "it repeats after 1 drive period(s), but no stable motion is near"

@@ -40,7 +40,7 @@ class SceneRun:
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
-    """Peaks and lines of consecutive parts of the motion; the last parts form the window."""
+    """Peaks and spectral lines of consecutive parts of the motion; the window consists of the last parts."""
     was_settled: bool
     """Whether the motion repeated before the window began."""
     motion: MotionKind
@@ -56,8 +56,8 @@ class SceneRun:
     wandered_until_s: float
     """Last time at which the motion still changed from one of its periods to the next [s]."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
-    """Relative change of the responses by leakage if lines are taken over the whole window, shape (4,). Zero
-    unless the motion was found to repeat only within the window."""
+    """Relative change of the responses by leakage if spectral lines are computed over the whole window, shape
+    (4,). Zero unless the motion was found to repeat only within the window."""
 
 
 class FixedCourse:
@@ -127,7 +127,7 @@ def classify(
     elif repeats is not None:
         found = stable_motion(run, repeats.period)
         if found is None:
-            ended = f"it comes back after {repeats.period} drive period(s), but near no stable motion"
+            ended = f"it repeats after {repeats.period} drive period(s), but no stable motion is near"
             motion, repeats = MotionKind.UNDECIDED, None
         else:
             repeats = replace(repeats, distance=found.distance)

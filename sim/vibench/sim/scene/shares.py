@@ -32,7 +32,7 @@ def normal_quantile(tail: float) -> float:
 
 
 def poisson_mean(fewer_than: int, probability: float) -> float:
-    """Return the mean of a Poisson count that is below ``fewer_than`` with this probability."""
+    """Return the mean of a Poisson distribution whose count is below ``fewer_than`` with ``probability``."""
 
     def below(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
@@ -78,7 +78,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     """
     if not (0.0 <= count <= trials < math.inf and trials > 0.0 and 0.0 < unsure < 1.0):
         msg = (
-            f"{count} of {trials} trials with probability {unsure} are not allowed: "
+            f"{count} of {trials} trials with an error probability of {unsure} are not allowed: "
             "give 1 trial or more, a count from 0 to all trials, and a probability between 0 and 1."
         )
         raise ValueError(msg)

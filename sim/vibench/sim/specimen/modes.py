@@ -210,7 +210,7 @@ def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tup
 
 @dataclass(frozen=True, eq=False)
 class BaseResponse:
-    """Response to the base at n frequencies, for the time factor exp(+i w t); each field has shape (n,)."""
+    """Response of x and p = y - z to the base U; each field has shape (n,); time factor exp(+i w t)."""
 
     free_p: Complex
     """Ratio p / U without contact."""

@@ -47,7 +47,7 @@ SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
 """Key for the format version of a file, and the supported version."""
 DEEPEST = 5
-"""Largest number of descriptions in a row of which each names the next in ``model``."""
+"""Maximum length of a chain of descriptions in which each names the next in ``model``."""
 USUAL_SPECIMEN = "gong2025"
 """Default specimen of rigs, studies and commands."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
@@ -63,7 +63,7 @@ class UnknownSpecimenError(ValueError):
 
 
 class SpecimenWarning(UserWarning):
-    """Warning: stiffnesses or dampings changed although only other parameters were replaced."""
+    """Warning: a replaced value also changed stiffnesses or dampings, which are computed from it."""
 
 
 class _Described(FrozenModel):
