@@ -65,7 +65,7 @@ def at_most(name: str, unit: str, high: float) -> Expectation:
 
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
-    """Return the requirements of a peak near each frequency."""
+    """Return one requirement per wanted peak: its frequency is right within ``within_hz``."""
     return tuple(about(f"{each:g} Hz peak", "Hz", each, within_hz) for each in wanted_hz)
 
 
