@@ -15,7 +15,7 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Random numbers per draw: a compromise between the number of draws and that of unused numbers."""
+"""Random numbers per page: short pages cost more generator calls, long pages more unused numbers."""
 
 
 class NoiseStream:
@@ -43,7 +43,7 @@ class NoiseStream:
 
     def generator(self, page_number: int) -> Generator:
         """Return a random generator for the events of one page."""
-        # The page number is the third word of the counter, so that draws of one page cannot reach the next.
+        # The page number is the third word of the counter, so that pages never share random numbers.
         return Generator(Philox(key=self._key, counter=np.array([0, 0, page_number, 0], dtype=np.uint64)))
 
     def _samples_of(self, page_number: int) -> NDArray[np.float64]:
@@ -55,7 +55,7 @@ class NoiseStream:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A constant output level from one step to another."""
+    """A constant output level during some steps, which replaces the signal."""
 
     first_step: int
     stop_step: int
@@ -157,7 +157,7 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
     z = np.exp(-2j * np.pi * frequency_hz * step_s)
     target = analogue.response(frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
     powers = z[:, np.newaxis] ** np.arange(_ZEROS)
-    # Unit gain at zero frequency makes the sums of both sets of weights equal: one unknown is eliminated.
+    # Unit gain at zero frequency: numerator and denominator have equal sums, so one weight is eliminated.
     total = denominator.sum()
     reduced = powers[:, 1:] - powers[:, :1]
     remainder = target - total * powers[:, 0]
