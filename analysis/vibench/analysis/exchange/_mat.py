@@ -61,7 +61,7 @@ def _look(content: memoryview, order: str, depth: int) -> None:
         if kind >> 16:  # small: type and size share four bytes, data are in the other four
             _require_plain(kind & 0xFFFF)
             if kind >> 16 > SMALL_BYTES:
-                raise ValueError(f"a small element has {kind >> 16} bytes; at most {SMALL_BYTES} are allowed")
+                raise ValueError(f"a small element has {kind >> 16} bytes; at most four are allowed")
             content = content[TAG_BYTES:]
             continue
         data = content[TAG_BYTES : TAG_BYTES + size]
