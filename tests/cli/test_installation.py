@@ -1,4 +1,4 @@
-"""A new installation: version, shipped files, the doctor's report, and missing extras."""
+"""Installation: version, shipped files, `vibench doctor`, shell completion, missing libraries, size."""
 
 import json
 import os
@@ -238,7 +238,7 @@ def test_plans_recordings_and_analysis_need_neither_instruments_nor_the_window(l
 
 
 def installed_mb(name, seen):
-    """Return the size of a library and of all its requirements, each counted once [MB]."""
+    """Return the size of a library and of its dependencies, each counted once [MB]."""
     if name in seen:
         return 0.0
     seen.add(name)
@@ -257,7 +257,7 @@ def test_the_core_installation_takes_less_than_300_megabytes():
     assert 200 < installed_mb("vibench", set()) < 300
 
 
-def test_the_installation_page_lists_all_exit_codes_and_variables():
+def test_the_installation_page_lists_exit_codes_and_environment_variables():
     page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
     assert [int(each) for each in re.findall(r"^\| (\d) \|", page, flags=re.M)] == list(ExitCode)
     assert dict(re.findall(r"^\| `([A-Z_]+)` \| (.+) \|$", page, flags=re.M)) == {
@@ -265,7 +265,7 @@ def test_the_installation_page_lists_all_exit_codes_and_variables():
     }
 
 
-def test_every_environment_variable_of_the_sources_is_on_the_installation_page():
+def test_environment_variables_in_the_sources_are_on_the_installation_page():
     read = r"""(?:environ(?:\.get|\.setdefault)?[\[(]|VARIABLE = )["']([A-Z][A-Z_]+)["']"""
     sources = [path for portion in PORTIONS for path in (ROOT / portion).rglob("*.py")]
     found = {name for path in sources for name in re.findall(read, path.read_text(encoding="utf-8"))}

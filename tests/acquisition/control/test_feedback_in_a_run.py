@@ -93,7 +93,7 @@ def test_a_hold_during_settling_does_not_change_the_level(bench, tmp_path):
     assert {each["level"] for each in level} == {"within tolerance"}
 
 
-def test_a_detached_accelerometer_ends_a_feedback_run_at_a_low_voltage(bench, tmp_path):
+def test_a_detached_accelerometer_ends_a_feedback_run_at_low_generator_voltage(bench, tmp_path):
     run = run_of(bench, tmp_path)
     while next(iter(run)).state is not RunState.RECORDING:
         pass
@@ -106,7 +106,7 @@ def test_a_detached_accelerometer_ends_a_feedback_run_at_a_low_voltage(bench, tm
     assert max(settings) < 0.5
 
 
-def test_a_base_level_that_needs_more_than_the_planned_voltage_is_refused(bench, tmp_path):
+def test_a_base_level_beyond_the_planned_voltage_is_refused_before_output(bench, tmp_path):
     loud = DWELL.excitation.model_copy(update={"base_level": BaseLevel(acceleration_m_per_s2=50.0)})
     with pytest.raises(LimitExceeded, match=r"the setting needed to hold the base's level \(at 200 Hz\)"):
         list(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": loud})))
@@ -126,7 +126,7 @@ def test_a_base_level_that_needs_more_than_the_planned_voltage_is_refused(bench,
         ),
     ],
 )
-def test_limits_are_checked_at_the_largest_generator_voltage_of_feedback(bench, tmp_path, excitation):
+def test_limits_are_checked_at_the_largest_voltage_of_feedback(bench, tmp_path, excitation):
     """One micrometre needs millivolts, but the plan allows ten volts, which at 20 Hz exceed the stroke."""
     with pytest.raises(LimitExceeded, match="the stroke"):
         list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))

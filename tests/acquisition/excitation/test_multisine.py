@@ -47,7 +47,7 @@ def test_the_mean_of_a_multisine_period_is_zero():
     assert abs(np.mean(values)) < 1e-15
 
 
-def test_realisations_have_equal_rms_and_the_peakiest_uses_full_range():
+def test_realisations_have_equal_rms_and_the_largest_peak_is_full_scale():
     periods = flat_periods(BAND, realisations=6, seed=5)
     rms = [np.sqrt(np.mean(np.square(period))) for period in periods]
     peaks = [np.max(np.abs(period)) for period in periods]
@@ -82,7 +82,7 @@ def test_requesting_more_realisations_does_not_change_the_first_phases():
     np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)
 
 
-def test_the_chosen_crest_factor_is_below_the_mean_of_random_phases():
+def test_phases_are_chosen_for_a_low_crest_factor():
     (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
     crest = np.max(np.abs(values)) / np.sqrt(np.mean(values**2))
     # Crest factors of single realisations of 991 lines range from 3.18 to 4.53.

@@ -33,13 +33,13 @@ def sine(frequency_hz, samples, first=0):
 
 
 @pytest.mark.parametrize("frequency_hz", [95.3, 260.01, 499.9])
-def test_a_tone_between_lines_is_found(frequency_hz):
+def test_a_sine_between_spectral_lines_is_found(frequency_hz):
     tone = drive_tone(sine(frequency_hz, look_samples(RATE)).values[0], RATE)
     assert tone.frequency_hz == pytest.approx(frequency_hz, abs=2e-3)
     assert tone.amplitude == pytest.approx(0.3, rel=1e-3)
 
 
-def test_noise_is_not_reported_as_a_tone():
+def test_noise_is_not_reported_as_a_sine():
     assert drive_tone(np.random.default_rng(1).standard_normal(25_600), RATE) is None
     assert drive_tone(np.zeros(25_600), RATE) is None
 
@@ -90,8 +90,8 @@ def test_no_live_point_is_drawn_while_the_drive_is_ramped_down():
 
 
 @pytest.mark.parametrize(("start_hz", "rate_hz_per_s"), [(110.0, -20.0), (260.0, -3.0), (260.0, 30.0)])
-def test_a_sweep_of_constant_displacement_is_not_taken_for_a_ramp(start_hz, rate_hz_per_s):
-    point = sine_point(constant_displacement_sweep(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
+def test_a_sweep_of_constant_displacement_gives_a_live_point(start_hz, rate_hz_per_s):
+    point = sine_point(held_displacement(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
     assert point.frequency_hz == pytest.approx(start_hz + rate_hz_per_s * point.time_s, rel=0.01)
 
 
@@ -136,7 +136,7 @@ def test_overlapping_portraits_give_each_poincare_point_once():
         section.add(found)
         kept.append(section.displacement_m.size - before)
     assert sum(kept) == section.displacement_m.size
-    # Each portrait shows 70 periods less 20 at each end; the last begins 28 160 samples after the first.
+    # each portrait omits 20 of its 70 periods at either end; the last begins 28 160 samples after the first
     assert section.displacement_m.size == pytest.approx(28_160 / RATE * 260 + 70 - 40, abs=2)
 
 

@@ -10,7 +10,7 @@ from vibench.gui.widgets.theme import DARK
 from vibench.gui.window.window import PAGES, Window
 
 
-def test_every_page_has_a_working_key(lasting_window, qtbot):
+def test_every_page_opens_with_its_shortcut(lasting_window, qtbot):
     for number, name in enumerate(lasting_window.pages, start=1):
         qtbot.keyClick(lasting_window, getattr(Qt.Key, f"Key_{number}"), Qt.KeyboardModifier.ControlModifier)
         assert lasting_window.page is lasting_window.pages[name], name
