@@ -131,7 +131,7 @@ def _count(folder: Path) -> int:
 
 
 def slope_per_h(looks: list[Look], name: str) -> tuple[float, float]:
-    """Return the growth of a number per hour and its standard error; NaN if there are too few looks."""
+    """Return the growth of a number per hour and its standard error; NaN after too few observations."""
     kept = [look for look in looks if look.time_s > SETTLED * looks[-1].time_s]
     if len(kept) < len(("slope", "offset", "error")) + 1:
         return float("nan"), float("nan")

@@ -51,7 +51,7 @@ NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 TIGHT, LOOSE = 1e-13, 1e-11
 """Two relative tolerances of the independent code; the difference of their results is its own error."""
 FORGOTTEN = 1e-3
-"""Relative difference of the two results above which the motion depends sensitively on its start."""
+"""Relative difference of both results above which the motion depends sensitively on its initial state."""
 RESOLVED = 5e-11
 """Smallest relative error of the independent code; its peaks of a known motion are 4e-11 too high."""
 DRAWS = 5

@@ -25,7 +25,7 @@ SIZE = 10
 UNITS = np.repeat([1e-4, 0.1], 3)
 """Units of errors of a state: 100 um and 0.1 m/s."""
 SMALLEST_PART = 1e-2
-"""Smallest scale of the error of a component, relative to its unit; less for small drive amplitudes."""
+"""Smallest scale of the error of a component, relative to its unit; smaller for small drive amplitudes."""
 MOST_STEPS = 400_000
 """Largest number of steps in a drive period; with more, the run fails."""
 FIRST_STEP_S = 1e-7

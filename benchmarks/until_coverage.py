@@ -316,7 +316,7 @@ def synthetic_results(kind: str, record: np.ndarray, time_s: float) -> dict[str,
 
 
 def synthetic(number: int, seed: int) -> Iterator[Ended]:
-    """End one synthetic record by uncertainties that other records of its kind reach after random times."""
+    """End one synthetic record at uncertainties that other records of its kind reach after random times."""
     kind = tuple(SYNTHETIC)[number % len(SYNTHETIC)]
     first_s = 8.0 if kind == "streamed noise" else 2.0
     scatter = promised(kind)

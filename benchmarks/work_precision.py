@@ -103,7 +103,7 @@ class Solver:
 
     name: str
     end: Callable[[float, Floats, float], Floats | None]
-    """Function from tolerance, start and span [s] to the final state; None if the solver fails."""
+    """Function from tolerance, initial state and span [s] to the final state; None if the solver fails."""
     cost: Callable[[float, Floats, float], float | None]
     """Function from the same to processor time over simulated time; None if the solver fails."""
     cost_s: float = COST_S
