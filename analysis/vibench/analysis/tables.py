@@ -279,7 +279,7 @@ def _collect(
 
 
 def _is_table(parts: tuple[Any, ...]) -> bool:
-    """Return whether all parts have one type and contain only numbers, words and lists of equal lengths."""
+    """Return whether all parts have one type and contain only numbers, texts and lists of equal lengths."""
     if not all(is_dataclass(each) for each in parts):
         return False
     shapes = {_row_shape(each) for each in parts}
