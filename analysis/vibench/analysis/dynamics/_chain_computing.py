@@ -60,7 +60,7 @@ class ChainRun(Labelled):
 
     cells: int
     frequency_hz: float
-    """Frequency of a steady sine; NaN otherwise."""
+    """Frequency of a steady sine; NaN for other drives."""
     over_hz: Reals
     """Frequencies of the transmission, shape (m,): one under a steady sine."""
     transmission: Reals
