@@ -55,7 +55,7 @@ class LiveSpectrum(Labelled):
 
     frequency_hz: Reals
     amplitude_density: Reals
-    """Shape (channels, lines) [unit of the channel / sqrt(Hz)]."""
+    """Amplitude spectral density, shape (channels, lines) [unit of the channel / sqrt(Hz)]."""
     n_eff: float
     """Number of independent averages."""
 
