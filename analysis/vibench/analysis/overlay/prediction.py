@@ -41,7 +41,7 @@ class ResponsePrediction(Labelled):
     amplitude_m: Reals
     """Drive amplitude A0 at each point."""
     response_i: Reals
-    """NaN if the simulation did not finish."""
+    """Response I; like Response II, NaN if the simulation did not finish."""
     response_ii: Reals
     linear: Reals
     """|x / U| of the linear model, without contact."""

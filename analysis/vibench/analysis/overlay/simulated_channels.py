@@ -28,7 +28,7 @@ class RecordedBaseMotion:
     """Displacement of the base over a whole recording, on its sample grid."""
 
     displacement_m: Reals
-    """Shape (samples,) [m]; zero mean, free of drift."""
+    """Displacement of the base without mean and drift, shape (samples,) [m]."""
     sample_rate_hz: float
     low_hz: float
     high_hz: float
