@@ -252,7 +252,7 @@ class DwellResponse(Labelled):
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
-    """NaN if the response still changes by an unknown amount."""
+    """Standard deviation of Response II; NaN if the response still changes by an unknown amount."""
     slow_change: float
     """Relative standard uncertainty of Response I due to slow change of base or response; NaN if unknown."""
     phase_rad: float

@@ -73,7 +73,7 @@ class SteppedResponse(Labelled):
     """Bias and rms error of Response I due to noise; NaN if the noise is unknown."""
     response_ii: Reals
     sd_response_ii: Reals
-    """NaN if the response still changed during the step."""
+    """Standard deviation of Response II; NaN if the response still changed during the step."""
     slow_change: Reals
     """Relative standard uncertainty of Response I due to slow change; NaN if unknown."""
     phase_rad: Reals
