@@ -150,7 +150,7 @@ class Expected(Labelled):
 
     quantity: str
     time_s: float
-    """Planned recording time, or the length of a sine's window."""
+    """Planned recording time, or the length of the analysed window of a sine [s]."""
     scatter: float | None
     """Relative standard uncertainty due to noise or chance after `time_s`; None if not stated."""
     cause: Cause
@@ -274,7 +274,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield for some parts the times [s] needed for all targets, until the first check, and planned."""
+    """Yield for some parts three times [s]: needed for all targets, until the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
