@@ -20,7 +20,7 @@ class Expectation:
 
     name: str
     unit: str
-    """Empty for ratios and counts; ``"%"`` for shares, which are stored as fractions."""
+    """Unit; empty for ratios and counts, ``"%"`` for shares, which are stored as fractions."""
     low: float
     high: float
 

@@ -26,7 +26,7 @@ class Responses:
     response_ii: Reals
     relative_i: Reals
     exponent_per_s: Reals
-    """NaN if not computed."""
+    """Largest Lyapunov exponent [1/s]; NaN if not computed."""
     collides: Flags
     """Whether m1 and m2 collided within the window."""
 

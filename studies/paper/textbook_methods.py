@@ -108,7 +108,7 @@ class Tableau(NamedTuple):
 
     nodes: Reals
     stages: Reals
-    """Shape (stages, stages), strictly lower."""
+    """Coefficients of the stages, strictly lower triangular, shape (stages, stages)."""
     result: Reals
     error: Reals
     """Error coefficients; zero for a method without error estimate."""
