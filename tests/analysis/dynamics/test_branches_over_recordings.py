@@ -59,7 +59,7 @@ def test_a_report_overlays_branches_and_states_level_differences(diagram, steppe
     assert sum(len(each.get_xdata()) for each in measured) == len(
         results.results[0].analysis.response.frequency_hz
     )
-    assert "is 1 to 1 times that of" in drawn.caption
+    assert "is 1 to 1 times the amplitude of" in drawn.caption
     half = BranchRequest(amplitude_m=1.0, start=diagram.request.start, stop=diagram.request.stop)
     (other,) = draw_branches(results, [BranchDiagram(half, diagram.lines, 1.0)])
     assert "is 1 to 1 times" not in other.caption
