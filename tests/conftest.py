@@ -58,7 +58,7 @@ LONG = (
     "tests/sim/exponents/test_lyapunov_spectrum.py",
     "tests/sim/exponents/test_tangent.py",
     "tests/cli/test_killed_campaign.py",
-    "tests/sim/branches/test_branches.py",
+    "tests/sim/branches/test_shooting_branches.py",
     "tests/sim/branches/test_balanced_branches.py",
     "tests/sim/branches/test_known_folds.py",
     "tests/analysis/dynamics/test_dynamics.py",
