@@ -77,7 +77,7 @@ def main():
     columns = [dict(zip(each.frequency_hz, each.exponent_per_s, strict=True)) for each in levels]
     rows = ((f"{f:g}", *(f"{each[f]:.0f}" for each in columns)) for f in SHOWN_HZ)
     show(("frequency [Hz]", *(each.name for each in settings)), rows)
-    exact = ("exact flight, resolved contact", "1, 1, 1", f"{columns[1][260.0]:.0f}")
+    exact = ("exact free motion, integrated contact", "1, 1, 1", f"{columns[1][260.0]:.0f}")
     show(("method", *METHOD_HEADINGS), (exact, *(textbook(case, each) for each in METHODS)))
 
 
