@@ -37,7 +37,7 @@ def stop_path(folder: str, pid: int | str, start: str, level: str) -> str:
 
 
 def answer_path(stop: str, answer: str) -> str:
-    """Return the path of a stop file after the ``answer`` of the program, ``"taken"`` or ``"silent"``."""
+    """Return the path of a stop file after the program's ``answer``: ``"taken"`` or ``"silent"``."""
     return f".{answer}-".join(stop.rsplit(".stop-", 1))
 
 
@@ -60,7 +60,7 @@ def write_stop_file(stop: str, reason: str) -> None:
 
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
-    """Return the result of a stop, after waiting until the program has obeyed it or failed to."""
+    """Return the result of a stop request, after waiting until the program has obeyed or failed to obey."""
     written_ns, give_up_s = _changed_ns(stop) or 0, time.monotonic() + TAKEN_S
     while _changed_ns(stop) is not None:
         if time.monotonic() > give_up_s:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 class AcquisitionError(Exception):
     """Base class of all errors between plan and recording.
 
-    The text is one or two sentences for the person at the bench: what happened (with the value
-    that was given and what is allowed), what was done about it, and what to do next.
+    The text is one or two sentences for the person at the bench: what happened (given and allowed value),
+    what the program did about it, and what to do next.
     """
 
 
@@ -39,7 +39,7 @@ class BrokenPromise(InstrumentError):
 
 
 class SettingRefused(InstrumentError):
-    """The instrument accepted a setting but uses another value, as reading it back has shown."""
+    """The instrument uses another value than the requested one, as reading the setting back has shown."""
 
 
 class DriveLate(AcquisitionError):
@@ -69,7 +69,7 @@ class LimitTrip:
     sample: int
     """Number of the first sample above the limit, counted from the start of the run."""
     time_s: float
-    """Time of that sample by the converter's clock [s]."""
+    """Time of the first sample above the limit, by the converter's clock [s]."""
 
 
 class LimitExceeded(AcquisitionError):
@@ -97,4 +97,4 @@ class RecordingError(AcquisitionError, OSError):
 
 
 class RecordingUnreachable(RecordingError):
-    """The system could not read a recording; the recording itself may be intact."""
+    """The operating system could not read a recording; the recording itself may be intact."""

@@ -62,11 +62,11 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Text accepted from a lock file: anyone may write to the file, and an error shows the text."""
+"""Characters accepted from a lock file: any user may write to it, and an error shows its text."""
 
 
 class BenchLock:
-    """Locks of this process on a rig's instruments; none if the rig is virtual or plays a recording."""
+    """Locks of this process on a rig's instruments; no locks if the rig is virtual or replays a recording."""
 
     def __init__(self, descriptors: list[int]) -> None:
         self._descriptors = descriptors
@@ -119,7 +119,7 @@ class BenchLock:
 
 
 def _instruments(rig: Rig) -> Iterator[str]:
-    """Yield one normalised name for each instrument, so that all its spellings share a lock."""
+    """Yield one normalised name for each instrument, so that all spellings of the name share a lock."""
     for resource in (rig.generator.resource, rig.controller.resource if rig.controller else ""):
         if resource:
             yield _plain(resource)
@@ -152,8 +152,7 @@ def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
 class RigPower:
     """Switches a virtual rig on and off, or locks a real one. Use it in a ``with``.
 
-    A virtual rig can outlast its bench: its rig time and its script of faults continue while the bench is
-    closed and opened again.
+    Its rig time and its script of faults continue while a bench is closed and opened again.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -224,11 +223,11 @@ class _AimedDigitizer:
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """Roles of the channels, in the order of the rows of a block."""
+        """Roles of the channels, in the order of the rows of a block of samples."""
         return tuple(self._names.get(each, each) for each in self._digitizer.roles)
 
     def read(self, samples: int) -> Block:
-        """Return the next samples; overloads of the renamed channel have its new role."""
+        """Return the next samples; overloads of the renamed channel are reported under its new role."""
         block = self._digitizer.read(samples)
         named = (
             replace(each, channel=self._names.get(each.channel, each.channel)) for each in block.overloads

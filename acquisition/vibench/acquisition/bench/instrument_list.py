@@ -14,7 +14,7 @@ class InstrumentList:
     """Instruments that a search has found."""
 
     visa_resources: tuple[str, ...]
-    """Names for ``generator.resource``; USB numbers may be decimal (1689::851 is an AFG1022)."""
+    """Names for ``generator.resource``. USB numbers in them may be decimal: 1689::851 is an AFG1022."""
     daq_devices: tuple[FoundDevice, ...]
     remarks: tuple[str, ...]
     """Reasons why VISA or DAQmx could not be searched."""

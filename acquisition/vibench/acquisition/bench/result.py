@@ -18,9 +18,9 @@ class Verdict(StrEnum):
 
     OK = "ok"
     WARN = "warn"
-    """Find the cause; measurements may be less accurate."""
+    """Find the cause of the deviation; measurements may be less accurate."""
     FAIL = "fail"
-    """Do not energise."""
+    """Do not switch the drive on before the cause is removed."""
 
 
 _ORDER = (Verdict.OK, Verdict.WARN, Verdict.FAIL)
@@ -35,9 +35,9 @@ class Finding(FrozenModel):
     expected: str
     verdict: Verdict
     number: float | None = None
-    """Value as a number, in ``unit``; None if the value is not a number."""
+    """Measured value as a number, in ``unit``; None if it is not a number."""
     uncertainty: float | None = None
-    """Standard uncertainty of the number."""
+    """Standard uncertainty of the number, in ``unit``."""
     unit: str = ""
     advice: str = ""
     """What to do; empty if the finding is ok."""
@@ -66,7 +66,7 @@ def finding_of(
     advice: str,
     uncertainty: float | None = None,
 ) -> Finding:
-    """Return the finding for a number; the advice is left out when the verdict is ok."""
+    """Return the finding for a number; it contains the advice only if the verdict is not ok."""
     spread = "" if uncertainty is None else f" +- {uncertainty:.1g}"
     return Finding(
         name=name,
@@ -91,7 +91,7 @@ class BenchReport(FrozenModel):
         return max((finding.verdict for finding in self.findings), key=_ORDER.index, default=Verdict.OK)
 
     def __getitem__(self, name: str) -> Finding:
-        """Return the finding of that name; raises KeyError, which lists the existing names."""
+        """Return the finding of that name; raises KeyError, whose text lists the existing names."""
         for finding in self.findings:
             if finding.name == name:
                 return finding
@@ -133,7 +133,7 @@ class CheckResult(FrozenModel):
 
     @classmethod
     def of(cls, rig: Rig, report: BenchReport, checked: datetime) -> Self:
-        """Return the result for a report, its rig and its time."""
+        """Return the result for a report, with the name of the rig and the time of the check."""
         return cls(
             rig=rig.name,
             rig_digest=rig_digest(rig),
@@ -153,7 +153,7 @@ class CheckResult(FrozenModel):
 
 
 def rig_digest(rig: Rig) -> str:
-    """Return the SHA-256 of a rig's configuration, without settings that need no new check."""
+    """Return the SHA-256 of a rig's configuration, without settings whose change needs no new check."""
     content = rig.model_dump(mode="json", exclude={"check_valid_h": True, "virtual": _PACE})
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

@@ -19,7 +19,7 @@ class ControlAction:
     """The next phase to play, and the notes to write at its first sample."""
 
     phase: Phase | None
-    """None to write notes only, without sampling."""
+    """Phase to play; None to write the notes only, without sampling."""
     notes: tuple[FeedbackNote, ...] = ()
 
 
@@ -31,7 +31,7 @@ class PhaseSamples:
     volts: Samples
     """Voltages at the inputs, shape (channels, samples) [V]."""
     coefficients: tuple[Any, ...] = ()
-    """Coefficients that a real-time controller measured during the phase."""
+    """Fourier coefficients that a real-time controller measured during the phase."""
 
 
 Result = TypeVar("Result")
@@ -39,11 +39,11 @@ Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
 """Generator that yields actions, is sent the samples of each, and returns a result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
-"""Samples sent back after an action without a phase."""
+"""Samples that the controller receives after an action without a phase: none."""
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
-    """Return the joined blocks of a phase, from its last gap on; gaps arise when the run is held."""
+    """Return the joined blocks of a phase, from its last gap on; a paused run has gaps."""
     if not blocks:
         return SILENCE
     joined: list[Block] = []
@@ -55,7 +55,7 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band as a fraction of the tolerance: smaller errors stay, as every correction disturbs the motion."""
+"""Dead band as a fraction of the tolerance. Smaller errors stay, as every correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which an error is significant."""
 _GAIN = 0.8
@@ -66,13 +66,13 @@ _BATCHES = 8
 
 @dataclass(frozen=True)
 class MeasuredLevel:
-    """Amplitude of the base's fundamental [unit of the channel], with its standard uncertainty."""
+    """Amplitude of the base's fundamental in the unit of the channel, with its standard uncertainty."""
 
     amplitude: float
     uncertainty: float
 
     def held(self, target: float, tolerance: float) -> Held:
-        """Return whether the amplitude deviates from ``target`` by at most the relative ``tolerance``."""
+        """Return whether the amplitude deviates from ``target`` by at most this fraction of ``target``."""
         return Held.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Held.OUTSIDE
 
 
@@ -101,7 +101,7 @@ class LevelControl:
     """Smallest amplitude setting that the generator accepts [Vpp]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Return the next generator setting [Vpp]; unchanged for a level error that is small or by chance."""
+        """Return the next generator setting [Vpp]; unchanged if the level error is small or may be chance."""
         if measured.amplitude <= 0.0:
             return setting_vpp
         error = abs(measured.amplitude / target - 1)

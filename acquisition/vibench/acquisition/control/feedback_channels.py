@@ -37,12 +37,12 @@ class FeedbackChannels:
     response_cut_hz: float
     sample_rate_hz: float
     response_derivatives: int = 0
-    """Number of differentiations from m0's signal to its velocity; -1 (integration) for an acceleration."""
+    """Number of time derivatives from m0's signal to its velocity; -1: integrate (acceleration)."""
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Return drive [V], base acceleration [m/s2] and the signal of m0, each of shape (samples,).
 
-        Drop-outs of a vibrometer are bridged.
+        Drop-outs of a vibrometer are filled from the motion before them.
         """
         response = samples.volts[self.response] * self.response_units_per_volt
         if self.response_derivatives == 0:
@@ -54,13 +54,13 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return m0's velocity divided by its sensor's signal; 0 at 0 Hz except for a velocity sensor."""
+        """Return m0's velocity per signal of its sensor; 0 at 0 Hz except for a velocity sensor."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
 
     def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:
-        """Return a stroboscope for a motion whose period is ``drives`` drive periods."""
+        """Return a `Stroboscope` for a motion whose period is ``drives`` drive periods."""
         return Stroboscope(near_hz, self.sample_rate_hz, drives)
 
     def transmissibility(
@@ -117,7 +117,7 @@ _REMEMBERED_S = 0.1
 
 
 class BridgedRows:
-    """Bridges drop-outs in a stream of samples; delays samples that may be the start of a drop-out."""
+    """Bridges drop-outs in a stream of samples; holds back samples in which a drop-out may begin."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz

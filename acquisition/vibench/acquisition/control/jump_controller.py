@@ -45,18 +45,18 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""Most brackets (frequency intervals) per jump; a new one starts if the motion leaves its branch early."""
+"""Most brackets (frequency intervals) per jump; if the motion leaves its branch early, a new one starts."""
 
 
 class _Return(Enum):
     BACK = auto()
     NOT_FOUND = auto()
     LEFT = auto()
-    """The motion returned to the branch, but left it again before its end."""
+    """The motion returned to the branch before the jump, but left it again before the end of that branch."""
 
 
 class _Pace(Enum):
-    """How the drive follows a branch forward to its end."""
+    """How the frequency is moved along a branch to the end of the branch."""
 
     GLIDE = auto()
     STEP = auto()
@@ -82,7 +82,7 @@ class _JumpSearch:
                 self.after = point
 
     def left(self, place: int, point: SettledPoint) -> None:
-        """Shorten the branch: the motion left it at index ``place``, and ``point`` was measured there."""
+        """Shorten the branch: the motion left it at index ``place``, where ``point`` was measured."""
         del self.branch[place:]
         self.after = point
 
@@ -109,7 +109,7 @@ class JumpLocator:
         Return the point reached there, and whether it is on the new branch behind a jump.
 
         A steep slope is no jump: across it, the change of the response shrinks with the bracket. If both
-        branches exist at the frequency of ``after``, the search may end on either; the note states which.
+        branches exist at the frequency of ``after``, the motion may end on either; the note states which.
         """
         search = _JumpSearch(list(points), after, JumpSide.AFTER)
         found, why = yield from self._bisect(search)
@@ -153,7 +153,7 @@ class JumpLocator:
     def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
-        First glide forward fast. If the motion leaves the branch, try again in steps, to find where it does.
+        First glide forward fast. If the motion leaves the branch, repeat in steps to find the frequency.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
@@ -174,7 +174,7 @@ class JumpLocator:
     def _left(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward; return index and point at which the motion has left the branch, or None if it stays."""
+        """Go forward. Return index and state where the motion has left the branch; None if it stays."""
         for place in steps:
             found = yield from self._move_to(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
@@ -182,7 +182,7 @@ class JumpLocator:
         return None
 
     def _rejoin(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
-        """Go back in growing steps until the motion is on the branch; return the index there, or None."""
+        """Go back in growing steps until the motion is on the branch. Return the index there, else None."""
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():
@@ -254,7 +254,7 @@ def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
 
 
 class Pass:
-    """One pass through the frequencies; it counts the branches."""
+    """One pass through the frequencies; counts the branches on which the motion has been."""
 
     def __init__(
         self, controller: SettlingController, plan: SettledSine, number: int, direction: str
@@ -267,7 +267,7 @@ class Pass:
         """Number of the present branch in this pass, from 1; each jump increases it by 1."""
 
     def carry_out(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
-        """Go to every frequency and record there; locate the jumps in between."""
+        """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
         points: list[SettledPoint] = []
         searched = 0
         search = self._plan.jumps

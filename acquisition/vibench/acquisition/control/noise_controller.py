@@ -18,7 +18,7 @@ from .feedback_channels import LEAST_ANSWER
 from .sine_loop import SineLoop
 
 _NEWEST = 0.5
-"""Weight of the newest gains in the average with earlier ones; single gains scatter due to impacts."""
+"""Weight of the newest gains in the average with earlier gains; due to impacts, single gains scatter."""
 _MOST_CHANGE = 4.0
 """Largest factor by which the squared gain of a spectral line changes between two realisations."""
 
@@ -38,7 +38,7 @@ class MeasuredDensities:
 
 
 class Equaliser:
-    """Estimates of the squared gains of every spectral line, from drive to base and from base to m0."""
+    """Estimates of the squared gains from drive to base and from base to m0, at every spectral line."""
 
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
@@ -78,7 +78,7 @@ class Equaliser:
         return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
 
     def hear(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
-        """Update the gains from the signals of a realisation, and return its densities.
+        """Update the gains from the signals of a realisation; return its power spectral densities.
 
         Raises LimitExceeded when the base moves far less than the model predicts.
         """
@@ -115,11 +115,11 @@ class Equaliser:
                 )
 
     def off_db(self, densities: MeasuredDensities, level_db: float) -> Samples:
-        """Return the base density over the target of this realisation, per spectral line [dB]."""
+        """Return the measured base density over the target of this realisation, per spectral line [dB]."""
         return np.asarray(10 * np.log10(np.maximum(densities.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
-        """Return the density per spectral line, averaged over ``resolution_hz``, without leakage."""
+        """Return the power spectral density per line, averaged over ``resolution_hz``, without leakage."""
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
@@ -175,7 +175,7 @@ def _note(
 
 
 def _average(values: Samples, width: int) -> Samples:
-    """Return the mean of each value over ``width`` neighbours; near the ends, over those available."""
+    """Return the mean of each value over its ``width`` neighbours; near the ends, over fewer neighbours."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     places = np.arange(values.size)
     first = np.maximum(places - width // 2, 0)

@@ -12,19 +12,19 @@ from .settling_controller import SettledState
 _GAIN = 0.3
 """Fraction of the phase error that the loop corrects after each measurement (look)."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""If more than ``_SLOW`` of a phase error is left after a look, the gain grows by ``_GROWTH``, up to
+"""If a look leaves more than ``_SLOW`` of a phase error, the gain grows by ``_GROWTH``, up to
 ``_LARGEST_GAIN``.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
-"""Trial values for the change of the half-width's logarithm from one level to the next."""
+"""Trial changes of ln(half-width) from one level to the next."""
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
-"""Trial values for super- and subharmonics, whose first half-width is known only roughly."""
+"""Trial changes of ln(half-width) for super- and subharmonics: their first half-width is rough."""
 _SURE_RAD = radians(12.0)
 """Unexplained phase drift that weighs as much in the fit as a half-width changed by the factor e."""
 _STEEPER = 0.5
 """Largest assumed relative change of ``bend_hz`` from one level to the next."""
 _EXPLAINED_RAD = radians(3.0)
-"""Rms unexplained phase drift above which the specimen is taken to have changed to another motion."""
+"""Rms unexplained phase drift above which the specimen counts as having changed to another motion."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class LearntMode:
 
 @dataclass(frozen=True)
 class TrackedPlace:
-    """State at the end of a level, from which the next level starts."""
+    """State of the loop at the end of a base level, from which the next level starts."""
 
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """None until the loop has locked at a level; without it, the next level is searched."""
+    """Estimate of the mode. None until the loop has locked at a level: then the next level is searched."""
 
 
 class PhaseLaw:
@@ -79,10 +79,10 @@ class PhaseLaw:
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []
-        """Frequency [Hz], phase error [rad] and base level [m/s2] of each look."""
+        """Frequency [Hz], phase error [rad] and base level [m/s2] of each look (measurement)."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look; return its phase error [rad] and the relative change of the motion still to come."""
+        """Add a look (measurement). Return its phase error [rad] and the relative change still to come."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
@@ -115,7 +115,7 @@ class PhaseLaw:
         turned = 2 * pi * self._turns / frequency_hz.mean()
 
         def unexplained(width_hz: float) -> float:
-            """Return the mean square of the phase drift that a half-width leaves unexplained [rad2]."""
+            """Return the mean square of the phase drift that one half-width leaves unexplained [rad2]."""
             levels, level = [], log(self._last.base_m_per_s2)
             for each in np.log(base):
                 level += (1.0 - exp(-turned * width_hz)) * (each - level)
@@ -148,7 +148,7 @@ class PhaseLaw:
         return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
 
     def _kept(self, frequency_hz: float) -> float:
-        """Return the fraction of a transient that remains after one look."""
+        """Return the fraction of a decaying transient that remains after one look (measurement)."""
         return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)
 
 
@@ -156,7 +156,7 @@ _NEAR_DEG = 35.0
 """Largest phase error on the straight part of the phase curve, which gives the slope [degrees]."""
 _FEWEST = 2
 _NEAREST = 3
-"""Number of measurements nearest to the resonance that give the slope if it changes with frequency."""
+"""Number of measurements nearest to the resonance that determine a frequency-dependent slope of the phase."""
 _STEEPEST_DEG = 85.0
 """Upper limit on phase errors in the fit, because the tangent of 90 degrees is infinite [degrees]."""
 _BEND = 0.15
@@ -165,7 +165,7 @@ _BEND = 0.15
 
 @dataclass(frozen=True)
 class PhaseError:
-    """Phase minus its target at one frequency [degrees], with the standard uncertainty due to scatter."""
+    """Phase minus target phase at one frequency [degrees], with the standard uncertainty due to scatter."""
 
     frequency_hz: float
     error_deg: float
@@ -178,12 +178,12 @@ class PhaseResonance:
 
     frequency_hz: float
     uncertainty_hz: float
-    """Standard uncertainty, including the sensors' phases [Hz]."""
+    """Standard uncertainty of the frequency, including the phase uncertainty of the sensors [Hz]."""
     slope_deg_per_hz: float
 
     @property
     def half_width_hz(self) -> float:
-        """Half of the half-power bandwidth (damping ratio times frequency), from the slope [Hz]."""
+        """Half of the half-power bandwidth (damping ratio times frequency), from the phase slope [Hz]."""
         return 180 / (pi * abs(self.slope_deg_per_hz)) if self.slope_deg_per_hz else 0.0
 
 
@@ -197,10 +197,10 @@ class PhaseSearch:
     """Largest step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
-    """Whether the phase follows a linear mode; if not, only the nearest measurements give its slope."""
+    """Whether the phase follows a linear mode. If not, only the nearest measurements determine the slope."""
 
     def next_hz(self) -> float:
-        """Return the next frequency to try [Hz]; needs at least one earlier try."""
+        """Return the next frequency at which to measure [Hz]; requires at least one earlier measurement."""
         last = self.tries[-1]
         if len(self.tries) == 1:
             step_hz = 0.5 * self.widest_step_hz
@@ -217,7 +217,7 @@ class PhaseSearch:
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
         """Return the resonance: the zero of a line fitted to the phases measured near it.
 
-        ``sensor_phase_deg`` is the standard uncertainty of the phase that all tries share [degrees].
+        ``sensor_phase_deg`` is the standard uncertainty of the phase that all measurements share [degrees].
         """
         nearest = sorted(self.tries, key=lambda each: abs(each.error_deg))
         near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]
@@ -255,7 +255,7 @@ class PhaseSearch:
 
 
 def _between(low: PhaseError, high: PhaseError) -> float:
-    """Return the secant's zero, but not close to either end, so that the bracket shrinks from both sides."""
+    """Return the secant's zero, kept away from both ends of the bracket so that the bracket shrinks."""
     share = low.error_deg / (low.error_deg - high.error_deg)
     edge = 0.05
     return low.frequency_hz + min(max(share, edge), 1 - edge) * (high.frequency_hz - low.frequency_hz)

@@ -22,12 +22,12 @@ from .steadiness import ORDERS, Periods
 _UNKNOWNS = 8
 """Number of real unknowns in the fit: frequency, damping, and a complex polynomial of degree two."""
 _SURE = 2.0
-"""Smallest accepted ratio of a damping to its standard uncertainty."""
+"""Smallest accepted ratio of a damping ratio to its standard uncertainty."""
 
 
 @dataclass(frozen=True)
 class Mode:
-    """A damped mode."""
+    """A damped mode, as fitted to measured transmissibilities."""
 
     frequency_hz: float
     """Undamped natural frequency [Hz]."""
@@ -92,14 +92,14 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Largest change still to come of a locked motion, in phase tolerances; 0.5 for super- and subharmonics."""
+"""Largest remaining change of a locked motion, in phase tolerances; 0.5 for super- and subharmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
 """Smallest relative frequency step of a search; a smaller step means that the phase jumps."""
 _BATCHES = 8
 _KNOWN = 4.0
-"""Ratio of a motion to its standard error above which its phase is defined."""
+"""Ratio of a motion to its standard error above which the phase of the motion is defined."""
 _FURTHEST = 1.5
 """Largest distance of a flank point from the resonance, in half-widths."""
 
@@ -152,7 +152,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level; return the number of looks, and the result (None: resonance lost)."""
+    """Control phase and level. Return the number of looks (measurements), and the result or None if lost."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
@@ -176,8 +176,8 @@ def _lock(
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
     """Return the factor of the first change of the setting towards a new level.
 
-    A specimen reduces the motion of a light table, but only after its own motion has grown. Until then the
-    base follows the whole change of the setting, so the first change must be smaller.
+    A specimen reduces the motion of a light table, but only after the specimen's motion has grown. Until then
+    the base follows the whole change of the setting, so the first change must be smaller.
     """
     bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)
     share = min(1.0, bare_vpp / loop.setting.setting_vpp)
@@ -253,13 +253,13 @@ class Tracked:
     lock: LockResult
     tries: int
     periods: int
-    """Number of drive periods that the result took."""
+    """Number of drive periods that the measurement took."""
 
 
 def _flanks(
     controller: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance
 ) -> Controller[list[SettledState]]:
-    """Return settled states on both flanks, up to `_FURTHEST` half-widths from the resonance."""
+    """Return settled states below and above the resonance, up to `_FURTHEST` half-widths away."""
     found: list[SettledState] = []
     pairs = plan.flank_pairs
     for place in (*range(-pairs, 0), *range(1, pairs + 1)):
@@ -279,7 +279,7 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
 
 
 def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
-    """Return whether the motion may be the tracked one; a subharmonic does not repeat every drive period."""
+    """Return whether this may be the tracked motion; a subharmonic never repeats every drive period."""
     return plan.subharmonic == 1 or found.judgement.period != 1
 
 
@@ -301,7 +301,7 @@ def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
 
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
-    """Return the phase of m0 over the base minus its target; the scatter of batches is its uncertainty."""
+    """Return the phase of m0 over the base, minus its target; its uncertainty is the scatter of batches."""
     count = periods.count // 2
     newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES

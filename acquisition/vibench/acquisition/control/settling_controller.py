@@ -29,7 +29,7 @@ from .steadiness import ORDERS, Judgement, Phasors, in_drives, judgement_of
 
 @dataclass(frozen=True)
 class SettledPoint:
-    """A frequency with settled motion, and its Response II."""
+    """Settled motion at one frequency, with its Response II (transmissibility)."""
 
     frequency_hz: float
     response: float
@@ -50,7 +50,7 @@ class LocatedJump:
         return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
 
     def is_jump(self, factor: float) -> bool:
-        """Whether the response still changes by more than ``factor`` across the bracket."""
+        """Whether the response changes by more than ``factor`` across the bracket."""
         return ratio(self.before, self.after) > factor
 
 
@@ -106,12 +106,12 @@ _SURE = 2.0
 _SAME_LEVEL = 0.004
 """Relative tolerance of the level if settling is judged by a single order of the response."""
 _PROMPT = 0.7
-"""Exponent that reduces a correction made while the specimen still responds to the last correction."""
+"""Exponent below 1 that reduces a correction made while the specimen still responds to the one before."""
 
 
 @dataclass(frozen=True)
 class SettledState:
-    """State at one frequency when the wait for a settled motion has ended."""
+    """State of the motion at one frequency, at the end of the wait for settling."""
 
     frequency_hz: float
     """Commanded frequency [Hz]."""
@@ -164,7 +164,7 @@ class SettledState:
 
 @dataclass(frozen=True)
 class SettlingController:
-    """Waits until the motion at one frequency has settled, or until the longest wait has passed."""
+    """Waits until the motion at one frequency has settled, or the longest allowed wait is over."""
 
     loop: SineLoop
     rule: Settling
@@ -188,7 +188,7 @@ class SettlingController:
                 return found
 
     def measured(self) -> MeasuredLevel:
-        """Return the base level, from the newer half of the periods since the drive last changed."""
+        """Return the base level [m/s2], from the newer half of the periods since the drive changed."""
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
 
@@ -231,7 +231,7 @@ class SettlingController:
         return True
 
     def found(self, waited_s: float) -> SettledState:
-        """Return the result from the periods since the last change of the drive."""
+        """Return the state of the motion, from the periods since the last change of the drive."""
         loop, periods = self.loop, self.loop.periods
         # A motion judged by one order settles slowly, so only its newest periods are used.
         newest = periods.last(
@@ -262,7 +262,7 @@ class SettlingController:
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Return whether the base level is known well, and is within tolerance or limited by ``most_vpp``."""
+        """Return whether the base level is well known, and is in tolerance or limited by ``most_vpp``."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
@@ -316,7 +316,7 @@ def record_settled(
 def record_and_judge(
     controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
 ) -> Controller[SettledState]:
-    """Record a motion long enough to judge whether it has settled; return the result."""
+    """Record a motion long enough to decide whether it has settled; return its state."""
     shortest_s = (controller.rule.periods + 2) / controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
     yield from _record_held(controller, segment, duration_s)
@@ -374,7 +374,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Update the frequency range in which the level is outside its tolerance; None outside such a range."""
+    """Extend the range of frequencies at which the level is out of tolerance; None if it is in tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

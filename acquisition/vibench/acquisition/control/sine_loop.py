@@ -21,18 +21,18 @@ from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
 from .steadiness import ORDERS, Periods, Phasors, Stroboscope
 
 _SURE = 4.0
-"""Ratio of a trend to its standard uncertainty above which the trend is extrapolated."""
+"""Ratio of a gain's trend to the trend's standard uncertainty, above which the trend is extrapolated."""
 _FEWEST = 3
-"""Smallest number of steps needed to estimate a trend and its scatter."""
+"""Smallest number of drive steps from which the trend of the gain and its scatter are estimated."""
 
 
 @dataclass(frozen=True)
 class _Answer:
     time_s: float
     gain: complex
-    """Measured base acceleration over that of the rig's linear model."""
+    """Measured base acceleration over the acceleration that the rig's linear model predicts."""
     level: complex
-    """Measured base acceleration over its target."""
+    """Measured base acceleration over its target acceleration."""
 
 
 class GainEstimator:
@@ -63,18 +63,18 @@ class GainEstimator:
 
     @property
     def is_known(self) -> bool:
-        """Whether at least one step has been measured."""
+        """Whether at least one step of the drive has been measured."""
         return bool(self._answers)
 
     @property
     def level(self) -> float:
-        """Mean amplitude of the base over the averaged steps, as a fraction of its target."""
+        """Mean amplitude of the base over the averaged steps of the drive, as a fraction of its target."""
         if not self._answers:
             return 1.0
         return float(abs(np.mean([each.level for each in self._answers])))
 
     def gain_at(self, time_s: float) -> float:
-        """Return the predicted magnitude of the gain; 1, as in the model, without measurements."""
+        """Return the predicted magnitude of the gain relative to the model; 1 without measurements."""
         if not self._answers:
             return 1.0
         gain = np.array([each.gain for each in self._answers])
@@ -112,7 +112,7 @@ class SineLoop:
         self.channels = channels
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
-        """Largest amplitude setting of the plan [Vpp]."""
+        """Largest amplitude setting that the plan allows [Vpp]."""
         self.drives = 1
         """Number of drive periods in one period of the motion; set before anything is played."""
         self.settling_order: int | None = None
@@ -122,7 +122,7 @@ class SineLoop:
         """Smallest amplitude setting of the generator [Vpp]."""
         self.setting = DriveSetting(0.0, self.least_vpp)
         self.elapsed_s = 0.0
-        """Duration of all samples so far [s]."""
+        """Total duration of the samples so far [s]."""
 
     @property
     def periods(self) -> Periods:
@@ -167,23 +167,23 @@ class SineLoop:
         self.forget()
 
     def bounded_vpp(self, setting_vpp: float) -> float:
-        """Return a setting limited to the generator's smallest and the plan's largest [Vpp]."""
+        """Return a setting, limited to the generator's smallest and the plan's largest setting [Vpp]."""
         return min(max(setting_vpp, self.least_vpp), self.most_vpp)
 
     def forget(self) -> None:
-        """Discard the periods so far, so that only later ones are evaluated."""
+        """Discard the measured periods, so that only later periods are evaluated."""
         self._scope.forget()
 
     def note(self, note: FeedbackNote) -> None:
-        """Keep a note, to be written at the start of the next phase."""
+        """Store a note, which is written at the start of the next phase."""
         self._notes.append(note)
 
     def ramp_up(self) -> Controller[None]:
-        """Ramp the drive up."""
+        """Ramp the drive up to its present setting."""
         yield from self.run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
-        """Ramp the drive down, and write all pending notes."""
+        """Ramp the drive down, and write all stored notes."""
         yield from self.run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
         yield from self.say()
 
@@ -198,12 +198,12 @@ class SineLoop:
             self._scope.add(first_sample, *rows)
 
     def say(self) -> Controller[None]:
-        """Write all pending notes."""
+        """Write all stored notes without sampling."""
         if self._notes:
             yield ControlAction(None, self._take_notes())
 
     def run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
-        """Play a phase and return its samples; pending notes are written at its first sample."""
+        """Play a phase and return its samples; stored notes are written at its first sample."""
         return (yield ControlAction(phase, self._take_notes()))
 
     def _take_notes(self) -> tuple[FeedbackNote, ...]:
@@ -233,7 +233,7 @@ def _start_at(loop: SineLoop, frequency_hz: float, wanted_vpp: float) -> Control
 
 
 def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
-    """Move to ``frequency_hz`` in steps of at most ``step_hz``, because a large step disturbs the motion."""
+    """Move to ``frequency_hz`` in steps of at most ``step_hz``, because larger steps disturb the motion."""
     begin_hz = loop.setting.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
     estimator = GainEstimator(_GLIDE_MEMORY_S)
@@ -245,7 +245,7 @@ def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz:
 
 
 def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
-    """Change the frequency; if a base level is held, scale the setting as the rig's model predicts."""
+    """Change the frequency. If a base level is held, scale the setting as the rig's model predicts."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
         setting_vpp *= _bare_vpp(loop, level, frequency_hz)
@@ -266,7 +266,7 @@ def track(
 
 
 def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) -> None:
-    """Add the newest periods to the estimator's track; without a level, do nothing."""
+    """Add the newest periods to the gain estimate; do nothing if no base level is held."""
     if level is None:
         return
     now = loop.setting
@@ -279,7 +279,7 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
 
 
 def _model_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Return the setting that the bare table needs for the level at the present frequency [Vpp]."""
+    """Return the setting for the level at the present frequency, for a table without specimen [Vpp]."""
     return _bare_vpp(loop, level, loop.setting.frequency_hz)
 
 
@@ -288,7 +288,7 @@ def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
 
 
 def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
-    """Change frequency and setting; with a level, the setting by at most the factor ``most_change``."""
+    """Change frequency and setting. If a level is held, ``most_change`` limits the setting's factor."""
     if level is not None:
         now_vpp = loop.setting.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
@@ -297,12 +297,12 @@ def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseL
 
 
 _PROMPT = 0.8
-"""Fraction of the deviation of m0's amplitude [dB] that one correction of the drive removes."""
+"""Fraction of the amplitude error of m0 [dB] that one correction of the drive removes."""
 _IN_A_ROW = 2
 
 
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Ramp up to a low level; bring m0 to its amplitude and record at each frequency (decision 0066)."""
+    """Ramp up to a low level. At each frequency, bring m0 to its amplitude and record (decision 0066)."""
     passes = tuple(plan.passes())
     yield from _start_at(loop, passes[0][1][0], plan.start_share * loop.most_vpp)
     for direction, frequencies_hz in passes:

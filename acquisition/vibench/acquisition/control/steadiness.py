@@ -16,7 +16,7 @@ from ..recording import Steadiness
 # estimated from the recorded drive, gives the beginning of each drive period in the converter's time.
 
 _MEMORY = 40
-"""Number of blocks to whose phases a line is fitted; its slope gives the frequency accurately enough."""
+"""Number of blocks to whose phases a line is fitted; the slope of the line gives the drive frequency."""
 
 
 class DriveClock:
@@ -90,16 +90,16 @@ class Periods:
 
     @property
     def count(self) -> int:
-        """Number of periods."""
+        """Number of periods stored here."""
         return len(self.base)
 
     def last(self, count: int) -> "Periods":
-        """Return the newest ``count`` periods."""
+        """Return the newest ``count`` periods of the motion."""
         return Periods(self.base[-count:], self.response[-count:])
 
 
 class Stroboscope:
-    """Splits blocks into periods of ``drives`` drive periods; an incomplete one waits for the next block."""
+    """Splits blocks of samples into periods of ``drives`` drive periods; keeps an incomplete period."""
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz
@@ -131,7 +131,7 @@ class Stroboscope:
         self._keep_from(starts_s[-1])
 
     def periods(self) -> Periods:
-        """Return all periods so far."""
+        """Return all periods since the last discard."""
         if not self._base:
             return Periods(np.empty(0, np.complex128), np.empty((0, ORDERS), np.complex128))
         return Periods(np.concatenate(self._base), np.concatenate(self._response))
@@ -200,7 +200,7 @@ _FEWEST_TURNS = 2
 _SURE = 2.0
 """Number of standard uncertainties that a value must be away from its limit."""
 _CERTAIN = 5.0
-"""Number of standard errors above which a mean is not attributed to noise."""
+"""Number of standard errors above which a mean is not explained by noise."""
 _BLOCKS = 12
 """Number of blocks compared by a test of stationarity."""
 _SIGNIFICANCE = 0.01 / 8
@@ -221,11 +221,11 @@ class Judgement:
     period: int
     """Number of drive periods after which the motion repeats; 0 if it does not."""
     scatter: float
-    """Rms distance of samples from the means of ``period`` clusters; of one cluster if ``period`` is 0."""
+    """Rms distance of the Fourier points from their cluster means; from a single mean if ``period`` is 0."""
     scatter_u: float
-    """Standard uncertainty of the scatter."""
+    """Standard uncertainty of the scatter, relative to the motion's rms."""
     noise: float
-    """Part of the scatter due to noise of the channel; a smaller scatter cannot be measured."""
+    """Part of the scatter that noise of the channel explains; a smaller scatter cannot be measured."""
     remaining: float
     """Extrapolated change of the cluster means still to come; for an aperiodic motion, their last change."""
 
@@ -298,7 +298,7 @@ def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
 
 
 def _differ(points: Phasors, period: int, allowed: float) -> bool:
-    """Return whether the clusters of a longer period are further apart than one cluster may be wide."""
+    """Return whether the clusters of a longer period are further apart than the scatter of one cluster."""
     centres = points.reshape(-1, period, points.shape[1]).mean(axis=0)
     away = centres - centres.mean(axis=0)
     size = float(np.mean(np.sum(np.abs(points) ** 2, axis=1)))
@@ -306,7 +306,7 @@ def _differ(points: Phasors, period: int, allowed: float) -> bool:
 
 
 def _remaining(early: float, late: float, by_chance: float) -> float:
-    """Extrapolate the change of a mean geometrically; return the last change if it may be due to chance."""
+    """Extrapolate the change of a mean as a geometric series; return the last change if it may be chance."""
     if late <= _SURE * by_chance:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
@@ -320,12 +320,12 @@ def _repeats(figures: Judgement, tolerance: float) -> bool:
 
 
 def _limit(figures: Judgement, tolerance: float) -> float:
-    """Return the largest scatter with which a motion still counts as repeating."""
+    """Return the largest scatter with which a motion still counts as periodic."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
 
 def _stationary(points: Phasors, found: Judgement) -> Judgement:
-    """Return the judgement from block statistics: stationary without a trend or a step between halves."""
+    """Return the judgement from block statistics: stationary if blocks show neither trend nor step."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
     # Use order 1, or the only order if a single one is judged.
