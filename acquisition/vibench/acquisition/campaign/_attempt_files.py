@@ -1,4 +1,4 @@
-"""Files of a point: one for each attempt (``NAME.h5``, ``NAME.2.h5``, ...); none is ever overwritten."""
+"""Recordings of a point: one file for each attempt (``NAME.h5``, ``NAME.2.h5``, ...), never overwritten."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ from ..recording import (
 
 @dataclass(frozen=True)
 class KeptRecording:
-    """State of one recording of a campaign's point, as read from its file."""
+    """State of one attempt's recording of a campaign's point, as read from the file of that attempt."""
 
     path: Path
     state: RecordingState | None
@@ -35,11 +35,11 @@ class KeptRecording:
     """Description of the damage; empty if the file is sound or has no seal."""
     is_of_this_plan: bool
     rig: Mapping[str, Any] = field(default_factory=dict)
-    """Configuration of the bench on which it was recorded."""
+    """Configuration of the bench on which the recording was made."""
 
     @property
     def is_complete(self) -> bool:
-        """Whether the file is sound and its run ended as planned."""
+        """Whether the recording is undamaged and its run ended as planned."""
         return self.state is RecordingState.COMPLETE and not self.damage
 
 
@@ -74,7 +74,7 @@ def is_made_by(recording: Recording, measurement: Measurement) -> bool:
 
 
 def attempts_in(folder: Path, name: str) -> tuple[Path, ...]:
-    """Return the paths of all attempts at the point ``name``, finished or not, in order."""
+    """Return the paths of all recordings of the point ``name``, finished or not, in order of the attempts."""
     attempts: list[Path] = []
     while _is_taken(candidate := _attempt(folder, name, len(attempts) + 1)):
         attempts.append(candidate)
@@ -89,7 +89,7 @@ def next_attempt(folder: Path, name: str) -> Path:
 def complete_attempt(
     folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
-    """Return the complete recording of a point; if there is none, the last damaged recording or None.
+    """Return the complete recording of a point; without one, the last damaged recording; without any, None.
 
     Raises RecordingError when a recording is complete but was measured with another plan.
     """

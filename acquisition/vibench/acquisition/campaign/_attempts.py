@@ -1,4 +1,4 @@
-"""Measure a point until it is recorded or all attempts are used, with cooling pauses."""
+"""Measure a point until it is recorded or all attempts are used; pause between points for cooling."""
 
 from collections.abc import Callable, Collection
 from functools import partial
@@ -39,7 +39,7 @@ class CoolingPause:
         self._is_due = True
 
     def wait(self, bench: Bench, name: str) -> None:
-        """Pause before the recording of the point ``name``, if required, with the generator off."""
+        """Pause before the recording of the point ``name``, if a pause is required; the generator is off."""
         if not self._is_due or not self._rest_s:
             return
         self._is_due = False
@@ -93,7 +93,7 @@ class Attempts:
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Measure a point until it has a valid recording; ``tell`` is called after every block.
 
-        Raises the AcquisitionError of the last attempt, which is also written to the journal.
+        Raises the AcquisitionError of the last attempt, and writes it to the journal.
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)
@@ -213,7 +213,7 @@ class Attempts:
 
 
 def _seal_of(path: Path) -> str:
-    """Return the seal of a finished recording; empty for an unfinished one."""
+    """Return the seal (checksums) of a finished recording; empty for an unfinished recording."""
     try:
         with open_recording(path) as recording:
             return recording.seal
@@ -222,7 +222,7 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Return a clause that names inputs near full scale in the segments ``labels``; empty if none."""
+    """Return a clause that names inputs near full scale in the segments ``labels``; empty without any."""
     if not path.exists():  # the user may have moved a complete recording already
         return ""
     with open_recording(path) as recording:

@@ -12,7 +12,7 @@ from ..stopping.stop import StopSwitch
 from ._log import CampaignEvent, CampaignEventKind, CampaignListener, CommandMessenger
 
 MOVE_LONGEST_S = 120.0
-"""Time after which a command that moves the beam is ended [s]."""
+"""Time after which a command that moves the beam is terminated [s]."""
 
 
 def rig_at(rig: Rig, measurement: Measurement) -> Rig:

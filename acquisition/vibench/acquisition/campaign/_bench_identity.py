@@ -27,7 +27,7 @@ class BenchIdentity(FrozenModel):
 
     @classmethod
     def of(cls, bench: Bench) -> Self:
-        """Return the identity of an open bench."""
+        """Return configuration, instruments and manual settings of an open bench."""
         instruments = {
             part: Instrument(maker=each.maker, model=each.model, serial=each.serial, firmware=each.firmware)
             for part, each in bench.identities.items()

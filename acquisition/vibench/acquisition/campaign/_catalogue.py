@@ -37,7 +37,7 @@ from ..recording import (
 from ._journal import JournalPoint, JournalPointState, journal_exists, read_journal
 
 UNREADABLE = "unreadable"
-"""State of a file that is damaged or not a recording; ``reason`` states what is wrong."""
+"""State of a file that is damaged or not a recording; ``reason`` of the entry states what is wrong."""
 DAMAGED = "damaged"
 """State of a recording that can be opened but differs from its seal (checksum)."""
 UNCHECKED = "samples not checked"
@@ -69,18 +69,18 @@ class CatalogueEntry:
     bench_check: str = ""
     """Verdict of the bench check before the recording."""
     results: str = ""
-    """Names of the saved analysis results, separated by commas."""
+    """Names of the analysis results saved in the recording, separated by commas."""
     operator: str = ""
     notes: str = ""
     recording_id: str = ""
     samples_id: str = ""
-    """Identifier of the samples, equal in copies; see `vibench.acquisition.recording.Recording`."""
+    """Identifier of the samples, the same in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
     """Value of `recording.SealState` after a quick check; empty if unknown."""
 
     @property
     def is_bad(self) -> bool:
-        """Whether the file is damaged or cannot be read."""
+        """Whether the recording is damaged or cannot be read."""
         return self.state in (UNREADABLE, DAMAGED)
 
 
@@ -143,7 +143,7 @@ def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
 
 
 def _number(value: object) -> float | None:
-    """Return a value of a plan as a number; None if it is not a number."""
+    """Return a value of a plan as a number; None if the value is not a number."""
     try:
         return float(value) if isinstance(value, int | float) else None
     except OverflowError:
@@ -169,7 +169,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 5
-"""Version of the catalogue, increased when the fields of an entry change; other versions are rebuilt."""
+"""Version of the catalogue. It increases when the fields of an entry change; other versions are rebuilt."""
 WAIT_S = 10.0
 """Longest wait for another program that writes the same catalogue [s]."""
 
@@ -183,7 +183,7 @@ class Refresh(StrEnum):
     """Which recordings are read again when a folder is listed."""
 
     CHANGED = "changed"
-    """Recordings that have changed since the last listing, and unfinished ones."""
+    """Recordings that have changed since the last listing, and unfinished recordings."""
     ALL = "all"
 
 
@@ -306,7 +306,7 @@ class VerifiedRecording:
     path: str
     """Path relative to the folder, with ``/``; for a single file, its name."""
     verdict: str
-    """Value of `recording.SealState`, or ``unreadable`` or ``missing``."""
+    """Value of `recording.SealState`, or ``unreadable`` or ``missing``, for the file."""
     sentence: str
     seal: str
     results: dict[str, str]
@@ -314,7 +314,7 @@ class VerifiedRecording:
 
     @property
     def is_bad(self) -> bool:
-        """Whether the verdict on the file, or on a result in it, is one of `BAD`."""
+        """Whether the verdict on the file, or on a result saved in it, is one of `BAD`."""
         return self.verdict in BAD or not BAD.isdisjoint(self.results.values())
 
 
@@ -323,7 +323,7 @@ def verify_recordings(
     depth: SealDepth | str = SealDepth.WHOLE,
     key: SealKey | None = None,
 ) -> tuple[VerifiedRecording, ...]:
-    """Compare recordings with their seals and journals; return the result for each file, change nothing.
+    """Compare recordings with their seals and journals; return one result per file. No file is changed.
 
     Raises RecordingError when ``place`` does not exist, or the key cannot be read.
 

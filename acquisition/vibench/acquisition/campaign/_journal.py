@@ -37,22 +37,22 @@ class ReasonCode(StrEnum):
     """Reason for the state of a point; includes all values of `plan.Retryable`."""
 
     NOT_YET = "not_yet"
-    """Not started yet."""
+    """The measurement of the point has not started yet."""
     RUNNING = "running"
     CARRIED_OUT = "carried_out"
     OVER_RANGE = "over_range"
-    """Carried out, but an input was near its full scale in a recorded segment."""
+    """The point was measured, but an input was near its full scale in a recorded segment."""
     FOUND = "found"
     """A complete recording of the same plan was already in the folder."""
     GONE = "gone"
-    """The point was done, but its recording is missing."""
+    """The point was measured, but its recording is missing."""
     DAMAGED = "damaged"
-    """The point was done, but its recording differs from its seal (checksum). The file is kept, and the point
-    is measured again."""
+    """The point was measured, but its recording differs from its seal (checksum). The file is kept, and the
+    point is measured again."""
     STOPPED = "stopped"
-    """A stop was requested; the reason states who requested it."""
+    """A stop was requested; the text of the reason names who requested it."""
     PROGRAM_ENDED = "program_ended"
-    """The program was killed, crashed, or lost power."""
+    """The program was killed or crashed, or the computer lost power."""
     DATA_LOST = "data_lost"
     INSTRUMENT_LOST = "instrument_lost"
     INSTRUMENT_FAULT = "instrument_fault"
@@ -62,7 +62,7 @@ class ReasonCode(StrEnum):
     PLAN = "plan"
     """The bench cannot play the plan."""
     FAULT = "fault"
-    """Anything else that went wrong."""
+    """Any other fault."""
 
 
 _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
@@ -78,7 +78,7 @@ _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
 
 
 def reason_code_of(error: AcquisitionError) -> ReasonCode:
-    """Return the reason code of an error."""
+    """Return the code in the journal for an error."""
     return next(
         (reason_code for kind, reason_code in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT
     )
@@ -114,7 +114,7 @@ class PointOutcome(StrEnum):
 
     RECORDED = "recorded"
     KEPT = "kept"
-    """The recording was already complete before."""
+    """The recording was already complete before this run of the campaign."""
     STOPPED = "stopped"
     FAILED = "failed"
 
@@ -163,7 +163,7 @@ class Finished:
 
 
 After = Callable[[Finished, Recording], Iterable[Measurement]]
-"""Called after every point with its open recording; returns further measurements to make next, or none."""
+"""Called after every point with the open recording; returns measurements to make next, or none."""
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:
@@ -181,7 +181,7 @@ VERSION = 2
 SEAL_COLUMNS = tuple(
     f"ALTER TABLE {table} ADD COLUMN seal TEXT NOT NULL DEFAULT ''" for table in ("points", "attempts")
 )
-"""Statements that add the columns missing in version 1."""
+"""SQL statements that add the columns missing in journals of version 1."""
 
 SCHEMA = """
 CREATE TABLE campaign (
@@ -230,7 +230,7 @@ FROM points ORDER BY place
 
 
 def journal_exists(path: Path) -> bool:
-    """Return whether ``path`` is a journal; a file without any committed transaction is not."""
+    """Return whether ``path`` is a journal; a database without any committed transaction is not."""
     if not path.is_file():
         return False
     with sentences(path), closing(opened_to_look(path)) as connection:
@@ -240,7 +240,7 @@ def journal_exists(path: Path) -> bool:
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Return a connection for writing, whose commits survive a kill and a power cut."""
+    """Return a database connection for writing, whose commits survive a kill and a power cut."""
     with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
@@ -287,7 +287,7 @@ class JournalPointState(StrEnum):
     DONE = "done"
     FAILED = "failed"
     INTERRUPTED = "interrupted"
-    """Stopped by a person, or by the end of the program."""
+    """The measurement was stopped by a person, or by the end of the program."""
 
 
 @dataclass(frozen=True)
@@ -311,7 +311,7 @@ class JournalPoint:
     ended_utc: str
     """Time of the end of the last attempt (UTC)."""
     seal: str
-    """Seal of the recording; empty without a recording or a seal."""
+    """Seal (checksums) of the recording; empty without a recording or a seal."""
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
@@ -408,13 +408,13 @@ class Journal(ClosedOnLeaving):
 
     @property
     def campaign(self) -> Campaign:
-        """The campaign's plan at its start."""
+        """The campaign's plan, as it was at the start of the campaign."""
         with sentences(self.path):
             return Campaign.model_validate_json(self._fact("plan_json"))
 
     @property
     def bench(self) -> BenchIdentity:
-        """The bench at the start of the campaign, or the last one accepted since."""
+        """The bench at the start of the campaign, or the bench accepted last after a change."""
         command = "SELECT identity_json FROM benches ORDER BY rowid DESC"
         with sentences(self.path):
             (identity,) = self._connection.execute(command).fetchone()
@@ -460,7 +460,7 @@ class Journal(ClosedOnLeaving):
             _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
     def keep(self, name: str, file: str, seal: str) -> None:
-        """Mark a point as done whose complete recording ``file`` is already in the folder."""
+        """Mark a point as done because its complete recording ``file`` is already in the folder."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
@@ -474,7 +474,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET is_followed_up = 1 WHERE name = ?", (name,))
 
     def close(self) -> None:
-        """Close the file. May be called at any time."""
+        """Close the journal. May be called at any time."""
         self._connection.close()
 
     def _fact(self, key: str) -> str:

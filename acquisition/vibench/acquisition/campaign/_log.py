@@ -62,7 +62,7 @@ class CampaignEvent:
 
 
 CampaignListener = Callable[[CampaignEvent], None]
-"""Called with every event, in order; must not raise."""
+"""Function called with every event, in order; it must not raise an exception."""
 
 
 def ignore_event(event: CampaignEvent) -> None:
@@ -133,7 +133,7 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Time by the rig's clock of the points and pauses before the running point [s]."""
+        """Sum of planned points and pauses before the running point, by the rig's clock [s]."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
@@ -161,7 +161,7 @@ class StatusLine(ClosedOnLeaving):
             self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s{known}")
 
     def close(self) -> None:
-        """Write the last lines. May be called at any time."""
+        """Write the last status lines. May be called at any time."""
         self._beside.close(LEFT_ALONE_S)
 
     def _write(self, what: str) -> None:
@@ -177,7 +177,7 @@ class StatusLine(ClosedOnLeaving):
             file.write(line)
 
     def _left(self) -> timedelta:
-        """Return the planned remaining time times this session's ratio of real to planned time."""
+        """Return the planned remaining time, scaled by real over planned time of this session [s]."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
@@ -213,7 +213,7 @@ class MailMessenger:
         self._settings = settings
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Send one mail; return a clause that states the result."""
+        """Send one mail; return a clause that states whether it was sent."""
         settings = self._settings
         try:
             with self._connected() as server:
@@ -248,10 +248,10 @@ COMMAND_LONGEST_S = 30.0
 
 
 class Messenger(Protocol):
-    """Means to send a notice to somebody."""
+    """A means of sending notices to a person."""
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Send a notice; return a clause that states the result. Never raise."""
+        """Send a notice; return a clause that states whether it was sent. Never raise an exception."""
 
 
 @dataclass(frozen=True)
@@ -281,11 +281,11 @@ class CommandMessenger:
         return cls(arguments)
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Run the command, end it after `COMMAND_LONGEST_S`, and return a clause that states the result."""
+        """Run the command, and end it after `COMMAND_LONGEST_S`. Return a clause that states the result."""
         return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
 
     def run(self, document: Mapping[str, Any], longest_s: float) -> str:
-        """Run the command with ``document`` as input; return a clause on its failure, empty on success."""
+        """Run the command with ``document`` as input; return a clause if it fails, empty text on success."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,
@@ -308,7 +308,7 @@ class Notifier:
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener
     ) -> None:
-        """``say`` is called with the result of each notice."""
+        """``say`` is called with a clause on the result of each notice."""
         self._campaign = campaign
         self._folder = folder
         self._messengers = messengers

@@ -38,8 +38,8 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     A point with a complete recording is done, even if the last entry in the journal is missing. A running
     point without a complete recording is interrupted, and its unfinished recording is made readable. A done
     point is queued again when its recording is missing or differs from its seal; the file is kept, and the
-    next attempt gets a new file. Reading a folder may take minutes; after a stop, the remaining points are
-    left for the next resume.
+    next attempt gets a new file. Reading a folder may take minutes. After a stop request, the next resume
+    updates the remaining points.
     """
     for point in journal.points():
         if stop.request is not None:
@@ -67,9 +67,9 @@ def found_recordings(
 ) -> dict[str, KeptRecording]:
     """Return the recordings in a folder by point, for a campaign whose journal is lost or never existed.
 
-    After a stop request the samples of further recordings are not checked; the next resume does this. Damaged
-    recordings are returned too. So are recordings whose seal is in no journal of the folder: the campaign may
-    have been renamed. Raises RecordingError when a complete recording was made by another plan.
+    After a stop request the samples of further recordings are not checked; the next resume checks them.
+    Damaged recordings are returned too. So are recordings whose seal is in no journal of the folder: the
+    campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
     """
 
     def looked_for(point: Point) -> KeptRecording | None:
@@ -140,7 +140,7 @@ class PlannedRecording:
     measurement: Measurement
     path: Path
     is_complete: bool = False
-    """Whether a complete recording of the same plan exists already."""
+    """Whether a complete recording of the same plan already exists."""
 
 
 def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
@@ -191,7 +191,7 @@ def open_journal(
     changed: ChangedBench,
     stop: StopSwitch,
 ) -> Journal:
-    """Return the campaign's journal: a new one, or the existing one updated from the folder.
+    """Return the campaign's journal: a new journal, or the existing journal updated from the folder.
 
     Raises RecordingError when the folder contains recordings of the campaign and ``existing`` refuses that,
     or the journal belongs to another plan. Raises CheckFailed when the bench differs from the one at the

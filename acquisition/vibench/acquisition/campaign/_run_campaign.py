@@ -58,7 +58,7 @@ from ._opening import make_folder, open_journal, planned_recordings, require_all
 
 
 class CampaignRunner:
-    """Measures the points of a campaign, and further points that results request."""
+    """Measures the points of a campaign, and further points that are requested after a result."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class CampaignRunner:
                 self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Pause and wait for the beam to be moved before a measurement; return False after a stop."""
+        """Pause, and wait until the beam has been moved, before a measurement; return False after a stop."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
             self._attempts.pause_before(point.name)
             self._attempts.ask_for_beam(point.measurement)
@@ -388,17 +388,17 @@ def _confirmed_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""Size of a finished recording over its size while growing, for 24-bit white noise; less for dwells."""
+"""Size of a finished recording relative to its growing file, for 24-bit white noise; less for dwells."""
 
 
 @dataclass(frozen=True)
 class CampaignEstimate:
-    """Duration and size of the recordings of a campaign that do not exist yet."""
+    """Duration and disk space of those recordings of a campaign that do not exist yet."""
 
     recordings: int
     """Number of recordings still to be made."""
     kept: int
-    """Number of recordings that are complete already."""
+    """Number of recordings that exist and are complete."""
     duration_s: float
     """Duration by the rig's clock, including bench checks, lead-ins and ramps [s]."""
     rest_s: float
@@ -406,13 +406,13 @@ class CampaignEstimate:
     lead_in_s: float
     """Part of ``duration_s`` for lead-ins of points in chains [s]."""
     largest_bytes: int
-    """Largest size of one growing recording [bytes]."""
+    """Largest size of one recording while it grows [bytes]."""
     total_bytes: int
     """Total size of all finished recordings [bytes]."""
     free_bytes: int
     """Free space on the disk of the folder [bytes]."""
     searching: int = 0
-    """Number of recordings that may end early, due to feedback or because results are accurate enough."""
+    """Number of recordings that may end early, because of feedback or because results are accurate enough."""
 
     @property
     def needed_bytes(self) -> int:

@@ -42,7 +42,7 @@ _HASH_DIGITS = 8
 
 
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
-    """Return the path of a rig's last check; it contains the rig's name and a hash of the name.
+    """Return the path of a rig's last check; the file name contains the rig's name and a hash of it.
 
     With ``passed``, the path of the last check that did not fail.
     """
@@ -178,7 +178,7 @@ def check_bench(
     switch
         Switch by which another thread can stop the check.
     new_reference
-        Do not compare with the last passed check: its changes are accepted.
+        Do not compare with the last passed check; changes since then are accepted.
     """
     report, at = bench_report(bench, folder, switch), clock()
     last = None if new_reference else last_passed(bench.rig)
@@ -283,7 +283,7 @@ def _require_passed(result: CheckResult) -> CheckResult:
 
 
 def _output_after(result: CheckResult) -> str:
-    """Return a clause that states whether the output was measured as off."""
+    """Return a clause that states whether the output was measured to be off."""
     left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
     if left is None or left.verdict is Verdict.FAIL:
         return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand, then"

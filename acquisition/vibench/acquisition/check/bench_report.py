@@ -22,7 +22,7 @@ from ..stopping.stop import Cause, StopSwitch
 from .loop import LoopCheck
 
 CHECK_SHARE = 0.02
-"""Largest level of the sine as a fraction of the bench's amplitude limit, far below clipping."""
+"""Largest level of the test sine as a fraction of the bench's amplitude limit, far below clipping."""
 # After this time a step has decayed in an AC coupling of 0.5 Hz.
 _SETTLE_S = 1.5
 _READ_S = 2.0
@@ -39,7 +39,7 @@ OFFSET_SHARE = Bounds(1e-2, 1e-1)
 LATENCY_S = Bounds(0.5, 5.0)
 """Bounds on the time for one verified change of a generator setting [s]; stopping takes as long."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Bounds on the recording time for which the disk has space [h]; negated, because more is better."""
+"""Bounds on the recording time for which the disk has space [h]; negated, because a longer time is better."""
 
 
 def bench_report(

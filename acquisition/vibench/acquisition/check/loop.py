@@ -40,7 +40,7 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
     """Return the least-squares fit of a cosine, a sine and a constant.
 
     The uncertainty assumes white noise: ``residual * sqrt(2 / n)`` (Kay, Fundamentals of Statistical Signal
-    Processing, vol. 1, example 3.14). ``volts`` must span more than one period.
+    Processing, vol. 1, example 3.14). ``volts`` must span more than one period of the sine.
     """
     angle = 2 * pi * frequency_hz * np.arange(volts.size) / sample_rate_hz
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
@@ -82,12 +82,12 @@ BASE_DB = Bounds(1.5, 3.0)
 CLOCK_PPM = Bounds(100.0, 500.0)
 """Bounds on the deviation of the clock ratio from 1, for two oscillators of 50 ppm each [ppm]."""
 DETECTED = 10.0
-"""Smallest ratio of amplitude to uncertainty of a detected sine."""
+"""Smallest ratio of amplitude to its uncertainty at which a sine counts as detected."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Bounds on a channel's phase deviation from the rig's model; above 90 degrees its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""Bounds on m0's phase deviation; never a FAIL, because the specimen is less well known than the shaker."""
+"""Bounds on m0's phase deviation: never a FAIL, because the model of the specimen is less accurate."""
 LEFT_OVER = Bounds(0.02, 0.05)
 """Bounds on the fraction of the drive voltage that remains with the output off."""
 
@@ -104,7 +104,7 @@ def detection_name(role: Role) -> str:
 
 
 class Lasting(Enum):
-    """Kinds of quantities that are compared between checks."""
+    """Kinds of quantities whose changes between two checks are limited."""
 
     GAIN = auto()
     """Gain in decibels."""
