@@ -113,7 +113,7 @@ class BenchLock:
             return
 
     def close(self) -> None:
-        """Release the locks. Legal at any time."""
+        """Release the locks. May be called at any time."""
         while self._descriptors:
             os.close(self._descriptors.pop())
 
@@ -308,7 +308,7 @@ class Bench:
         self._power.idle(duration_s)
 
     def close(self) -> None:
-        """Silence generator and output, then close all instruments. Legal at any time."""
+        """Silence generator and output, then close all instruments. May be called at any time."""
         self._closing.close()
 
     def __enter__(self) -> Self:

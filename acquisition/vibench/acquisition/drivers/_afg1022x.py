@@ -185,7 +185,7 @@ class AFG1022X(ScpiInstrument):
             self.output = "ON"
 
     def stop(self) -> None:
-        """Switch the output off. Legal at any time; tries again, also over a new session.
+        """Switch the output off. May be called at any time; tries again, also over a new session.
 
         Raises InstrumentLost when the generator could not be reached: the output may be ON, and the operator
         must act.
@@ -220,7 +220,7 @@ class AFG1022X(ScpiInstrument):
         )
 
     def close(self) -> None:
-        """Switch the output off and close the connection, even after an error. Legal at any time."""
+        """Switch the output off and close the connection, even after an error. May be called at any time."""
         if self._is_silent_and_closed:
             return
         try:

@@ -104,7 +104,7 @@ class DaqmxOutput:
             self._task.start()
 
     def stop(self) -> None:
-        """Stop playing and go to zero volts at once. Legal at any time.
+        """Stop playing and go to zero volts at once. May be called at any time.
 
         Raises InstrumentLost when the device or its server is gone: the samples already written still play.
         """
@@ -129,7 +129,7 @@ class DaqmxOutput:
             ) from error
 
     def close(self) -> None:
-        """Release the output, at zero volts. Legal at any time."""
+        """Release the output, at zero volts. May be called at any time."""
         self._is_open = False
         if self._task is not None:  # otherwise `stop` has succeeded, or raised its error
             self.stop()

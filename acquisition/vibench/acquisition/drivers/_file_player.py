@@ -126,11 +126,11 @@ class FilePlayer:
         return Block(first, volts, overloads)
 
     def stop(self) -> None:
-        """Stop playing. Legal at any time."""
+        """Stop playing. May be called at any time."""
         self._is_running = False
 
     def close(self) -> None:
-        """Close the recording. Legal at any time."""
+        """Close the recording. May be called at any time."""
         self._is_running = self._is_open = False
         self._recording.close()
 

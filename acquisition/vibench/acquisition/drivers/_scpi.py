@@ -168,7 +168,7 @@ class ScpiInstrument:
             )
 
     def disconnect(self) -> None:
-        """Close the session. Legal at any time, also when the connection is lost."""
+        """Close the session. May be called at any time, also when the connection is lost."""
         with self._lock, self._report_losses("closing the session"):
             self._link.close()
 

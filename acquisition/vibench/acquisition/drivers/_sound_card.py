@@ -206,14 +206,14 @@ class SoundCardDigitizer:
         return self.card.waiting
 
     def stop(self) -> None:
-        """End sampling. Legal at any time."""
+        """End sampling. May be called at any time."""
         if self._is_running:
             self._is_running = False
             with _portaudio(f"stopping {self._device}"):
                 self.card.stream.abort()
 
     def close(self) -> None:
-        """Release the card. Legal at any time."""
+        """Release the card. May be called at any time."""
         self.stop()
         if self._is_open:
             self._is_open = False
@@ -281,11 +281,11 @@ class SoundCardOutput:
             self._card.is_armed = True
 
     def stop(self) -> None:
-        """Play zero volts from the next block on. Legal at any time."""
+        """Play zero volts from the next block on. May be called at any time."""
         self._card.drop()
 
     def close(self) -> None:
-        """Play zero volts and accept no more samples. Legal at any time."""
+        """Play zero volts and accept no more samples. May be called at any time."""
         self._is_open = False
         self.stop()
 

@@ -293,7 +293,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         )
 
     def close(self) -> None:
-        """End the connection; the engine continues. Legal at any time."""
+        """End the connection; the engine continues. May be called at any time."""
         self._connection.close()
 
     def ask(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
@@ -346,7 +346,7 @@ class Attendant:
                 self._begin()
 
     def close(self) -> None:
-        """Stop attending. Legal at any time."""
+        """Stop attending. May be called at any time."""
         self._beat_s = inf  # `live` sends nothing from now on
         self._end()
 

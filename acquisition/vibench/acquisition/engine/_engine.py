@@ -109,7 +109,7 @@ class Engine:
         self.published.enter(EngineState.READY)
 
     def close(self) -> None:
-        """Silence the bench and close it. Legal at any time.
+        """Silence the bench and close it. May be called at any time.
 
         Raises AcquisitionError, after publishing it, when an instrument fails.
         """

@@ -282,7 +282,7 @@ class RequestHandler:
         self._engine.published.twin(told)
 
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "a request ended the engine") -> None:
-        """End the run, silence everything, and let the engine end. Legal in every state."""
+        """End the run, silence everything, and let the engine end. Allowed in every state."""
         self._stop(StopRequest.by(cause, reason))
         self._is_ending = True
         self._jobs.leave()

@@ -40,7 +40,7 @@ class AdoptedEngine(ClosedOnLeaving):
         self.client.close()
 
     def close(self) -> None:
-        """Let the engine ramp down and end, and wait for that. Legal at any time."""
+        """Let the engine ramp down and end, and wait for that. May be called at any time."""
         with suppress(EngineGone):
             self.client.shutdown()
         self.client.close()
@@ -78,7 +78,7 @@ class EngineProcess(ClosedOnLeaving):
         self._close_pipes()
 
     def close(self) -> None:
-        """Let the engine ramp down and end, and wait for that. Legal at any time."""
+        """Let the engine ramp down and end, and wait for that. May be called at any time."""
         if self.is_alive:
             try:
                 self.client.shutdown()

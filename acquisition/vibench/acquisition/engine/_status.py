@@ -270,7 +270,7 @@ class TwinProcess:
         return self._process is not None
 
     def turn(self, switch: TwinSwitch) -> None:
-        """Start or end the twin. Legal in every state."""
+        """Start or end the twin. Allowed in every state."""
         match switch:
             case TwinSwitch.ON if self._process is None:
                 self._process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's

@@ -94,7 +94,7 @@ class Verb(Generic[A]):
     request: type[FrozenModel]
     answer: Answer[A]
     states: tuple[EngineState, ...]
-    """Engine states that permit the request; empty: legal in every state, and never delayed."""
+    """Engine states that permit the request; empty: allowed in every state, and never delayed."""
     work_s: float
     """Longest time to compute the answer [s]; 0 if it is ready at once."""
 

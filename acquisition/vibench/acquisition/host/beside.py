@@ -66,7 +66,7 @@ class ClosedOnLeaving(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release all resources. Legal at any time."""
+        """Release all resources. May be called at any time."""
 
     def __enter__(self) -> Self:
         return self

@@ -206,7 +206,7 @@ class FunctionGenerator(Protocol):
         """Turn the output on."""
 
     def stop(self) -> None:
-        """Turn the output off. Legal at any time, in any state; never fails silently."""
+        """Turn the output off. May be called at any time, in any state; never fails silently."""
 
     def close(self) -> None:
         """Switch the output off and close the connection."""
@@ -246,10 +246,10 @@ class Digitizer(Protocol):
         """Number of converted samples of every channel that can be read without waiting."""
 
     def stop(self) -> None:
-        """End sampling. Legal at any time."""
+        """End sampling. May be called at any time."""
 
     def close(self) -> None:
-        """Release the device. Legal at any time."""
+        """Release the device. May be called at any time."""
 
 
 class IdleOutput(StrEnum):
@@ -293,10 +293,10 @@ class AnalogOutput(Protocol):
         """Prepare to start with the digitizer, once the first samples are written; both begin at sample 0."""
 
     def stop(self) -> None:
-        """Go to zero volts at once. Legal at any time; the next `write` begins a new stream."""
+        """Go to zero volts at once. May be called at any time; the next `write` begins a new stream."""
 
     def close(self) -> None:
-        """Go to zero volts and release the device. Legal at any time."""
+        """Go to zero volts and release the device. May be called at any time."""
 
 
 class RealTimeController(Protocol):
@@ -307,7 +307,7 @@ class RealTimeController(Protocol):
         """Identity of the controller."""
 
     def close(self) -> None:
-        """Silence the drive and close the connection. Legal at any time."""
+        """Silence the drive and close the connection. May be called at any time."""
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:

@@ -81,7 +81,7 @@ class Committer:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Write and commit everything queued, and end the thread. Legal at any time.
+        """Write and commit everything queued, and end the thread. May be called at any time.
 
         Raises RecordingError when the disk does not respond; the disk must then not be accessed.
         """

@@ -384,7 +384,7 @@ class Recording(RecordingDescription):
         return given
 
     def close(self) -> None:
-        """Close the file. Legal at any time."""
+        """Close the file. May be called at any time."""
         self._open.file.close()
 
     def __enter__(self) -> Self:

@@ -95,7 +95,7 @@ class DescriptorReserve:
             ) from error
 
     def close(self) -> None:
-        """Release the reserved descriptors. Legal at any time."""
+        """Release the reserved descriptors. May be called at any time."""
         while self._held:
             os.close(self._held.pop())
 
