@@ -30,14 +30,18 @@ class RunningProgram:
         except OSError:
             self._facts = b""
 
-    def name(self) -> str:
-        """Return what the program does, and its process id, in printable characters."""
+    def fact(self, name: str) -> str:
+        """Return a part of the announcement; empty if unknown."""
         import json
 
         try:
-            what = str(json.loads(self._facts)["what"])
+            return str(json.loads(self._facts)[name])
         except (ValueError, KeyError, TypeError):
-            what = "a program of another user"
+            return ""
+
+    def name(self) -> str:
+        """Return what the program does, and its process id, in printable characters."""
+        what = self.fact("what") or "a program of another user"
         shown = (each if each.isprintable() else each.encode("unicode_escape").decode() for each in what)
         return f"{''.join(shown)}, process {self.pid}"
 
@@ -102,17 +106,17 @@ def running_programs() -> Iterator[RunningProgram]:
     for name in sorted(os.listdir(folder)):  # noqa: PTH208
         pid, _, rest = name.partition(".")
         start, _, suffix = rest.rpartition(".")
-        if suffix != "json" or not pid.isdecimal():
-            continue
         path = os.path.join(folder, name)  # noqa: PTH118
-        place = start.split("_")
-        if len(place) != 3 or place[0] != boot:
-            if _is_locked(path):
-                raise OSError("on another computer")
-        elif place[1] == space:
-            yield RunningProgram(path, pid, start, partial(_is_process, pid, place[2]))
-        elif _is_locked(path):  # in a container on this computer
-            yield RunningProgram(path, pid, start, partial(_is_locked, path))
+        if suffix != "json" or not pid.isdecimal() or not os.path.isfile(path):  # noqa: PTH113 - as above
+            continue
+        is_here = start.startswith(f"{boot}_{space}_")
+        look = partial(_is_process, pid, start.split("_")[-1]) if is_here else partial(_is_locked, path)
+        if not start.startswith(f"{boot}_") and look():
+            raise OSError("on another computer")
+        program = RunningProgram(path, pid, start, look)
+        # Otherwise it runs in a container, or may have ended with an earlier boot of this computer.
+        if is_here or look() or program.fact("computer") == os.uname().nodename:
+            yield program
 
 
 def _state_folder() -> str:
@@ -125,18 +129,14 @@ def _own_place() -> tuple[str, str]:
         return file.read(8), str(os.stat("/proc/self/ns/pid").st_ino)  # noqa: PTH116
 
 
-def _start_of(pid: str) -> str:
-    """Return the start time of a process as in proc(5); empty if it does not run."""
+def _is_process(pid: str, start: str) -> bool:
+    """Return whether the process with this start time, as in proc(5), runs."""
     try:
         with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
             state, *others = file.read().rpartition(")")[2].split()
     except OSError:
-        return ""
-    return "" if state in "ZX" else others[18]
-
-
-def _is_process(pid: str, start: str) -> bool:
-    return _start_of(pid) == start
+        return False
+    return state not in "ZX" and others[18] == start
 
 
 def _is_locked(path: str) -> bool:

@@ -13,6 +13,7 @@ from vibench.acquisition.stopping.program import (
     announced_programs,
     engines_folder,
     facts_of_this_process,
+    note_open_bench,
 )
 from vibench.sim.operating_system.this import OpenFile
 
@@ -134,3 +135,21 @@ def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, 
         assert "run 'vibench stop' there" in told.stdout
     assert "Not reached" not in vibench_here("stop", cwd=tmp_path).stderr
     assert path.exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
+def test_a_program_from_before_a_restart_is_reported_until_its_bench_is_silent(vibench_here, tmp_path):
+    """The generator has its own mains, and plays on while the computer starts again."""
+    facts = facts_of_this_process("night")
+    boot, *others = facts["process_start"].split("_")
+    before = facts | {"process_start": "_".join([boot[::-1], *others]), "rigs": ("lab",)}
+    path = engines_folder() / f"{facts['pid']}.{before['process_start']}.json"
+    path.write_text(Program.model_validate(before).model_dump_json())
+    for each in ("ramp", "hold"):  # the short and the complete command
+        told = vibench_here("stop", "--level", each, cwd=tmp_path)
+        assert told.returncode == 1
+        assert "night" in told.stderr
+        assert "ended without confirming" in told.stderr
+        assert "switch the amplifier off" in told.stderr
+    note_open_bench("lab")
+    assert not path.exists()

@@ -244,10 +244,11 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 def unconfirmed_programs() -> tuple[Program, ...]:
     """Return the programs of this computer that ended without confirming that their output is off.
 
-    `note_open_bench` forgets them. Raises AcquisitionError in the same cases as `announced_programs`.
+    They may have ended with an earlier boot. `note_open_bench` forgets them. Raises AcquisitionError in the
+    same cases as `announced_programs`.
     """
-    here = (each for _, each in _announcements(Program) if each.place is Place.HERE)
-    return tuple(each for each in here if not each.is_alive and each.computer in ("", platform.node()))
+    dead = (each for _, each in _announcements(Program) if not each.is_alive)
+    return tuple(each for each in dead if each.computer == platform.node() or not each.computer)
 
 
 def note_open_bench(rig: str) -> None:
