@@ -68,9 +68,8 @@ def parse_stop(words: Sequence[str]) -> tuple[str, str, str] | None:
     if len(split) != 2 * len(given) or not given.keys() <= {"--level", "--reason", "--pid"}:
         return None
     level, reason = given.get("--level", "ramp"), given.get("--reason", "vibench stop")
-    pid = given.get("--pid")
-    is_plain = level in LEVELS and reason and (pid is None or pid.isdecimal())
-    return (level, reason, pid or "") if is_plain else None
+    is_plain = level in LEVELS and reason and given.get("--pid", "0").isdecimal()
+    return (level, reason, given.get("--pid", "")) if is_plain else None
 
 
 def stop_programs(level: str, reason: str, pid: str) -> int | None:
@@ -120,8 +119,9 @@ def running_programs() -> Iterator[RunningProgram]:
 
 
 def _state_folder() -> str:
-    home = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")  # noqa: PTH111
-    return os.environ.get("VIBENCH_STATE_DIR") or os.path.join(home, "vibench")  # noqa: PTH118
+    home = os.path.expanduser("~/.local/state")  # noqa: PTH111
+    usual = os.path.join(home, os.environ.get("XDG_STATE_HOME", ""), "vibench")  # noqa: PTH118
+    return os.environ.get("VIBENCH_STATE_DIR") or usual
 
 
 def _own_place() -> tuple[str, str]:

@@ -153,3 +153,15 @@ def test_a_program_from_before_a_restart_is_reported_until_its_bench_is_silent(v
         assert "switch the amplifier off" in told.stderr
     note_open_bench("lab")
     assert not path.exists()
+
+
+@pytest.mark.parametrize("given", ["", "given"])
+def test_a_program_is_found_from_every_folder(vibench_here, tmp_path, monkeypatch, given):
+    monkeypatch.delenv("VIBENCH_STATE_DIR")
+    monkeypatch.setenv("XDG_STATE_HOME", given)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    with driving("night"):
+        told = vibench_here("stop", cwd=tmp_path / "elsewhere")
+        assert told.returncode == 0, told.stderr

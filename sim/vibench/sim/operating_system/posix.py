@@ -118,7 +118,7 @@ def bound_memory(most_bytes: int) -> None:
 def usual_state_folder() -> Path:
     """Return vibench's folder inside the operating system's folder for user-specific program state."""
     home = Path.home()
-    linux = Path(os.environ.get("XDG_STATE_HOME", home / ".local" / "state"))
+    linux = home / ".local" / "state" / os.environ.get("XDG_STATE_HOME", "")  # not in the current folder
     return (home / "Library" / "Application Support" if sys.platform == "darwin" else linux) / "vibench"
 
 
