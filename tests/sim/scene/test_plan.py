@@ -1,6 +1,9 @@
+import time
+
 import pytest
 
-from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene
+from vibench.sim import Harmonic, Observable, Scene, gong2025, integrate, plan_scene
+from vibench.sim.scene.plan import CLOSED_FORM_S
 from vibench.sim.scene.prediction import Method
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
 
@@ -58,3 +61,18 @@ def test_the_planned_cost_without_contact_grows_with_the_drive_periods():
         return plan_scene(Scene(gong2025(), drive, duration=length, budget_s=0.0)).planned_s
 
     assert cost(1e6) > 30.0 * cost(1e4)
+
+
+def test_enormous_levels_cost_as_much_more_as_planned():
+    """Relative to the plan, levels of 1 to 20 m took 14 times as long as 10 um."""
+
+    def taken_over_planned(amplitude_m):
+        drive, length = Harmonic(200.0, amplitude_m), FixedDuration(1.0, 0.1)
+        planned_s = plan_scene(Scene(gong2025(), drive, duration=length, budget_s=0.0)).planned_s
+        begins_s = time.thread_time()
+        integrate(gong2025(), drive, length.duration_s)
+        return (time.thread_time() - begins_s) / (planned_s - CLOSED_FORM_S)
+
+    usual, *enormous = (min(taken_over_planned(each) for _ in range(3)) for each in (1e-5, 1e-3, 1.0, 20.0))
+    for each in enormous:
+        assert 0.2 < each / usual < 5.0

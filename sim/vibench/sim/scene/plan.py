@@ -124,10 +124,11 @@ DECAYED_SHARE = 1e-9
 """Largest transient, over the steady motion, that the closed form may neglect."""
 
 CLOSED_FORM_S = 5e-4
-"""Planned computing time of a closed form [s]. The ledger of `vibench.sim.scene.cost` corrects planned times
-for each machine."""
-FLIGHT_S, PERIOD_S, IMPACT_S = 5e-5, 1e-7, 1e-6
-"""Planned time [s] per second of motion without contact, per drive period of it, and per impact."""
+"""Planned time for a closed form [s]. Measured run times correct the planned times for each machine
+(`vibench.sim.scene.cost`)."""
+FLIGHT_S, PERIOD_S, IMPACT_S, PRESSED_S = 5e-5, 1e-7, 1e-6, 1.2e-2
+"""Planned time per second and per drive period of motion without contact, per impact, and per second of
+contact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
 """Planned time [s] per second and per drive period of motion under a force that acts at every p."""
 TANGENT = 1.5
@@ -141,7 +142,9 @@ SLOW = 0.9
 """Ratio of drive frequency to lowest natural frequency below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if the linear p equals the gap; proportional to the cube root of p over gap."""
+"""Impacts per drive period if the linear p equals the gap; grows with the cube root of p over the gap."""
+HALF_PRESSED = 150.0
+"""Linear p over the gap at which m1 touches a stop for half of the time."""
 MICROMETRES = 1e6
 
 
@@ -323,11 +326,7 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     if _share(scene, motion) > TOUCHING:
         contact = "slow" if _is_slow(scene, motion) else "touching"
     contact += ", undamped" if motion.slowest_rate >= 0.0 else ""
-    match scene.duration:
-        case FixedDuration():
-            duration = "fixed"
-        case AutomaticDuration():
-            duration = "automatic"
+    duration = "fixed" if isinstance(scene.duration, FixedDuration) else "automatic"
     observed = "+".join(sorted(each.value for each in scene.observe))
     return "/".join(
         (
@@ -341,13 +340,14 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
     """Return the planned computing time for one second of motion [s]."""
     share, frequency_hz = _share(scene, motion), scene.drive.frequency_hz
-    per_period = IMPACTS_PER_PERIOD * math.cbrt(share) if share > TOUCHING else 0.0
-    per_s = FLIGHT_S + (PERIOD_S + IMPACT_S * per_period) * frequency_hz
+    per_s = FLIGHT_S + PERIOD_S * frequency_hz
+    if share > TOUCHING:
+        per_s += IMPACT_S * IMPACTS_PER_PERIOD * math.cbrt(share) * frequency_hz
+        per_s += PRESSED_S * share / (share + HALF_PRESSED)
     if method is Method.POLYNOMIAL:
         per_s = STEPS_S + STEPS_PERIOD_S * frequency_hz
     runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
-    runs += FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0
-    runs += 1.0 if scene.budget_s > 0.0 else 0.0
+    runs += (FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0) + float(scene.budget_s > 0.0)
     return per_s * runs
 
 
