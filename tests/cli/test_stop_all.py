@@ -162,6 +162,6 @@ def test_a_program_is_found_from_every_folder(vibench_here, tmp_path, monkeypatc
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "elsewhere").mkdir()
-    with driving("night"):
+    with driving_program("night"):
         told = vibench_here("stop", cwd=tmp_path / "elsewhere")
         assert told.returncode == 0, told.stderr

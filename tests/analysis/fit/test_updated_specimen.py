@@ -143,8 +143,8 @@ def test_a_sweep_that_collides_smoothly_before_its_regions_gives_no_gap(tmp_path
         update_model(analyse_files([path], "smooth", Simulation.LEFT_OUT))
 
 
-def test_a_wrong_description_widens_the_bounds_of_the_gap(measured):
-    sweep = measured.sweeps[0].analysis
+def test_a_wrong_description_widens_the_bounds_of_the_gap(campaign):
+    sweep = campaign.sweeps[0].analysis
     widths = []
     for damping_s in (3.1e-5, 3.3e-5):
         (onset,) = onsets(sweep, with_values(TRUE, {Parameter.DAMPING_TIME: damping_s}))
@@ -218,7 +218,7 @@ def test_the_gap_is_not_fitted_without_a_sweep_and_a_reason_is_given(campaign):
     assert found.specimen.gap_m == gong2025().gap_m
     assert [each for each in found.not_determined if "gap stays as described" in each]
     with pytest.raises(NotEnoughData, match="as the specimen predicts it"):
-        update_model(CampaignResults("sweep", measured.sweeps, ()))  # of another specimen than the bench says
+        update_model(CampaignResults("sweep", campaign.sweeps, ()))  # of another specimen than the bench says
 
 
 def test_missing_data_for_a_fit_give_a_one_sentence_error(campaign):

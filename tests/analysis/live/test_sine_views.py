@@ -91,7 +91,7 @@ def test_no_live_point_is_drawn_while_the_drive_is_ramped_down():
 
 @pytest.mark.parametrize(("start_hz", "rate_hz_per_s"), [(110.0, -20.0), (260.0, -3.0), (260.0, 30.0)])
 def test_a_sweep_of_constant_displacement_gives_a_live_point(start_hz, rate_hz_per_s):
-    point = sine_point(held_displacement(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
+    point = sine_point(constant_displacement_sweep(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
     assert point.frequency_hz == pytest.approx(start_hz + rate_hz_per_s * point.time_s, rel=0.01)
 
 
