@@ -19,13 +19,15 @@ _HEADINGS = ("claim", "section, figure", "measured", "required", "verdict")
 HEAD = f"| {' | '.join(_HEADINGS)} |"
 _TITLE = "Claims of the paper, checked by simulation"
 _METHOD = """\
-Each claim of Gong et al. (2025) with a number or a direction is checked by simulating their specimen. The
-paper states few tolerances, so the required bounds are our choice. They allow for chaos, which differs by
-some per cent from run to run. Some bounds were set after a first look at the results. If chaos ends at
-random, a claim is measured from several starts (initial states a millionth of the gap apart), and the range
-is given. If a claim fails, other options (choices that the paper leaves open) are tested until it holds.
-A0 is the base amplitude, n the power of a continuous contact law, similarity the rate of eq. 7, and
-the exponent the largest Lyapunov exponent. DIR/report.html lists options, methods and claims by setting."""
+Each claim of Gong et al. (2025) with a number or direction is checked with a simulation of their
+specimen. The paper states few tolerances, so the required bounds are our choice, some made after a first
+look at the results. The bounds allow for chaos, whose responses differ by some per cent between runs.
+"Strict reading" takes the paper's words literally. "A over B" is the ratio A / B.
+If chaos ends at random, a claim is measured from several starts (initial states a millionth of the gap
+apart); its range is in parentheses. If a claim fails, options are tested in order until it holds.
+A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest Lyapunov
+exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
+DIR/report.html describes each measurement."""
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
@@ -185,7 +187,7 @@ def _except(result: Judgement) -> str:
 
 def _values(claim: Claim, found: Finding) -> str:
     text = "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
-    return text if len(found.draws) < 2 else f"{text}; over {len(found.draws)} starts"
+    return text if len(found.draws) < 2 else f"{text}; from {len(found.draws)} starts"
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:

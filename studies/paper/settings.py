@@ -60,13 +60,7 @@ def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
     always = [key for key in scores[0].failed if all(key in each.failed for each in scores)]
     return report.ReportTable(
         "Score by damping",
-        (
-            "c / k",
-            "claims that hold",
-            "largest exponent at 1 µm [1/s]",
-            "at 5 µm [1/s]",
-            "other claims that fail",
-        ),
+        ("c / k", "claims that hold", "largest exponent at 1 µm [1/s]", "at 5 µm [1/s]", "others that fail"),
         tuple(
             (
                 f"{each.damping_time_s:.3g} s",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.analysis import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
+from vibench.analysis import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ as TERMINAL_HZ
 from vibench.sim import Harmonic
 
 from .claim import about, at_least, at_most, claim
@@ -32,36 +32,26 @@ def redistributed(r: Reading) -> Values:
     """At 260 Hz and 5 µm the spectrum has peaks at 201 and 435 Hz, not at 95 and 500 Hz."""
     signal = _signal(r, MODERATE_M)
     outer = (PAPER_RESONANCES_HZ[0], PAPER_RESONANCES_HZ[-1])
-    pairs = zip(PAPER_TERMINAL_RESONANCES_HZ, outer, strict=True)
+    pairs = zip(TERMINAL_HZ, outer, strict=True)
     return tuple(_band(signal, terminal) / _band(signal, linear) for terminal, linear in pairs)
 
 
 @claim(
     "5, Figs. 10(f) and 14",
     "Levels within 10 Hz of 201 and of 435 Hz, relative to the level within 10 Hz of 260 Hz.",
-    *(
-        at_most(f"level, {each:g} over 260 Hz, at 1 µm", "%", _ABSENT)
-        for each in PAPER_TERMINAL_RESONANCES_HZ
-    ),
-    *(
-        at_least(f"level, {each:g} over 260 Hz, at 50 µm", "%", _PRESENT)
-        for each in PAPER_TERMINAL_RESONANCES_HZ
-    ),
+    *(at_most(f"level, {each:g} over 260 Hz, at 1 µm", "%", _ABSENT) for each in TERMINAL_HZ),
+    *(at_least(f"level, {each:g} over 260 Hz, at 50 µm", "%", _PRESENT) for each in TERMINAL_HZ),
 )
 def lines_emerge(r: Reading) -> Values:
     """With larger A0 at 260 Hz, two more resonances appear in the spectrum."""
     signals = [_signal(r, each) for each in (WEAK_M, STRONG_M)]
-    return tuple(
-        _band(signal, each) / _band(signal, SHOWN_HZ)
-        for signal in signals
-        for each in PAPER_TERMINAL_RESONANCES_HZ
-    )
+    return tuple(_band(signal, each) / _band(signal, SHOWN_HZ) for signal in signals for each in TERMINAL_HZ)
 
 
 @claim(
     "5, Figs. 10(f) and 14(b)",
     "Frequency of the highest peak at 50 µm, smoothed over 10 Hz, in 150-245 and in 350-500 Hz.",
-    *(about(f"peak near {each:g} Hz", "Hz", each, _NEAR_HZ) for each in PAPER_TERMINAL_RESONANCES_HZ),
+    *(about(f"peak near {each:g} Hz", "Hz", each, _NEAR_HZ) for each in TERMINAL_HZ),
 )
 def lines_at_terminal(r: Reading) -> Values:
     """These two resonances approach the terminal resonances, 201 and 435 Hz."""
