@@ -50,5 +50,5 @@ def test_a_table_10_percent_heavier_than_described_is_named_as_suspect(update):
     (suspect,) = heavier.suspects
     assert suspect.assumption is Assumption.TABLE_MASS
     assert "all three masses of the specimen" in suspect.sentence
-    assert [each for each in heavier.sentences if each.startswith("The table does not fit")]
+    assert [each for each in heavier.sentences if each.startswith("The table's described mass does not fit")]
     assert heavier.values == update.values
