@@ -24,6 +24,13 @@ def test_an_estimate_is_one_json_document_and_writes_no_file(output_of, tmp_path
     assert not (tmp_path / "out").exists()
 
 
+def test_an_estimate_refuses_a_level_beyond_the_limits(refusal, tmp_path):
+    plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
+    plan.write_text(plan.read_text(encoding="utf-8").replace("[0.05]", "[0.05, 50]"), encoding="utf-8")
+    said = refusal("measure", plan, "--bench", bench, "--out", "out", "--estimate")
+    assert "line-50vpp-200hz: the generator voltage would be 50 Vpp, allowed is at most 10 Vpp" in said
+
+
 @pytest.mark.thorough
 def test_a_campaign_is_logged_catalogued_and_its_end_notified(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)

@@ -15,13 +15,7 @@ from vibench.analysis import (
     compare_recording,
     level_of_drive,
 )
-from vibench.analysis.dynamics import (
-    BranchDiagram,
-    BranchLine,
-    BranchRequest,
-    branch_lines,
-    write_diagram,
-)
+from vibench.analysis.dynamics import BranchDiagram, BranchLine, BranchRequest, branch_lines, write_diagram
 from vibench.sim import Parameter
 
 from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for

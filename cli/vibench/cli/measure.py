@@ -13,13 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import vibench.analysis
-from vibench.acquisition import (
-    AcquisitionError,
-    CheckRule,
-    load_campaign,
-    load_toml,
-    stop_on_signal,
-)
+from vibench.acquisition import AcquisitionError, CheckRule, load_campaign, load_toml, stop_on_signal
 from vibench.acquisition.campaign import (
     AfterFailure,
     CampaignEstimate,
@@ -41,7 +35,7 @@ from vibench.acquisition.engine import (
     TwinSwitch,
     serving,
 )
-from vibench.acquisition.plan import Campaign
+from vibench.acquisition.plan import Campaign, played_alike, require_within_limits
 from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 from vibench.sim import number_of
 
@@ -91,7 +85,9 @@ def print_estimate(
 
 
 def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:
-    """Return the expected results of each measurement, each with its uncertainty."""
+    """Return the expected results of each measurement; raise LimitExceeded for a plan beyond a limit."""
+    for point in played_alike(campaign.points()):
+        require_within_limits(point.measurement, rig)
     found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
     return {name: each for name, each in found.items() if each}
 

@@ -4,12 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from vibench.analysis import InvalidRequest
-from vibench.analysis.dynamics import (
-    ExponentSpectrum,
-    SpectrumRequest,
-    spectrum_points,
-    write_spectrum,
-)
+from vibench.analysis.dynamics import ExponentSpectrum, SpectrumRequest, spectrum_points, write_spectrum
 from vibench.sim import Parameter
 
 from .dynamics_answer import SHOWN, compute_parts, keep, leave, print_answer, room_for
