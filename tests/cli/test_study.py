@@ -140,6 +140,11 @@ def test_a_study_with_a_failed_point_is_saved_and_returns_an_error(vibench_here,
     assert ended.value.exit_code == 1
 
 
+def test_a_study_file_with_the_suffix_of_another_format_is_refused(refusal, tmp_path):
+    assert "use the suffix .h5" in refusal("study", "paper", "--out", "a.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_unreachable_cluster_is_reported_in_one_sentence(refusal, tmp_path):
     pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
     said = refusal("study", plan(tmp_path), "--out", "a.h5", "--cluster", "nonsense:what")

@@ -45,6 +45,8 @@ _ALLOWED = {
     "finite_number": "it must be a finite number",
 }
 """Text about the allowed values, by type of pydantic's error."""
+_EXAMPLES = {"error": "; for 1 % give 1%"}
+"""Example of an allowed value, by field."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,9 @@ def validated(model: type[Request], given: Mapping[str, object]) -> Request:
         return model.model_validate(given)
     except ValidationError as error:
         fault = error.errors()[0]
-        allowed = _ALLOWED.get(fault["type"], "").format(**fault.get("ctx", {}))
-        reason = allowed or fault["msg"].removeprefix("Value error, ")
         field = str(fault["loc"][0]) if fault["loc"] else ""
+        allowed = _ALLOWED.get(fault["type"], "").format(**fault.get("ctx", {}))
+        reason = (allowed or fault["msg"].removeprefix("Value error, ")) + _EXAMPLES.get(field, "")
         typed = given.get(field)
         value = typed if fault["input"] is None or isinstance(typed, str) else fault["input"]
         place = f"--{option_name(field)} was given as {value!r}: " if field else ""

@@ -94,9 +94,14 @@ def file_at(out: Path | None, usual: Path) -> Path:
         out.mkdir(parents=True)
     if out.is_dir():
         return out / usual.name
-    if out.suffix.lower() in SUFFIXES - {usual.suffix}:
-        raise ConfigurationError(f"{out} has the suffix of another format; use the suffix {usual.suffix}")
+    require_suffix(out, usual.suffix)
     return out
+
+
+def require_suffix(path: Path, suffix: str) -> None:
+    """Refuse the suffix of another format; raise ConfigurationError."""
+    if path.suffix.lower() in SUFFIXES - {suffix}:
+        raise ConfigurationError(f"{path} has the suffix of another format; use the suffix {suffix}")
 
 
 def free_path(path: Path) -> Path:

@@ -32,7 +32,7 @@ from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 from .interruption import watch_interrupt
 from .options import Fields, RequestOptions, option, option_name
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
-from .paths import AsJson
+from .paths import AsJson, require_suffix
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
 from .range_option import frequencies
@@ -76,6 +76,7 @@ def predict(
     """Predict the responses of m0 and of p over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, which it needs; give both")
+    require_suffix(out or Path(), ".h5")
     given = {"error": error, "time_s": time_limit, "budget_s": budget and _seconds("budget", budget)}
     given["duration_s"] = duration if duration in (None, AUTO) else _seconds("duration", duration)
     typed = {name: value for name, value in given.items() if value is not None}
@@ -220,7 +221,7 @@ def _table(title: str, headings: Sequence[str], caption: str | None = None) -> T
 
 
 def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
-    title = "Responses I and II of m0 and of p = y - z, over the base amplitude [-]"
+    title = "Responses I and II of m0 and of p = y - z, over the base amplitude [-]; relative error"
     headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
     rows = _table(title, headings + ["exponent [1/s]"] * has_exponents)
     step = max(1, -(-len(points) // _SHOWN))

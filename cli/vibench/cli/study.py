@@ -19,7 +19,7 @@ from vibench.sim.study import (
 from .interruption import watch_interrupt
 from .options import option
 from .output import ExitCode, console, errors, print_json, print_warnings
-from .paths import AllowExternal, AsJson, external_data
+from .paths import AllowExternal, AsJson, external_data, require_suffix
 from .points import Cluster, Workers, complain_about_points, print_failures
 from .progress_bars import study_bar
 
@@ -39,6 +39,7 @@ def study(
     as_json: AsJson = False,
 ) -> None:
     """Predict every combination of the values in a file, longest runs first."""
+    require_suffix(out, ".h5")
     request = load_toml(named(plan, "studies"), Study)
     print_warnings(
         plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)

@@ -56,8 +56,8 @@ class FixedDuration(Strict):
         require_positive("Duration", self.duration_s, "s")
         if not 0.0 < self.window_s <= self.duration_s:
             msg = (
-                f"Window {self.window_s} s is not allowed: "
-                f"it must be positive and within the run of {self.duration_s} s."
+                f"Window {self.window_s} s is not allowed: it must be positive and within the run of "
+                f"{self.duration_s} s; give a shorter window or a longer run."
             )
             raise ValueError(msg)
 
