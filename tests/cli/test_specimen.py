@@ -169,8 +169,14 @@ def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(output_of, tmp_path):
     assert "-0," not in text
 
 
-def test_the_forces_of_all_laws_are_drawn(output_of, tmp_path):
-    output_of("specimen", "--forces", "drawn")
+def test_a_gap_in_metres_gives_a_warning(vibench_here, tmp_path):
+    (tmp_path / "wide.toml").write_text('name = "wide"\nmodel = "gong2025"\ngap_m = 30\n')
+    said = vibench_here("specimen", "wide.toml", cwd=tmp_path).stderr
+    assert "if 30 micrometres were meant, give 3e-05" in said
+
+
+def test_the_forces_of_all_laws_are_drawn(answered, tmp_path):
+    answered("specimen", "--forces", "drawn")
     assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000
 
 

@@ -144,8 +144,9 @@ def _add_given_value(error: typer.BadParameter, words: Sequence[str]) -> None:
     if given is None:
         return
     if any(kind in error.message for kind in ("number", "float", "integer")) and not _is_number(given):
-        advice = "give a number in SI units without the unit, such as 5 or 5e-6"
-        error.message = f"{given!r} is not a number; {advice}."
+        advice = "number; give a number in SI units without the unit, such as 5 or 5e-6"
+        advice = "whole number; give a number such as 5" if "integer" in error.message else advice
+        error.message = f"{given!r} is not a {advice}."
     elif error.message.startswith("Input should be "):
         error.message = f"{given!r} was given; it {error.message.removeprefix('Input ').partition(', ')[0]}."
 

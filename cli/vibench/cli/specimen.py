@@ -10,9 +10,10 @@ import typer
 from vibench.acquisition import schema_line, shipped_folder, toml_text
 from vibench.analysis import InvalidRequest
 from vibench.sim import CONTACT_LAWS, Specimen, shipped_specimens
+from vibench.sim.study import plausibility_warnings
 
 from .options import option
-from .output import bold, console, paragraph, print_json
+from .output import bold, console, paragraph, print_json, print_warnings
 from .paths import AsJson, room_for_folder
 from .specimen_option import read_specimen
 
@@ -44,6 +45,7 @@ def show_specimen(
         return
     table = read_specimen(specimen)
     facts = figures_of(table.specimen())
+    print_warnings(plausibility_warnings((), table.specimen().gaps_m))
     if as_json:
         gaps_m = [gap_m if math.isfinite(gap_m) else str(gap_m) for gap_m in table.specimen().gaps_m]
         print_json({**table.model_dump(mode="json", exclude_none=True), **facts, "gaps_m": gaps_m})
@@ -88,7 +90,7 @@ def _list(as_json: bool) -> None:
     for title, rows in (("Specimens (--specimen)", specimens), ("Contact laws (--model)", laws)):
         console.print(title)
         for name, about in rows.items():
-            console.print(f"  {name:28} {about}")
+            console.print(f"  {name:42} {about}")
 
 
 _UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m": "m"}

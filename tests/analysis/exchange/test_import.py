@@ -635,6 +635,7 @@ def test_a_csv_heading_may_be_in_any_common_encoding(tmp_path, encoding):
         ("a.h5", b"text", "is not an HDF5 file"),
         ("a.mat", b"MATLAB 5.0 MAT-file", "is damaged, or has a wrong suffix"),
         ("a.csv", b"a,b\nc,d\n", "lines contains numbers only"),
+        ("a.csv", b"", r"wrong suffix \(empty\)"),
         ("a.wav", b"RIFF\x00\x00", "is damaged, or has a wrong suffix"),
         ("a.uff", b"    -1\n    58b     1     2\n", "is damaged, or has a wrong suffix"),
         ("a.unv", b"    -1\n   164\n    -1\n", "contains no real samples over time"),

@@ -289,7 +289,7 @@ def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
                 found = head.copy(), number, layout
             head.append(line)
     if found is None:
-        raise ValueError(f"none of its first {LONGEST_HEAD} lines contains numbers only")
+        raise ValueError(f"none of its first {LONGEST_HEAD} lines contains numbers only" if head else "empty")
     return found
 
 
